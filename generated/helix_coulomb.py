@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input 3f2dfaf376e9, body 6ff1f17191a2
+# interface 11, input 3f2dfaf376e9, body 7f7b2c8ada66
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=10)
+compiled = compiler(__file__, interface=11)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, STATIC_BALANCE,
@@ -66,8 +66,8 @@ def path_and_contact_force(n, places, speeds, p, out):
 
 
 @compiled(PATH_IN_SPACE)
-def path_in_space(n, places, speeds, p, out):
-    """y, and the contact force along x, y and z, given V**2."""
+def path_in_space(n, places, speeds, v, p, out):
+    """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (4, n))
     R, c, g, m = p[0], p[1], p[3], p[4]
     _t0 = R**2 + c**2
@@ -326,7 +326,7 @@ MODEL = CompiledModel(
     functions=CompiledFunctions(
         path_and_contact_force,
     ),
-    path_in_space=path_in_space, signed=False,
+    path_in_space=path_in_space, signed=False, sided=False,
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=False),

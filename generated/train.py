@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 10, input b87305fcd75e, body a9a1838443f9
+# interface 11, input b87305fcd75e, body 76be0a6a259e
 """A train of five cars on hills
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=10)
+compiled = compiler(__file__, interface=11)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
@@ -175,9 +175,9 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_train(op, p):
-    """The length of a train, and what gravity is."""
+    """The length of a train, what gravity is, and its coefficient of friction."""
     length, g = p[0], p[1]
-    return length, g
+    return length, g, 0
 
 def exact_factors(op, p):
     """What stands before the parts of U, then before those of n0."""

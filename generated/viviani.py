@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 10, input c93b8a64a5a5, body 8b0326c7e4c1
+# interface 11, input c93b8a64a5a5, body 9aeede97de4f
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=10)
+compiled = compiler(__file__, interface=11)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -68,8 +68,8 @@ def path_and_contact_force(n, places, speeds, p, out):
 
 
 @compiled(PATH_IN_SPACE)
-def path_in_space(n, places, speeds, p, out):
-    """y, and the contact force along x, y and z, given V**2."""
+def path_in_space(n, places, speeds, v, p, out):
+    """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (4, n))
     a, g, m = p[0], p[1], p[2]
     for i in range(n):
@@ -441,7 +441,7 @@ MODEL = CompiledModel(
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    path_in_space=path_in_space, signed=False,
+    path_in_space=path_in_space, signed=False, sided=False,
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,

@@ -7,6 +7,7 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Set
 from functools import wraps
+from itertools import islice
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -21,6 +22,8 @@ _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 # Of a name with fewer letters than this, one of two letters may be wrong.
 MIN_LENGTH = 4
+# The most things in order that an argument may have: what has no end is no list of them.
+MAX_ITEMS = 2_000_000
 # No longer path is the name of a file.
 MAX_PATH = 4096
 # Arguments that a method does not get from its caller.
@@ -101,7 +104,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def not_given(name: str) -> str:
-    """What to do about a parameter that has no value."""
+    """Return the remedy for a parameter without a value."""
     return f"{name}: has no default and was not given; pass {name}=..."
 
 
@@ -123,9 +126,11 @@ def several(given: Any, *, where: str, what: str) -> tuple[Any, ...]:
     """
     if not isinstance(given, str | bytes | Mapping | Set):
         try:
-            return tuple(given)
+            items = tuple(islice(given, MAX_ITEMS + 1))
         except TypeError:
-            pass
+            items = None
+        if items is not None and len(items) <= MAX_ITEMS:
+            return items
     raise DeclarationError(f"{where}: must be {what}, got {short(given)}")
 
 

@@ -1,8 +1,8 @@
 """Processor time that a stage may take: symbolic work has no bound that could be seen from its input.
 
-Processor time and not that of the clock: a busy machine is no reason to refuse anything. Nor is a large program: what
-collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what it is called from
-says nothing of budgets, and stages may lie within one another.
+Processor time is measured, not the time of the clock, so that nothing is refused because a machine is busy. Nor is a
+large program: what collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what
+it is called from says nothing of budgets, and stages may lie within one another.
 """
 
 import gc
@@ -30,7 +30,7 @@ _CURRENT: ContextVar[_Budget | None] = ContextVar("budget", default=None)
 
 
 def _without_collections(own: _Budget) -> Callable[[str, Any], None]:
-    """What to call when a collection of garbage begins and ends, for the budget to be longer by its time."""
+    """Return the callback of garbage collection, whose time is added to the budget."""
     thread, begin = get_ident(), thread_time()
 
     def collecting(phase: str, _: Any) -> None:
@@ -53,7 +53,7 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
     stage
         What it does, as the error should call it: ``derivation``.
     seconds
-        How long it may take.
+        The limit of time.
     remedy
         What to try if that is not enough.
     """

@@ -1,9 +1,9 @@
-"""Dimensions of parameters, as far as the formulas that they stand in tell them.
+"""The dimensions of parameters, as far as the formulas that contain them determine these.
 
 Every parameter has unknown powers of mass, length and time. A formula of known dimension gives linear equations for
-them: terms of a sum are alike, arguments of functions are numbers. People leave units out of numbers (z = x**2 is a
-curve, in metres), so numbers and what has no parameter in it give no equation where they might hide a unit, and
-formulas that contradict each other tell nothing.
+them: terms of a sum are alike, arguments of functions are numbers. Numbers are often written without units (z = x**2 is
+a curve, in metres). Therefore numbers, and terms without parameters, give no equation where they might hide a unit, and
+formulas that contradict each other determine nothing.
 """
 
 from collections.abc import Mapping

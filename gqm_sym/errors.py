@@ -1,4 +1,4 @@
-"""What can go wrong: one exception a kind, and which of them are the user's to mend.
+"""Exceptions, one for each kind of error; `InputError` and its subclasses are mistakes in the input.
 
 Every message says, in this order: where, what was given, what would be right.
 """
@@ -12,7 +12,7 @@ class GQMError(Exception):
 
 
 class InputError(GQMError):
-    """What was given is wrong: an expression, a declaration, a file or a launch."""
+    """The input is wrong: an expression, a declaration, a file or a launch."""
 
 
 class ExpressionError(InputError):
@@ -88,7 +88,7 @@ class NoisyPointsWarning(UserWarning):
 
 
 def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn]:
-    """A ``__getattr__`` for a class or a module that tells the new name of an attribute that was renamed.
+    """Return a ``__getattr__`` for a class or a module whose error says the new name of a renamed attribute.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ def is_real_at(form: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool | Non
 
 
 def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NAMES) -> str:
-    """Return ``name`` if a parameter can be called so, else say why not.
+    """Return ``name`` if it is allowed as the name of a parameter, and refuse it with the reason otherwise.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NA
 
 
 def check_module_name(name: str, *, where: str) -> str:
-    """Return ``name`` if a generated module can be called so, else say why not."""
+    """Return ``name`` if it is allowed as the name of a generated module, and refuse it with the reason otherwise."""
     check_name(name, where=where)
     if name in sys.stdlib_module_names or name == "gqm_sym" or _is_installed(name):
         raise ExpressionError(
@@ -199,7 +199,7 @@ def check_module_name(name: str, *, where: str) -> str:
 
 
 def _is_installed(name: str) -> bool:
-    """Whether a package that is installed has a module of this name; one in the user's own folders is no obstacle."""
+    """Whether an installed package has a module of this name; a module in the user's own folders does not matter."""
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):

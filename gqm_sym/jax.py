@@ -35,8 +35,8 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     SolutionError
         If JAX is not installed (extra ``[jax]``).
     InputError
-        From the function that is returned, for a name that is no parameter of the module, or a parameter that has no
-        default and was not given.
+        Raised by the returned function for a name that is not a parameter of the module, or for a parameter without
+        default that was not given.
 
     Notes
     -----

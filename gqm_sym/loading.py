@@ -12,7 +12,7 @@ from gqm_sym.errors import InputError
 
 
 class _Source(SourceFileLoader):
-    """Reads the source always: Python tells what it cached apart by size and whole seconds alone."""
+    """It always reads the source, because Python distinguishes cached versions by size and whole seconds only."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)

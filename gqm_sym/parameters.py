@@ -126,7 +126,7 @@ def check_measured(defaults: Mapping[str, Value | None], units: Mapping[str, str
 
 
 def _decimal(number: sp.Rational) -> str:
-    """A rational number as a decimal where it ends, else as a fraction."""
+    """Return a rational number as a decimal if that is finite, otherwise as a fraction."""
     with localcontext(prec=_PLACES) as context:
         context.traps[Inexact] = True
         try:

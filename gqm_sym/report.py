@@ -21,6 +21,9 @@ from gqm_sym.export.html import summary
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION
 from gqm_sym.optional import require
 from gqm_sym.runtime import Motion
+from gqm_sym.runtime.charts.train import TrackOfTrain
+from gqm_sym.runtime.launch.kinds import LOADS
+from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY
 from gqm_sym.runtime.motion.rows import Rows, table
 from gqm_sym.specfile import Spec
 from gqm_sym.sympy_charts import ChartFunction
@@ -79,6 +82,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
         _facts(summary(motion)),
         "<h2>The motion</h2>",
         *_figures(motion),
+        *_riders(motion),
         "<h2>Events</h2>",
         Rows(motion.events)._repr_html_(),
         "<h2>Legs</h2>",
@@ -171,7 +175,7 @@ def _power(base: str, exponent: str) -> str:
 
 
 def _mathml(form: sp.Basic) -> str:
-    # XML does not know the named entities of HTML.
+    # XML does not have the named entities of HTML.
     text: str = sp.mathml(form, printer="presentation")
     return re.sub(r"&[A-Za-z]\w+;", lambda found: _character(found[0]), _unfenced(text))
 
@@ -200,9 +204,33 @@ def _character(entity: str) -> str:
 
 def _figures(motion: Motion) -> Iterator[str]:
     for what, caption in FIGURES.items():
+        if what == "track" and motion.problem.formulas.rider_loads is not None:
+            continue  # the ride has it
         # A motion that loses energy has no phase portrait.
         with suppress(SolutionError):
             yield _svg(motion.plot(what), what, caption)
+
+
+def _riders(motion: Motion) -> Iterator[str]:
+    """Yield what riders feel, on a banked track: the extremes of loads, and in a train those of three cars."""
+    from gqm_sym.figures.rides import SEAT_TIMES, ride, seat_extremes, seats
+
+    if motion.problem.formulas.rider_loads is None:
+        return
+    yield "<h2>What riders feel</h2>"
+    yield f"<p>Loads are in units of {STANDARD_GRAVITY} m/s².</p>"
+    rows = []
+    for load in LOADS:
+        least, most = getattr(motion, f"n_{load}_min"), getattr(motion, f"n_{load}_max")
+        rows.append((load, *(f"{number:.4f}" for number in (least.value, least.t, most.value, most.t))))
+    yield table(("load", "least", "after (s)", "most", "after (s)"), rows)
+    if isinstance(motion.problem.formulas.chart, TrackOfTrain):
+        rows = [(seat, *(f"{load:.3f}" for load in felt)) for seat, *felt in seat_extremes(motion)]
+        heads = [f"{load}, {which}" for load in LOADS for which in ("least", "most")]
+        yield f"<p>The same in three cars of the train, at {SEAT_TIMES} times:</p>"
+        yield table(("car", *heads), rows)
+        yield _svg(seats(motion), "seats", "What riders feel in three cars, against the place of their car")
+    yield _svg(ride(motion), "ride", "The track with the vertical load, its plan and elevation, and all loads along it")
 
 
 def _svg(figure: "Figure", name: str, caption: str) -> str:

@@ -64,7 +64,7 @@ class SpaceFunction(ChartFunction):
     axis
         The coordinate, or ``roll``.
     order
-        How often it is differentiated.
+        The order of the derivative.
     """
 
     axis: ClassVar[str]
@@ -83,6 +83,58 @@ def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
     named = {"axis": axis, "order": order, "row": row, "symbol": (r"\psi" if axis == ROLL else axis) + primes}
     return type(f"space_{row}", (SpaceFunction,), {**named, "__module__": __name__})
 
+
+class TrainLoad(sp.Function):  # type: ignore[misc]
+    """The mean of |N|/m over the cars of a train, by the place of its middle, V**2, length, number of cars and g.
+
+    Attributes
+    ----------
+    by_speed, by_place
+        The heads of its derivatives by V**2 and by the place; None where that is not known.
+    """
+
+    nargs = 5
+    is_real = True
+    by_speed: "ClassVar[type[TrainLoad] | None]" = None
+    by_place: "ClassVar[type[TrainLoad] | None]" = None
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """Return its derivative by the place, or by V**2."""
+        head = (self.by_place, self.by_speed)[argindex - 1] if argindex <= 2 else None
+        if head is None:
+            raise DerivationError(f"{self}: no derivative of it is known")
+        return head(*self.args)
+
+
+class train_load_slope(TrainLoad):
+    """Its derivative by V**2."""
+
+
+class train_load_rate(TrainLoad):
+    """Its derivative by the place."""
+
+
+class train_load(TrainLoad):
+    """Of a track in space."""
+
+    by_speed, by_place = train_load_slope, train_load_rate
+
+
+class train_load_slope_in_plane(TrainLoad):
+    """Of a planar track the derivative by V**2."""
+
+
+class train_load_in_plane(TrainLoad):
+    """Of a planar track."""
+
+    by_speed = train_load_slope_in_plane
+
+
+TRAIN_LOADS: dict[str, tuple[str, ...]] = {
+    **{head.__name__: ("along_x", "along_y", "along_z") for head in (train_load, train_load_slope, train_load_rate)},
+    **{head.__name__: ("chart",) for head in (train_load_in_plane, train_load_slope_in_plane)},
+}
+"""The charts that each of these reads."""
 
 ROLL = "roll"
 AXES = ("x", "y", "z")

@@ -69,7 +69,7 @@ OFTEN_EXACT = {
     "superellipse",
 }
 # Launches from one line of progress to the next.
-PROGRESS = 1_000
+PROGRESS = 5_000
 
 
 def drawn(module: ModuleType, draw: random.Random) -> dict[str, Any]:

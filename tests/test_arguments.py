@@ -7,6 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache, partial
 from importlib import import_module
+from itertools import count
 
 import numpy as np
 import pandas as pd
@@ -270,6 +271,25 @@ def test_what_raised_errors_of_others_is_refused(asked, thing):
     call = LAUNCHED[asked] if asked in LAUNCHED else partial(ASKED[asked], MOTIONS["libration"]())
     with pytest.raises(GQMError, match=": "):
         call(thing)
+
+
+RISE = [(0, 0, 5), (1, 0.2, 4), (2, 0.1, 3), (3, 0, 3.5), (4, 0.3, 4), (5, 0, 4.5)]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: gqm.Curve.sampled(RISE, roll=count()), "sampled: roll: must be an angle for each point"),
+        (lambda: gqm.Curve.sampled(RISE, roll=range(10**9)), "sampled: roll: must be an angle for each point"),
+        (lambda: gqm.Curve.piecewise(range(10**9)), "piecewise: pieces: must be"),
+        (lambda: gqm.Curve.piecewise([gqm.line(length=1)], start=count()), "piecewise: start: must be a pair"),
+        (lambda: gqm.Train(length=1, cars=np.timedelta64(1, "s")), "train: cars: must be a whole number"),
+    ],
+)
+def test_what_has_no_end_is_no_list(call, message):
+    """Such lists filled the memory; a span of time was no whole number by an error of Python's."""
+    with pytest.raises(GQMError, match=f"^{message}"):
+        call()
 
 
 def test_questions_without_an_answer_take_no_time():

@@ -9,6 +9,7 @@ import pytest
 import gqm_sym as gqm
 from gqm_sym.cli import tool
 from gqm_sym.report import _formulas, _unfenced
+from gqm_sym.runtime.launch.kinds import LOADS
 
 HTML, SVG, MATH = (
     "{http://www.w3.org/1999/xhtml}",
@@ -126,3 +127,29 @@ def test_where_it_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert tool.main(["report", "swing.yaml", "--v0=-1"]) == 2
     assert tool.main(["report", "none.yaml"]) == 2
     assert sorted(path.name for path in here.iterdir()) == ["swing.yaml"]
+
+
+TRAIN = """\
+name: hills
+curve:
+  space: {x: 40*cos(u), y: 60*sin(u), z: 6*cos(3*u), parameter: u, roll: [coordinated, 14]}
+kernel:
+  gravity: {}
+  train: {length: 9, cars: 4}
+launch: {lam0: 0, v0: 10, t_max: 3}
+"""
+
+
+def test_a_coaster(here: Path) -> None:
+    """A page on a banked track has the extremes of loads, of a train also those of three cars, and their pictures."""
+    (here / "swing.yaml").write_text(TRAIN)
+    tree = page()
+    found = {row[0]: row[1:] for row in rows(tree) if row}
+    assert [load for load in found if load in ("vertical", "lateral", "longitudinal")] == list(LOADS)
+    assert 1.0 < float(found["vertical"][2]) < 1.5
+    assert len(found["first"]) == len(found["middle"]) == len(found["last"]) == 6
+    captions = ["".join(caption.itertext()) for caption in tree.iter(f"{HTML}figcaption")]
+    assert [caption.split(",")[0] for caption in captions][-2:] == [
+        "What riders feel in three cars",
+        "The track with the vertical load",
+    ]

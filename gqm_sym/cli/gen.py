@@ -23,7 +23,7 @@ FOLDER = "generated"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Product:
-    """What is made from one curve file: the model, the text of its module and where the module is written."""
+    """The results of one curve file: the model, the text of its module and the path of the module."""
 
     spec: "Spec"
     model: "Model"
@@ -173,7 +173,7 @@ def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
 
 
 def _deliver(product: Product, options: argparse.Namespace) -> None:
-    """Print and write what the options ask for."""
+    """Print and write the results that the options select."""
     from gqm_sym.building import write_module, write_text
 
     if options.latex is not None:

@@ -12,7 +12,7 @@ class Bar:
     Parameters
     ----------
     stream
-        Where to draw; standard error if not given.
+        The stream to draw on; by default standard error.
     things
         What is counted.
     """

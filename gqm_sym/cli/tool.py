@@ -247,7 +247,7 @@ def _assignment(text: str, known: Sequence[str]) -> tuple[str, str]:
 
 
 def _module(text: str, name: str, folder: Path) -> Any:
-    """Import the generated module: from the folder if the file there is up to date, else from a temporary folder."""
+    """Import the generated module from the folder if the file there is up to date, or else from a temporary one."""
     from gqm_sym.building import difference, load, write_module
 
     present = folder / f"{name}.py"

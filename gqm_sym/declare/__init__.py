@@ -1,4 +1,4 @@
-"""What a user declares: a curve, by its own formulas or as one of the known families."""
+"""Declarations of curves, by formulas, by points or pieces, or as one of the known families."""
 
 from gqm_sym.declare import families
 from gqm_sym.declare.curve import Curve

@@ -1,4 +1,4 @@
-"""How a track in space is banked: by an angle, or so that riders feel no lateral force."""
+"""The banking of a track in space: by an angle, or without lateral force on riders."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -47,7 +47,7 @@ def _is_coordinated(given: Any) -> bool:
 
 
 def is_formula(roll: Any) -> bool:
-    """Whether a roll is told by a formula or a word, not by angles of points."""
+    """Whether a roll is given by a formula or a word, and not by angles of points."""
     return isinstance(roll, str | int | sp.Expr) or (isinstance(roll, tuple | list) and len(roll) <= 2)
 
 

@@ -1,4 +1,4 @@
-"""After how much of its parameter a curve closes: found where its formulas tell it, and checked where it is given."""
+"""The period of a closed curve: found from its formulas where they determine it, and verified where it is given."""
 
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -26,7 +26,7 @@ _WAVES = (sp.sin, sp.cos)
 def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
     """Return the least period of a curve whose coordinates are made of waves of commensurate rates.
 
-    None where there is none, and where it is not certain that the curve is real and finite all along it.
+    None if there is no period, or if it is not certain that the curve is real and finite everywhere.
     """
     rates: set[sp.Expr] = set()
     if not all(_of_waves(form, lam, rates) for form in point) or not rates:
@@ -80,8 +80,7 @@ def check_period(
     right = found_period(tuple(form.xreplace(values) for form in point), lam)
     remedy = "leave it out: the curve does not close" if right is None else f"give {right}"
     raise DeclarationError(
-        f"{kind}: period: after {period} of {lam.name} the curve is not where it was, but {gap:.3g} of its size away; "
-        f"{remedy}"
+        f"{kind}: period: after {period} of {lam.name} the curve is {gap:.3g} of its size away from its start; {remedy}"
     )
 
 

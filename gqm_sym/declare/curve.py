@@ -75,7 +75,7 @@ class Curve(Declaration):
         Raises
         ------
         DeclarationError
-            If the curve has no start or no end.
+            If the curve has no start or no end, or its roll angle is a formula in its own parameter.
         """
         if self.charted:
             return self
@@ -83,8 +83,16 @@ class Curve(Declaration):
         ends = (sp.S.Zero, self.period) if closed else self.domain
         if None in ends:
             raise DeclarationError(f"{self.kind} curve: has no end to measure arc length from; give it a domain")
-        whole = replace(self, domain=ends, period=None)
-        return Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
+        banking = self.banking
+        if banking is not None and banking.angle is not None and self.parameter in banking.angle.free_symbols:
+            raise DeclarationError(
+                f"{self.kind} curve: roll: {banking.angle} is in {self.parameter}, and the track of a train has arc "
+                "length for its parameter; declare roll='coordinated', ('coordinated', speed) or an angle that is the "
+                "same everywhere, or give the track as points with roll angles"
+            )
+        whole = replace(self, domain=ends, period=None, banking=None)
+        made = Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
+        return replace(made, banking=banking)
 
     def __str__(self) -> str:
         """Describe the curve in a few lines: its form, its range and the units of its parameters."""

@@ -123,8 +123,11 @@ def declare(
     given = tuple(end for end in (*ends, turn) if end is not None)
     used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
-    if forms.in_space and "y" in found:
-        raise DeclarationError("space curve: 'y' is a coordinate and cannot be a run-time parameter; rename it")
+    if confused := {name for name, _ in forms.coordinates}.intersection(found):
+        raise DeclarationError(
+            f"{kind} curve: {min(confused)!r} is a coordinate and cannot be a run-time parameter; write the curve as a "
+            f"function of its parameter {symbol.name!r}, or rename it"
+        )
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
     if turn is None and kind in ("parametric", "polar", "space") and ends == (None, None):
         turn = found_period(forms.point, symbol)

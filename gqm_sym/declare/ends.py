@@ -58,5 +58,5 @@ def check_order(kind: str, domain: Ends, period: sp.Expr | None, defaults: Mappi
 
 
 def _is_false(relation: Any) -> bool:
-    # One that SymPy cannot decide is no reason to refuse.
+    # An order that SymPy cannot decide is accepted.
     return relation is False or relation is sp.false

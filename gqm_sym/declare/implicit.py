@@ -17,7 +17,7 @@ X, Z = (sp.Symbol(name, real=True) for name in COORDINATES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """What an implicit curve is made from.
+    """The definition of an implicit curve.
 
     Attributes
     ----------

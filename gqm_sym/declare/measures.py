@@ -1,4 +1,4 @@
-"""What the formulas of a curve are measured in, and the curve in words: coordinates are lengths, angles numbers."""
+"""The units of a curve's formulas, and the curve in words: coordinates are lengths, and angles are numbers."""
 
 from typing import Protocol, cast
 
@@ -14,7 +14,7 @@ from gqm_sym.parameters import in_words
 
 
 class DeclaredCurve(FormulaCurve, Protocol):
-    """What is read of a curve here (`curve.Curve` is one)."""
+    """The attributes of a curve that are used here; `curve.Curve` has them."""
 
     @property
     def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
@@ -38,7 +38,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def definition(self) -> object:
-        """What a charted curve is made from."""
+        """The definition of a curve without formulas."""
 
     @property
     def banking(self) -> Banking | None:
@@ -82,7 +82,7 @@ def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension | None]]:
 
 
 def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
-    """Return what a curve's parameter is measured in; None where its formulas do not tell it at once."""
+    """Return what a curve's parameter is measured in; None if its formulas do not determine it immediately."""
     lam = curve.parameter
     if curve.kind in ("parametric", "space"):
         # The argument of a wave with a number for its rate is an angle.
@@ -111,7 +111,7 @@ def _rail_formulas(rail: Rail) -> Formulas:
 
 
 def units_of(curve: DeclaredCurve) -> dict[str, str]:
-    """The SI units of the parameters of a curve, as far as its formulas tell them."""
+    """Return the SI units of a curve's parameters, as far as its formulas determine them."""
     return {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
 
 

@@ -20,7 +20,7 @@ BACKWARDS = pi - 1e-6
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
 JUMP = 100.0
 
-# A chord of measured points that is this many times as long as they scatter tells the direction of the track.
+# A chord of measured points has the direction of the track if it is this many times longer than their scatter.
 LONG = 8.0
 
 # Curvature that rises and falls by turns between more than this share of neighbours is scatter,
@@ -112,7 +112,7 @@ def _refuse_turn(turn: float, row: int) -> None:
 
 
 def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
-    """Warn of a track whose curvature goes up and down from point to point, as that of the track does not.
+    """Warn of a curvature that changes its sign from point to point, which the curvature of a real track does not.
 
     Scatter of points at distances h is in the curvature over h**2. Where it is most of that, the sign changes between
     most neighbours; that the sign of the curvature's changes does shows it earlier, and on a loop as well.

@@ -25,7 +25,7 @@ _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kap
 
 @runtime_checkable
 class FormulaCurve(Protocol):
-    """What a rail needs of a curve with formulas that is one of its pieces (`curve.Curve` is one)."""
+    """The attributes that a rail needs of a piece with formulas; `curve.Curve` has them."""
 
     @property
     def kind(self) -> str:
@@ -64,7 +64,7 @@ class Piece:
         What `STANDARD` says, or the ends of the curve's parameter; of a transition its length, then the coefficients
         of yaw, of pitch and of roll, lowest power first.
     curve
-        Where the piece is a curve with formulas.
+        The curve, if the piece is one with formulas.
     """
 
     kind: str
@@ -263,12 +263,14 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     if isinstance(given, Piece):
         return given
     if not isinstance(given, FormulaCurve):
-        raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
+        raise DeclarationError(
+            f"{where}: must be a line, an arc, a clothoid, a transition or a curve with formulas, got {short(given)}"
+        )
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain
     if low is None or high is None:
-        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, which the piece lies between")
+        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, between which the piece lies")
     return Piece(kind="curve", numbers=(low, high), curve=given)
 
 
@@ -277,7 +279,7 @@ def _is_spatial(piece: Piece) -> bool:
 
 
 def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_space: bool) -> tuple[sp.Expr, ...] | None:
-    """The start of a rail as `Rail` has it."""
+    """Return the start of a rail in the form that `Rail` stores."""
     if first.curve is not None:
         if place is not None or heading is not None:
             raise DeclarationError(

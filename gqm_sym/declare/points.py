@@ -72,7 +72,7 @@ def read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
     """Read rows of two coordinates or three: the text and the values of each."""
     if isinstance(points, str):
         raise DeclarationError(
-            f"sampled: points: must be rows of x and z, got {short(points)}; read a file first, as by pandas.read_csv"
+            f"sampled: points: must be rows of x and z, got {short(points)}; read a file first, by gqm_sym.read_track"
         )
     # An array of numbers gives Python's own floats at once, which is many times quicker than row by row.
     rows = points.tolist() if hasattr(points, "tolist") else points

@@ -41,7 +41,7 @@ class Track:
         One point a line, x and z, or x, y and z, and perhaps the roll angle, as decimal numbers. A closed track does
         not repeat its first point.
     kind : {"spline", "linear"}
-        A quintic spline, or planes stitched together.
+        A quintic spline, or straight lines between the points.
     closed : bool
         Whether the track goes on from the last point to the first.
     smoothing : Smoothing or None

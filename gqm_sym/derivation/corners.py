@@ -86,7 +86,7 @@ def without_known_bars(form: sp.Expr, signs: Signs) -> sp.Expr:
 
 
 def _zeros(forms: Iterable[sp.Expr], lam: sp.Symbol) -> Iterator[sp.Expr]:
-    """What may change its sign under an absolute value, or in even powers under a root."""
+    """Yield the expressions that may change sign under an absolute value, or in even powers under a root."""
     for form in forms:
         for node in sorted(form.atoms(sp.Abs, sp.Pow), key=sp.default_sort_key):
             inner = node.args[0]

@@ -40,7 +40,7 @@ def join(curve: Curve, kernel: Kernel, given: Mapping[str, Given | None]) -> tup
     for name, value in given.items():
         if name not in values:
             raise DeclarationError(
-                f"derive: parameters: {name!r} is no parameter of this curve and kernel; they have {', '.join(order)}"
+                f"derive: parameters: {name!r} is not a parameter of this curve or force; they have {', '.join(order)}"
             )
         values[name] = None if value is None else read_value(value, where=f"parameters: {name}")
     positive = (*curve.positive, *kernel.positive, "m")

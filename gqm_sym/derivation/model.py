@@ -8,7 +8,7 @@ import sympy as sp
 from gqm_sym.declare import Curve
 from gqm_sym.declare.measures import curve_formulas, parameter_dimension
 from gqm_sym.derivation.forces.dissipation import Dissipation
-from gqm_sym.derivation.forces.forces import Place
+from gqm_sym.derivation.forces.forces import Place, turned_force
 from gqm_sym.derivation.forces.rider import Rider
 from gqm_sym.derivation.geometry.geometry import cross
 from gqm_sym.derivation.geometry.level_set import LevelSet
@@ -38,74 +38,87 @@ def _read_v2(given: Any) -> sp.Expr:
 class Model:
     """Closed forms in the parameter λ, the launch (``lam0``, ``v0``) and run-time parameters.
 
+    Sections and equations: geometry MATHS, section 1; forces and the contact force MATHS, section 2 (paper, eq. 15);
+    turning points MATHS, section 3; time MATHS, section 4 (paper, eq. 17).
+
     Attributes
     ----------
     curve, force
-        What it was derived from.
+        The declarations from which the model was derived.
     title
-        One line for people.
+        One line of text for readers.
     parameter, lam0, v0, mass
-        The symbols of λ, of the launch and of the mass.
+        The symbols of λ, of the place and the speed of launch, and of the mass.
     x, y, z
-        Coordinates; y is 0 on planar curves.
-    ds, dxds, dyds, dzds
-        σ = ds/dλ ≥ 0 and the components of the unit tangent.
+        Coordinates in m; y is 0 on planar curves.
+    ds
+        σ = ds/dλ ≥ 0, in m per unit of λ.
+    dxds, dyds, dzds
+        The components of the unit tangent.
     kappa
-        Signed curvature, positive to the left of growing λ; of a curve in no vertical plane its absolute value.
+        The signed curvature in 1/m, positive to the left of increasing λ; its absolute value for a curve in no vertical
+        plane.
     turning_rate, turning_angle
-        dΘ/dλ, and Θ from ``lam0`` to λ; of a curve in no vertical plane ``|dt/dλ|``, and None.
+        dΘ/dλ, and Θ from ``lam0`` to λ in radians; ``|dt/dλ|`` and None for a curve in no vertical plane.
     cusp
-        A smooth factor of σ that changes sign or vanishes at the cusps; None without cusps.
-    potential, inertia
-        Φ per unit mass along the curve, and 1 + β.
+        A smooth factor of σ that changes sign or vanishes at cusps; None without cusps.
+    potential
+        Φ, the potential energy per unit mass along the curve, in m²/s².
+    inertia
+        1 + β.
     effective_potential, effective_potential_slope
-        U = Φ/inertia, so that W + 2U is constant along a motion, and dU/dλ.
+        U = Φ/inertia in m²/s², so that W + 2U is constant along a motion, and dU/dλ.
     symmetry
-        Where the effective potential and σ are even; None where no such place was found, or nothing repeats.
+        The places about which the effective potential and σ are even; None if none was found, or nothing repeats.
     symmetric_orbits
-        The time of orbits about such a place as an integral without sines; None where there is no such form.
+        The time of orbits about such a place as an integral without sines; None if there is no such form.
     static_normal_load
-        n₀ with N/m = κ W + n₀; of a curve in no vertical plane its length.
+        n₀ in m/s², with N/m = κ W + n₀; its length for a curve in no vertical plane.
     normal
-        The unit vector along which N is positive; of a curve in no vertical plane empty.
+        The unit vector along which N is positive; empty for a curve in no vertical plane.
     bend, loads
-        Of a curve in no vertical plane the vectors t × dt/ds and -t × F, by components, with which t × N/m = W·bend +
-        loads; else empty.
+        The components of t × dt/ds and of -t × F for a curve in no vertical plane, with t × N/m = W·bend + loads;
+        otherwise empty.
+    coriolis
+        In a rotating frame the vector that ds/dt adds to that sum for such a curve, for each unit of ds/dt; otherwise
+        empty.
     dissipation
-        What a force law that is not conservative does along the curve; None for a conservative one.
+        The terms of a force law that is not conservative; None for a conservative one.
     speed_squared
-        W = V². Of a dissipative model on one leg, where ``direction`` is the sign of ds/dt and ``contact_sign`` that
-        of N.
+        W = V² in m²/s². In a dissipative model it holds on one leg, where ``direction`` is the sign of ds/dt and
+        ``contact_sign`` that of N.
     speed_squared_form
-        ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
-        in W). Where it is not closed, the forms below hold W as a symbol.
+        ``closed``, ``quadrature`` (W contains an Integral) or ``equation`` (W is an unknown function, because the law
+        is not linear in W). If it is not closed, the forms below contain W as a symbol.
     normal_force
-        N, positive along the normal to the left of growing λ; of a curve in no vertical plane its size ``|N|``, without
-        a sign.
+        N in N, positive along the normal to the left of increasing λ; ``|N|`` for a curve in no vertical plane.
     side_force
-        What a track that turns about the z axis carries out of its plane; 0 for one at rest.
+        The force in N out of the plane of a planar track that rotates; 0 for a track at rest, and in space.
     tangential_acceleration
-        A, so that dW/ds = 2 A; of a dissipative model in ``W``.
+        A in m/s², so that dW/ds = 2 A; it contains ``W`` in a dissipative model.
     time_integrand
-        dt/dλ = σ/√W.
+        dt/dλ = σ/√W, in s per unit of λ.
     regularised_integrand
-        σ √((λ - λ₁)(λ₂ - λ)/W) between turning points ``lam1`` and ``lam2``: it stays finite.
+        σ √((λ - λ₁)(λ₂ - λ)/W) between the turning points ``lam1`` and ``lam2``, which is finite.
     turning_point_equation, liftoff_equation
-        W = 0 and N = 0; a contact force without a sign has no such equation.
+        W = 0 and N = 0; None for a contact force without a sign.
     liftoff_speed_squared
-        v0² of the launch for which N = 0 at λ; None where W is not closed, or the curve is straight.
+        v0² of the launch for which N = 0 at λ; None if W is not closed, or the curve is straight.
     defaults
-        Run-time parameters in order, each with its default or None; g and m come last.
+        The run-time parameters in order, each with its default or None; g and m come last.
     positive
-        Parameters that were taken to be positive, which is checked at run time.
+        Parameters that were assumed to be positive, which is checked at run time.
     at_least
-        Parameters with what they must not fall below, which is checked too.
+        Parameters with their lower bounds, which are checked at run time.
     notes
-        What was left unsimplified, and why; of a dissipative model what kind of form V² has.
+        Remarks on forms that were not simplified, and on the form of V² in a dissipative model.
     level_set
-        Of an implicit curve: F with its derivatives, tangent and curvature, in x and z.
+        F of an implicit curve with its derivatives, tangent and curvature, as functions of x and z.
+    sided
+        Whether the sign of N, or of its part along the upward direction of riders on a banked space curve, tells on
+        which side of the track a body is.
     rider
-        Of a space curve that is banked: what a rider feels; else None.
+        The loads on a rider of a banked space curve; None for other curves.
     """
 
     curve: Curve
@@ -136,6 +149,7 @@ class Model:
     normal: tuple[sp.Expr, ...]
     bend: tuple[sp.Expr, ...]
     loads: tuple[sp.Expr, ...]
+    coriolis: tuple[sp.Expr, ...]
     dissipation: Dissipation | None
     speed_squared: sp.Expr
     speed_squared_form: str
@@ -152,6 +166,7 @@ class Model:
     at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
+    sided: bool = True
     rider: Rider | None = None
 
     if not TYPE_CHECKING:
@@ -180,6 +195,8 @@ class Model:
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
         """Return the contact force for a given value of V²: N, or ``|N|`` for a curve in no vertical plane.
+
+        In a rotating frame in space it depends on ``direction``, the sign of ds/dt.
 
         Parameters
         ----------
@@ -221,7 +238,7 @@ class Model:
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
         """The vector t × N/m, which has the length of N/m."""
-        return tuple(bend * v2 + load for bend, load in zip(self.bend, self.loads, strict=True))
+        return turned_force(self.bend, self.loads, self.coriolis, v2)
 
     @property
     def units(self) -> dict[str, str]:
@@ -244,7 +261,7 @@ class Model:
             turning = sp.Eq(W, 0, evaluate=False)
             if liftoff is not None:
                 liftoff = sp.Eq(self.kappa * W + self.static_normal_load, 0, evaluate=False)
-            side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
+            side = 0 if self.loads else 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
         return (
             *(self.level_set.closed_forms() if self.level_set else ()),
             *self.curve.named(self.x, self.y, self.z),
@@ -291,7 +308,7 @@ class Model:
         return found
 
     def __str__(self) -> str:
-        """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
+        """Describe the model in a few lines: its closed forms, and its parameters with their units."""
         said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "A": " [m/s**2]"}
         said |= {"N": " [N]", "|N|": " [N]"}
         lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]

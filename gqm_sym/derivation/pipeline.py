@@ -15,6 +15,7 @@ from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.forces.dissipation import (
+    CORIOLIS,
     LOAD,
     LOADS,
     PUSH,
@@ -22,11 +23,12 @@ from gqm_sym.derivation.forces.dissipation import (
     TILT,
     TURN,
     TURNS,
+    UPRIGHT,
     Dissipation,
     dissipation,
 )
-from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, of_train
-from gqm_sym.derivation.forces.rider import rider
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
+from gqm_sym.derivation.forces.rider import rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
@@ -104,7 +106,8 @@ def derive(
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
         curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
-    heading = vertical_plane(curve) if curve.in_space else AHEAD
+    # A frame that turns pushes a body out of every vertical plane.
+    heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
         if not curve.in_space:
             raise DeclarationError(
@@ -120,9 +123,10 @@ def derive(
     law = of_train(body, kernel, lam) if kernel.cars else body
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
+    upright = upright_force(curve.banking, shape, body) if curve.banking else None
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
-        loss = _losses(curve, kernel, (x, y, z), law, shape)
+        loss = _losses(curve, kernel, (x, y, z), law, shape, upright or ())
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.static_normal_load
     dxds, dyds, dzds = shape.tangent
@@ -161,11 +165,12 @@ def derive(
         normal=shape.normal,
         bend=shape.bend,
         loads=law.loads,
+        coriolis=law.coriolis,
         dissipation=loss,
         speed_squared=speed.squared,
         speed_squared_form=speed.form,
         normal_force=MASS * pressure,
-        side_force=2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
+        side_force=sp.S.Zero if law.loads else 2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
         tangential_acceleration=acceleration,
         time_integrand=shape.ds / sp.sqrt(speed.held),
         regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
@@ -177,6 +182,7 @@ def derive(
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
+        sided=not law.loads or upright is not None,
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
     )
     if law.loads:
@@ -193,7 +199,6 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
     """Refuse forces that are known for planar curves only."""
     refused = (
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
-        ("rotating_frame", kernel.spin, "a turning frame"),
         ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
     )
     for name, given, what in refused:
@@ -204,7 +209,6 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
 def _refuse_of_train(kernel: Kernel) -> None:
     """Refuse what is not known of a train."""
     refused = (
-        ("coulomb", kernel.friction or kernel.static_friction, "friction"),
         ("surface_tension", kernel.resistance, "a droplet's resistance"),
         ("rotating_frame", kernel.spin, "a turning frame"),
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
@@ -216,7 +220,9 @@ def _refuse_of_train(kernel: Kernel) -> None:
             raise DeclarationError(f"derive: {name}: {what} is not known of a train; leave it out")
 
 
-def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry) -> Dissipation:
+def _losses(
+    curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry, upright: tuple[sp.Expr, ...]
+) -> Dissipation:
     lam = curve.parameter
     signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
     if law.loads and shape.cusp is not None and signs.sign(shape.cusp) is None:
@@ -231,8 +237,11 @@ def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geom
         **{PUSH: law.push, LOAD: law.static_normal_load},
         **dict(zip(TURNS, shape.turning, strict=False)),
         **dict(zip(LOADS, law.loads, strict=False)),
+        **dict(zip(CORIOLIS, law.coriolis, strict=False)),
+        **dict(zip(UPRIGHT, reversed(upright), strict=False)),
     }
-    loss = dissipation(kernel, pieces, coordinates, signs)
+    cars_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
+    loss = dissipation(kernel, pieces, coordinates, signs, cars_load)
     for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
         check_real(form, where=f"the law of a body at rest that is about to move {way}")
     return loss

@@ -1,4 +1,4 @@
-"""The curve of quickest descent from rest, with dry friction that knows the track's own contact force.
+"""The curve of quickest descent from rest, with dry friction by the whole contact force of the track.
 
 With the tangent's angle alpha, Y = V**2 exp(2 mu alpha) obeys dY/ds = -2 g exp(2 mu alpha) (sin(alpha) + mu cos(alpha))
 where N > 0: the curvature has dropped out, and alpha is the control of a problem with the states x, z and Y.
@@ -37,7 +37,7 @@ def brachistochrone(to: Sequence[Source], *, mu: Source = 0, title: str = "") ->
         Coefficient of dry friction between body and track (`CoulombFriction`). The friction is that of the whole
         contact force, also of the part that comes from the track's curvature.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------

@@ -93,6 +93,11 @@ def least_speed(
             f"least_speed: {formulas.name} loses energy, so that V**2 depends on the path taken; use module.solve"
         )
     check_contact(formulas, contact)
+    if contact != "bilateral" and not formulas.signed:
+        raise SolutionError(
+            f"least_speed: contact {contact!r} is for curves in a vertical plane; of a banked space curve ask "
+            "module.solve(..., contact=...) whether contact lasts"
+        )
     for name in parameters:
         if name not in formulas.parameters:
             known = ", ".join(formulas.parameters)

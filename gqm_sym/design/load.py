@@ -57,7 +57,7 @@ def constant_load(
     parameters : mapping, optional
         Defaults of names in ``n`` and ``v0``.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def constant_load(
 
 
 class _Motion(NamedTuple):
-    """What is known of the motion: the load as a function of s or t, the launch speed, gravity, and which of both."""
+    """The prescribed motion: the load as a function of s or t, the launch speed, gravity, and the variable."""
 
     mp: Any
     load: Callable[[Any], Any]
@@ -122,7 +122,7 @@ class _Motion(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Where a track has come to: the tangent's angle, and coordinates."""
+    """The end of a track so far: the tangent's angle, and coordinates."""
 
     alpha: Any
     x: Any
@@ -159,7 +159,7 @@ def from_load(
     parameters : mapping, optional
         Values of the parameters in ``law``.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------

@@ -87,10 +87,8 @@ def minimise(
     SolutionError
         If no track meets all limits, or the motion does not have the quantity at the first guess.
 
-    Notes
-    -----
-    SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference quotients
-    elsewhere. What it finds is a local minimum.
+    Notes ----- SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference
+    quotients elsewhere. The result is a local minimum.
 
     Examples
     --------
@@ -172,7 +170,7 @@ def _limits(limits: Mapping[str, tuple[Any, Any]], where: str) -> dict[str, tupl
 
 
 def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: str) -> None:
-    """Refuse what was found where it does not meet the limits, or is no minimum."""
+    """Refuse a result that violates the limits, or is not a minimum."""
     for (name, low, high), margins in zip(held, tracks.margins(x, held, between), strict=True):
         if not margins.min() >= -MAX_EXCESS:
             raise SolutionError(
@@ -196,7 +194,7 @@ class _Tracks(ABC):
     start, low, high : (n,) arrays
         First guesses and limits of what is free.
     size : float
-        Of what is free, at least.
+        The least number of unknowns.
     step, tolerance : float
         The step of a difference quotient as a share of the size, and the relative change of the quantity at which the
         optimiser ends.

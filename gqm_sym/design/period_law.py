@@ -86,7 +86,7 @@ def from_period(
     parameters : mapping, optional
         Values of the parameters in ``law``.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------

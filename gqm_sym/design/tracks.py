@@ -1,4 +1,4 @@
-"""What the designs have in common: how their arguments are read, and tracks made of polynomials."""
+"""The common parts of designs: reading of arguments, and tracks made of polynomials."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Context, Decimal
@@ -24,7 +24,7 @@ TERMS, MAX_TAIL = 24, 1e-22
 
 # A piece is not halved more often.
 MAX_HALVINGS = 40
-# Numbers of a design are no larger, and no smaller but for 0, than this power of ten says.
+# The size of numbers in a design, other than 0, is within this power of ten and its inverse.
 MAX_EXPONENT = 60
 
 _U = sp.Symbol("u")

@@ -175,7 +175,9 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
         return made
     pull = differentiate(train.potential, HEIGHT)
     numbers = lowering.constants(
-        "exact_train", "The length of a train, and what gravity is.", (train.train_length, pull)
+        "exact_train",
+        "The length of a train, what gravity is, and its coefficient of friction.",
+        (train.train_length, pull, train.friction),
     )
     length = lowering.order[train.train_length.name]
     return replace(

@@ -1,4 +1,4 @@
-"""What the lowered functions of one model share: its names, its parameters, and how a function is made of forms."""
+"""The common context of the lowered functions of one model: names, parameters, and functions made from forms."""
 
 from collections.abc import Iterable
 
@@ -9,6 +9,10 @@ from gqm_sym.derivation import Model
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.emission.subscripts import at
+from gqm_sym.kernels.base import DIRECTION
+
+FORWARDS = {DIRECTION: sympy.S.One}
+"""Contact forces that depend on the sign of ds/dt are those of motions forwards where functions are not told it."""
 
 
 class Names:
@@ -53,7 +57,7 @@ class Lowering:
         return {call: Symbol(f"_p{count}", real=True) for count, call in enumerate(outermost)}
 
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
-        """The function that evaluates them; nothing where there are none."""
+        """Yield the function that evaluates them, if there are any."""
         doc = "What stands behind the run-time parameters in compiled functions."
         return (self.constants("exact_trigonometric", doc, (*self.trigonometric,)),) if self.trigonometric else ()
 
@@ -155,6 +159,6 @@ class Lowering:
         )
 
     def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:
-        """The run-time parameters in some expressions, and where they stand in ``p``."""
+        """Return the run-time parameters in some expressions with their positions in ``p``."""
         free = {s.name for e in expressions for s in e.free_symbols}
         return tuple((name, i) for name, i in self.order.items() if name in free)

@@ -6,16 +6,30 @@ from dataclasses import dataclass, replace
 import sympy
 from sympy import Expr, Symbol
 
-from gqm_sym.derivation.forces.dissipation import LOAD, LOADS, PUSH, SIGMA, TILT, TURN, TURNS, Dissipation
+from gqm_sym.derivation.forces.dissipation import (
+    CORIOLIS,
+    LOAD,
+    LOADS,
+    PUSH,
+    SIGMA,
+    TILT,
+    TURN,
+    TURNS,
+    UPRIGHT,
+    Dissipation,
+)
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
+from gqm_sym.sympy_charts import chart_alpha, chart_kappa, chart_x, chart_z
 
 _NAMES = {
     **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
     **{symbol: f"turn_{axis}" for symbol, axis in zip(TURNS, "xyz", strict=True)},
     **{symbol: f"load_{axis}" for symbol, axis in zip(LOADS, "xyz", strict=True)},
+    **dict(zip(UPRIGHT, ("n0_upright", "kappa_upright"), strict=True)),
+    **{symbol: f"coriolis_{axis}" for symbol, axis in zip(CORIOLIS, "xyz", strict=True)},
 }
 """The names in emitted code of the geometric forms that a force law is written in."""
 
@@ -52,6 +66,8 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     contact, force = "n0, kappa", ", N = m*(kappa*V**2 + n0)"
     if lowering.model.loads:
         contact, force = ("|n0|, |kappa|" if loss.linear else "|N|/m, 0"), ""
+        if loss.contact == UPRIGHT:
+            contact = "n0 and kappa along the upward direction of riders"
     doc = (
         f"ds/d{lam}, P, Q, {contact}: dV**2/d{lam} = P - Q*V**2{linearised}{force} (paper, eq. 19); "
         "v = sgn(ds/dt), nu = sgn(N)."
@@ -75,6 +91,25 @@ def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
     form = loss.along(2 * SIGMA * loss.acceleration).xreplace({W: w, DIRECTION: v, CONTACT_SIGN: nu})
     doc = f"dV**2/d{lowering.place} where V**2 = {w}, {v} = sgn(ds/dt) and {nu} = sgn(N) (paper, eq. 19)."
     return lowering.exact_function("speed_slope", doc, (form,), (lowering.place, w, v, nu))
+
+
+def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
+    """Contact force and law along a charted curve, by what is known at a point; nothing where they depend on more."""
+    model, place = lowering.model, lowering.place
+    point = tuple(lowering.names.symbol(name) for name in ("x", "z", "dxds", "dzds", "kappa"))
+    angle = chart_alpha(place)
+    forms = (chart_x(place), chart_z(place), sympy.cos(angle), sympy.sin(angle), chart_kappa(place))
+    w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
+    known = {**dict(zip(forms, point, strict=True)), W: w, DIRECTION: v, CONTACT_SIGN: nu}
+    load = model.static_normal_load.xreplace(known)
+    slope = loss.along(2 * SIGMA * loss.acceleration).xreplace(known)
+    if model.curve.in_space or model.ds != 1 or place in load.free_symbols | slope.free_symbols:
+        return ()
+    doc = f"dV**2/d{place} where V**2 = {w}, {v} = sgn(ds/dt) and {nu} = sgn(N) (paper, eq. 19)."
+    return (
+        lowering.exact_function("static_normal_load", "n0 = N/m of a body at rest (paper, eq. 15).", (load,), point),
+        lowering.exact_function("speed_slope", doc, (slope,), (*point, w, v, nu)),
+    )
 
 
 def _in_pieces(

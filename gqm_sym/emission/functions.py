@@ -18,7 +18,7 @@ CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
 
-# Columns up to which several loads of a value stand on one line.
+# The width up to which several loads of a value are on one line.
 WIDTH = 112
 
 
@@ -137,7 +137,7 @@ def _views(function: FunctionIR) -> str:
 
 
 def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str]) -> list[str]:
-    """The lines that find the charts of the curve, which stand behind the run-time parameters."""
+    """Return the lines that find the charts of the curve, which are stored behind the run-time parameters."""
     if not printer.charts:
         return []
     p, count = function.views[-2]

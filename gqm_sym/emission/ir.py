@@ -104,7 +104,7 @@ class SeparatedIR:
     parts : ExactIR or None
         What depends on the place of the potential, by coordinates; None where it depends on more.
     potentials : int
-        How many of the products belong to the potential.
+        The number of products that belong to the potential.
     """
 
     function: FunctionIR
@@ -122,8 +122,9 @@ class ModuleIR:
     the effective potential are compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body
     that must fit into its track, empty for any other; ``static_friction_limit`` names beta and mu_static of one that
     may slip. ``units`` are the SI units of the curve's parameter and of the run-time parameters, as far as they are
-    known. ``in_space``, ``signed`` and ``banked`` say whether it is of a space curve, whether its contact force has a
-    sign, and whether it tells what a rider feels.
+    known. ``in_space`` and ``signed`` say whether it is of a space curve, and whether its contact force has a sign;
+    ``sided`` whether that, or a part of it, tells on which side the body is; ``directed`` whether it depends on the
+    sign of ds/dt; and ``banked`` whether it is told what a rider feels.
     ``monotone`` says that there are no cusps,
     and that the effective potential rises or falls all the way between places of symmetry.
     """
@@ -150,4 +151,6 @@ class ModuleIR:
     separated: SeparatedIR | None
     in_space: bool
     signed: bool
+    sided: bool
+    directed: bool
     banked: bool

@@ -5,7 +5,7 @@ from math import prod
 
 from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
 
-from gqm_sym.emission.context import Lowering
+from gqm_sym.emission.context import FORWARDS, Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.subscripts import at
 
@@ -19,7 +19,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
         return ()
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
-    force = model.normal_force_at(v2)
+    force = model.normal_force_at(v2).xreplace(FORWARDS)
     grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
     return (
         lowering.function(

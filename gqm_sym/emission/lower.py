@@ -7,8 +7,8 @@ from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
-from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.dissipative import speed_equation, speed_slope, static_balance
+from gqm_sym.emission.context import FORWARDS, Lowering
+from gqm_sym.emission.dissipative import chart_law, speed_equation, speed_slope, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
@@ -51,6 +51,8 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         in_space=model.curve.in_space,
         banked=model.rider is not None,
         signed=not model.loads,
+        sided=model.sided,
+        directed=bool(model.coriolis),
         bounds=lowering.bounds(),
         batch=batch,
         bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
@@ -78,7 +80,8 @@ def _check(model: Model) -> None:
     }
     if model.curve.in_space:
         labels = (f"contact force, {axis}" for axis in "xyz")
-        forms |= dict(zip(labels, model.normal_force_vector_at(MASS), strict=True))
+        vector = (part.xreplace(FORWARDS) for part in model.normal_force_vector_at(MASS))
+        forms |= dict(zip(labels, vector, strict=True))
     loss = model.dissipation
     if model.rider is not None:
         felt = {DIRECTION.name, CONTACT_SIGN.name, W.name} | names
@@ -106,21 +109,22 @@ class _ModelLowering(Lowering):
             (places, speeds),
             f"x, z, ds/d{lam}, curvature kappa, contact force {form}, given V**2 (paper, eqs. 8, 15).",
             inside=[(lam, at(places)), (v2, at(speeds))],
-            outputs=(model.x, model.z, model.ds, model.kappa, model.normal_force_at(v2)),
+            outputs=(model.x, model.z, model.ds, model.kappa, model.normal_force_at(v2).xreplace(FORWARDS)),
         )
 
     def path_in_space(self) -> tuple[FunctionIR, ...]:
         """The third coordinate of a space curve, and the contact force as a vector; nothing for a planar curve."""
         model, v2 = self.model, self.names.symbol("v2")
-        places, speeds = self.names("places"), self.names("speeds")
+        places, speeds, v = self.names("places"), self.names("speeds"), self.names.symbol("v")
         if not model.curve.in_space:
             return ()
+        vector = (part.xreplace({DIRECTION: v}) for part in model.normal_force_vector_at(v2))
         function = self.function(
             "path_in_space",
-            (places, speeds),
-            "y, and the contact force along x, y and z, given V**2.",
+            (places, speeds, v),
+            "y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt).",
             inside=[(self.place, at(places)), (v2, at(speeds))],
-            outputs=(model.y, *model.normal_force_vector_at(v2)),
+            outputs=(model.y, *vector),
         )
         return (function,)
 
@@ -195,7 +199,7 @@ class _ModelLowering(Lowering):
         """The formulas that extended precision and gradients need; of a charted curve the potential by coordinates."""
         model, loss = self.model, self.model.dissipation
         if model.curve.charted:
-            return self.exact_potential() if loss is None else ()
+            return self.exact_potential() if loss is None else chart_law(self, loss)
         bend, load = "Signed curvature", "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0)"
         if model.loads:
             bend, load = "Curvature", "|N|/m of a body at rest"
@@ -222,7 +226,7 @@ class _ModelLowering(Lowering):
         if not model.curve.in_space:
             return ()
         found: list[tuple[str, str, tuple[Expr, ...]]] = [("y", "Second horizontal coordinate.", (model.y,))]
-        if model.loads:
+        if model.loads and not model.coriolis:
             doc = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
             product = Add(*(bend * load for bend, load in zip(model.bend, model.loads, strict=True)))
             found.append(("load_along_curvature", doc, (product,)))

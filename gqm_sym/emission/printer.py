@@ -11,7 +11,7 @@ from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
 from gqm_sym.errors import EmissionError
-from gqm_sym.sympy_charts import SPACE_CHARTS
+from gqm_sym.sympy_charts import SPACE_CHARTS, TRAIN_LOADS
 
 # Up to this every integer is a double.
 MAX_INTEGER = 2**53
@@ -39,6 +39,7 @@ FUNCTIONS = {
 CHARTED = frozenset(
     {"chart_x", "chart_z", "chart_alpha", "chart_kappa"}
     | {head.__name__ for rows in SPACE_CHARTS.values() for head in rows}
+    | set(TRAIN_LOADS)
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
 # In space each coordinate has a chart, whose height is the coordinate; its derivatives are in the places of angle,
@@ -116,11 +117,13 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         if in_space or _CHART_CALL.fullmatch(name.removeprefix("i")):
             texts.insert(0, chart)
             self.charts.add(chart)
+        texts[:0] = read = TRAIN_LOADS.get(name, ())
+        self.charts.update(read)
         return f"{self.prefix}{name}({', '.join(texts)})"
 
     def _print_Function(self, expr: Expr) -> str:
         name = type(expr).__name__
-        if name == "at":  # the element of an array that the loop stands at
+        if name == "at":  # the element of an array in the current step of the loop
             array, *rows = expr.args
             return f"{array}[{', '.join([*map(str, rows), self.index])}]"
         if isinstance(expr, AppliedUndef) or name in CHARTED:  # a helper of the runtime

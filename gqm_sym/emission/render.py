@@ -18,7 +18,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 10
+INTERFACE = 11
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
@@ -44,7 +44,7 @@ _OWN = frozenset(
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
         *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),
-        *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
+        *("Equilibrium", "ExactChartLaw", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -153,6 +153,8 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "pass1": _pass1(module),
         "in_space": module.in_space,
         "signed": module.signed,
+        "sided": module.sided,
+        "directed": module.directed,
         "banked": module.banked,
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
@@ -187,7 +189,7 @@ def _exact_formulas(module: ModuleIR) -> list[str]:
 
 
 def _pass1(module: ModuleIR) -> str:
-    """What a load map is handed over as."""
+    """The description of a load map for the runtime."""
     if module.banked:
         return "Pass1OfRider"
     return "Pass1InSpace" if module.in_space else "Pass1"
@@ -196,7 +198,7 @@ def _pass1(module: ModuleIR) -> str:
 def _exact_class(module: ModuleIR) -> str:
     """The record that takes them."""
     if module.dissipation:
-        return "ExactLaw"
+        return "ExactChartLaw" if module.chart else "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 
@@ -232,7 +234,7 @@ def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
 
 
 def _as_imported(name: str) -> tuple[int, str]:
-    """The order in which names of one import stand: constants, classes, functions."""
+    """Return the key that orders the names of an import: constants, classes, functions."""
     return (0 if name.isupper() else 1 if name[0].isupper() else 2, name)
 
 
@@ -247,7 +249,7 @@ def _digest(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Change any text so that it can stand inside a docstring."""
+    """Change a text so that it can be part of a docstring."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain.replace("\\", "\\\\").replace('"', "'")
 

@@ -8,12 +8,13 @@ from sympy import Basic, Expr, Function, Integer, Pow, Rational, Symbol, ordered
 from gqm_sym.emission.ir import Assignment
 from gqm_sym.errors import EmissionError
 
-# Operations of one function, written out: a long curve has some thousand, and SymPy goes through 10**5 in seconds.
+# The largest number of operations of one function, written out: a long curve has some thousand, and SymPy processes
+# 10**5 in seconds.
 MAX_SIZE = 200_000
 
 
 def check_size(outputs: Iterable[Expr], *, where: str) -> None:
-    """Refuse expressions that are too large, because SymPy goes through them term by term at every step.
+    """Refuse expressions that are too large, because SymPy visits all terms at every step.
 
     Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
     """

@@ -135,7 +135,7 @@ def sweep_dataset(sweep: Sweep) -> "Dataset":
 
 
 def _axis_name(axis: int, arguments: dict[str, Any]) -> str:
-    """The name of the argument that varies along an axis and along no other; another name where there is none."""
+    """Return the name of the argument that varies along this axis only; a numbered name if there is none."""
     along = [name for name, value in arguments.items() if value.shape[axis] != 1]
     alone = len(along) == 1 and arguments[along[0]].size == arguments[along[0]].shape[axis]
     return along[0] if alone else f"axis_{axis}"

@@ -6,9 +6,10 @@ print; the kinds of events differ in their markers.
 
 from typing import Any
 
-from gqm_sym.figures.motions import animate, portrait, sampled, speed_and_force, track
+from gqm_sym.figures.animations import animate
+from gqm_sym.figures.motions import portrait, sampled, speed_and_force, track
 from gqm_sym.figures.portraits import period_against_amplitude, phase_portrait
-from gqm_sym.figures.rides import ride
+from gqm_sym.figures.rides import ride, seats
 from gqm_sym.figures.surveys import smoothing
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "portrait",
     "ride",
     "sampled",
+    "seats",
     "smoothing",
     "speed_and_force",
     "track",

@@ -1,6 +1,7 @@
 """Figures of one motion: its track, its speed and contact force, its portrait, and animations."""
 
 from itertools import pairwise
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,6 @@ from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.motion.motion import horizon
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -32,6 +31,7 @@ PORTRAIT_MARGIN = 0.4
 # Orange where the contact force points along the normal (to the left of increasing parameter), purple where against it.
 FORCE_COLOURS = "PuOr_r"
 LINE_COLOUR = "#333333"
+FORCE_LABEL = "contact force N (N)"
 MARKERS = {
     "launch": (">", "#000000"),
     "turn": ("o", "#0072b2"),
@@ -54,7 +54,8 @@ def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
     motion : Motion
         The motion; a periodic one is drawn over one period.
     axes : matplotlib Axes, optional
-        Where to draw. Without it a new figure is made.
+        Where to draw; of a space curve the elevation is drawn there. Without it a new figure is made, that of a space
+        curve in three dimensions.
 
     Returns
     -------
@@ -62,31 +63,78 @@ def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
         Coordinates are in metres, contact forces in newtons.
     """
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import TwoSlopeNorm
 
-    axes = new_axes(axes)
     path = sampled(motion)
-    points = np.stack([path.x, path.z], axis=1)
-    force = 0.5 * (path.normal_force[1:] + path.normal_force[:-1])
-    largest = float(np.nanmax(np.abs(path.normal_force), initial=0.0)) or 1.0
-    line = LineCollection(
-        list(np.stack([points[:-1], points[1:]], axis=1)),
-        array=force,
-        cmap=FORCE_COLOURS,
-        norm=TwoSlopeNorm(0.0, -largest, largest),
-        linewidth=4,
-        capstyle="round",
-    )
+    if axes is None and motion.problem.formulas.path_in_space is not None:
+        return _track_in_space(motion, path)
+    axes = new_axes(axes)
+    line = LineCollection(_segments(path.x, path.z), **_coloured(path.normal_force), capstyle="round")
     axes.plot(path.x, path.z, color=LINE_COLOUR, linewidth=5.5, solid_capstyle="round", zorder=1)
     axes.add_collection(line)
     for kind, x, z in _marks(motion):
-        marker, colour = MARKERS.get(kind, OTHER_MARKER)
-        axes.plot(x, z, marker, color=colour, markeredgecolor="white", markersize=9, linestyle="none", label=kind)
+        axes.plot(x, z, label=kind, **_marker(kind))
     figure = figure_of(axes)
-    figure.colorbar(line, ax=axes, label="contact force N (N)")
+    figure.colorbar(line, ax=axes, label=FORCE_LABEL)
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     return finished(axes, "x (m)", "z (m)")
+
+
+def _track_in_space(motion: "Motion", path: "State") -> "Figure":
+    """Draw a track in three dimensions, coloured by the contact force, with the events."""
+    figure = new_figure(8, 6)
+    view = figure.add_subplot(projection="3d")
+    draw_in_space(view, path, path.normal_force, FORCE_LABEL)
+    times = [("launch", 0.0), *((event.kind, event.t) for event in _shown_events(motion) if isfinite(event.t))]
+    for kind, time in times:
+        at = motion.state(min(time, horizon(motion)))
+        view.plot(at.x, at.y, at.z, label=kind, zorder=9, **_marker(kind))
+    finished(view, "x (m)", "y (m)")
+    return figure
+
+
+def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
+    """Draw the places of states on axes of three dimensions, in the colours of values there, white where these are 0.
+
+    A bar beside the axes tells the values by their ``label``.
+    """
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    line = Line3DCollection(_segments(path.x, path.y, path.z), **_coloured(values))
+    view.plot(path.x, path.y, path.z, color=LINE_COLOUR, linewidth=5.0)
+    view.add_collection3d(line)
+    view.set_aspect("equal")
+    # Smaller than its place, for the layout does not know how wide the labels of three dimensions are.
+    view.set_box_aspect([np.ptp(ends()) for ends in (view.get_xlim, view.get_ylim, view.get_zlim)], zoom=0.85)
+    view.locator_params(nbins=5)
+    view.locator_params(axis="z", nbins=3)
+    view.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    figure_of(view).colorbar(line, ax=view, label=label, shrink=0.7, location="left")
+
+
+def _segments(*coordinates: Array) -> list[Array]:
+    """The lines between points."""
+    points = np.stack(coordinates, axis=1)
+    return list(np.stack([points[:-1], points[1:]], axis=1))
+
+
+def _coloured(values: Array) -> dict[str, Any]:
+    """How lines are drawn in the colours of values at their ends, white where these are 0."""
+    from matplotlib.colors import TwoSlopeNorm
+
+    largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+    return {
+        "array": 0.5 * (values[1:] + values[:-1]),
+        "cmap": FORCE_COLOURS,
+        "norm": TwoSlopeNorm(0.0, -largest, largest),
+        "linewidth": 4,
+    }
+
+
+def _marker(kind: str) -> dict[str, Any]:
+    """How an event is drawn."""
+    marker, colour = MARKERS.get(kind, OTHER_MARKER)
+    return {"marker": marker, "color": colour, "markeredgecolor": "white", "markersize": 9, "linestyle": "none"}
 
 
 @require("plot")
@@ -153,43 +201,6 @@ def portrait(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
     given = tuple(number.text for number in problem.p)
     assert isinstance(problem.formulas, CompiledModel)
     return portrait_of(problem.formulas, given, span, through=[launch], axes=axes)
-
-
-@require("plot")
-def animate(motion: "Motion", path: "str | Path", *, duration: float | None = None, rate: int = 25) -> None:
-    """Write an animation of the body on its track.
-
-    Parameters
-    ----------
-    motion : Motion
-        The motion to show.
-    path : path
-        The file to write. Its extension selects the format: ``.gif``, or ``.mp4`` where ffmpeg is installed.
-    duration : float, optional
-        Length of the animation in seconds of motion, from the launch on. Without it one period is shown, or the whole
-        motion if it does not repeat.
-    rate : int
-        Frames per second.
-
-    Raises
-    ------
-    InputError
-        If ``duration`` is not positive.
-    """
-    from matplotlib.animation import FuncAnimation
-
-    end = horizon(motion) if duration is None else float(duration)
-    if not end > 0.0:
-        raise InputError(f"duration: must be positive, got {duration!r}")
-    frames = motion.state(np.arange(0.0, end, 1.0 / rate))
-    figure = track(motion)
-    (body,) = figure.axes[0].plot([], [], "o", color="black", markersize=12, zorder=9)
-
-    def step(k: int) -> tuple[Any, ...]:
-        body.set_data([frames.x[k]], [frames.z[k]])
-        return (body,)
-
-    FuncAnimation(figure, step, frames=len(frames.t), blit=True).save(path, fps=rate)
 
 
 def sampled(motion: "Motion") -> "State":

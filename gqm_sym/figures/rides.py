@@ -1,6 +1,6 @@
-"""The picture of a ride on a banked track: where it goes, and what riders feel."""
+"""The figure of a ride on a banked track: the track, and the loads on riders."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError
 from gqm_sym.figures.axes import finished, new_figure
-from gqm_sym.figures.motions import FORCE_COLOURS, LINE_COLOUR, sampled
+from gqm_sym.figures.motions import LINE_COLOUR, draw_in_space, sampled
 from gqm_sym.optional import require
-from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.rider import check_banked
+from gqm_sym.runtime.motion.motion import horizon
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.motion.motion import Motion
 
 COLOURS = {"vertical": "#d55e00", "lateral": "#0072b2", "longitudinal": "#009e73"}
+SEATS = {"first": "#d55e00", "middle": "#333333", "last": "#0072b2"}
+# Times at which the loads in these cars are compared.
+SEAT_TIMES = 4001
+LOAD_LABEL = "load (9.80665 m/s²)"
 
 
 @require("plot")
@@ -41,7 +45,7 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     Raises
     ------
     InputError
-        If no roll was declared, or the limits are none.
+        If no roll was declared, or the limits are not pairs of numbers.
     """
     check_banked(motion.problem.formulas, "ride")
     levels = _levels({} if limits is None else limits)
@@ -49,16 +53,9 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     figure = new_figure(11, 9)
     grid = figure.add_gridspec(3, 2, height_ratios=(1.5, 1.5, 2), width_ratios=(1.3, 1))
     view = figure.add_subplot(grid[:2, 0], projection="3d")
-    line = _coloured(view, np.stack([path.x, path.y, path.z], axis=1), path.n_vertical)
     view.plot(path.track_x, path.track_y, path.track_z, color=LINE_COLOUR, linewidth=0.8)
     view.plot(path.x[:1], path.y[:1], path.z[:1], ">", color="black", label="launch")
-    view.set_aspect("equal")
-    # Smaller than its place, for the layout does not know how wide the labels of three dimensions are.
-    view.set_box_aspect([np.ptp(ends()) for ends in (view.get_xlim, view.get_ylim, view.get_zlim)], zoom=0.85)
-    view.locator_params(nbins=5)
-    view.locator_params(axis="z", nbins=3)
-    view.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
-    figure.colorbar(line, ax=view, label="vertical load (9.80665 m/s²)", shrink=0.7, location="left")
+    draw_in_space(view, path, path.n_vertical, f"vertical {LOAD_LABEL}")
     plan, elevation = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     plan.plot(path.x, path.y, color=LINE_COLOUR)
     plan.plot(path.x[:1], path.y[:1], ">", color="black", label="launch")
@@ -70,9 +67,65 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     felt.axhline(0.0, color=LINE_COLOUR, linewidth=0.8)
     for load, colour in COLOURS.items():
         felt.plot(path.s, getattr(path, f"n_{load}"), color=colour, label=load)
-        for level in levels.get(load, ()):
-            felt.axhline(level, color=colour, linestyle="--", linewidth=1.0, label=f"{load}, limit")
-    return finished(felt, "arc length s (m)", "load (9.80665 m/s²)")
+        _limit(felt, levels.get(load, ()), colour, f"{load}, limit")
+    return finished(felt, "arc length s (m)", LOAD_LABEL)
+
+
+@require("plot")
+def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = None) -> "Figure":
+    """Draw what riders feel in the first, the middle and the last car of a train, against the place of their car.
+
+    Parameters
+    ----------
+    motion : Motion
+        The motion of a train on a banked track; a periodic one is drawn over one period.
+    limits : mapping, optional
+        Levels that are drawn beside the loads, as for `ride`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Arc length is that of the curve in metres, loads are in units of 9.80665 m/s**2.
+
+    Raises
+    ------
+    InputError
+        If the body is no train, no roll was declared, or the limits are none.
+    """
+    check_banked(motion.problem.formulas, "seats")
+    levels = _levels({} if limits is None else limits)
+    cars = motion.cars(sampled(motion).t)
+    figure = new_figure(9, 8)
+    rows = figure.subplots(len(COLOURS), 1, sharex=True)
+    for axes, load in zip(rows, COLOURS, strict=True):
+        axes.axhline(0.0, color=LINE_COLOUR, linewidth=0.8)
+        for seat, car in _seats(cars.lam.shape[0]):
+            felt = getattr(cars, f"n_{load}")[car]
+            axes.plot(cars.lam[car], felt, color=SEATS[seat], label=f"{seat} car", linewidth=1.2)
+        _limit(axes, levels.get(load, ()), LINE_COLOUR, "limit")
+        finished(axes, "arc length of the car s (m)" if axes is rows[-1] else "", f"{load} {LOAD_LABEL}")
+        if axes is not rows[0]:
+            axes.get_legend().remove()
+    return figure
+
+
+def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
+    """Yield the first, the middle and the last car of a train, each with the least and the largest of its loads."""
+    cars = motion.cars(np.linspace(0.0, horizon(motion), SEAT_TIMES))
+    loads = [getattr(cars, f"n_{load}") for load in LOADS]
+    for seat, car in _seats(cars.lam.shape[0]):
+        yield seat, *(end(felt[car]) for felt in loads for end in (np.min, np.max))
+
+
+def _seats(count: int) -> list[tuple[str, int]]:
+    """Three cars of a train by name and number."""
+    return list(zip(SEATS, (count - 1, count // 2, 0), strict=True))
+
+
+def _limit(axes: Any, levels: Sequence[float], colour: str, label: str) -> None:
+    """Draw levels across axes."""
+    for level in levels:
+        axes.axhline(level, color=colour, linestyle="--", linewidth=1.0, label=label)
 
 
 def _levels(limits: Any) -> dict[str, list[float]]:
@@ -90,20 +143,3 @@ def _levels(limits: Any) -> dict[str, list[float]]:
             raise InputError(f"limits: {load}: must be finite numbers, got {short(levels)}")
         found[load] = values.tolist()
     return found
-
-
-def _coloured(view: Any, points: Array, values: Array) -> Any:
-    """Draw a line in three dimensions in the colours of values at its points, white where these are 0."""
-    from matplotlib.colors import TwoSlopeNorm
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-    largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
-    line = Line3DCollection(
-        list(np.stack([points[:-1], points[1:]], axis=1)),
-        array=0.5 * (values[1:] + values[:-1]),
-        cmap=FORCE_COLOURS,
-        norm=TwoSlopeNorm(0.0, -largest, largest),
-        linewidth=4,
-    )
-    view.add_collection3d(line)
-    return line

@@ -22,7 +22,7 @@ from gqm_sym.runtime.model import CompiledModel
 STEP = 1e-6
 
 # Directions in which a change of the parameters changes the measurements less than this, relative to the direction in
-# which it changes them most, cannot be told from the data. The second holds for difference quotients.
+# which it changes them most, cannot be determined from the data. The second holds for difference quotients.
 RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
 
 # A parameter takes part in such a direction if its share of it is more than this.
@@ -39,7 +39,7 @@ LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
 
 
 class Free(NamedTuple):
-    """What is to be found: names, first guesses and limits, in the same order."""
+    """The unknowns: names, first guesses and limits, in the same order."""
 
     names: tuple[str, ...]
     start: Array
@@ -69,7 +69,7 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     Returns
     -------
     Fit
-        Estimates, standard deviations, covariance, residuals, and what the data cannot tell apart.
+        Estimates, standard deviations, covariance, residuals, and the names that the data cannot tell apart.
 
     Raises
     ------
@@ -205,7 +205,7 @@ class Residuals:
             return np.full(self.values.size, nan)
 
     def predicted(self, x: Array) -> Array:
-        """What would be measured without errors."""
+        """Return the measurements without errors."""
         names = tuple(self.measured.values)
         if self.measured.t is not None:
             motion = self.motion(x)
@@ -273,7 +273,7 @@ def _until_rest(motion: Any, t: Array) -> Array:
 
 
 def _rates(motion: Any, t: Array) -> Array:
-    """How fast the curve parameter changes at times."""
+    """Return the rate of change of the curve parameter at given times."""
     state, f = motion.state(t), motion.problem.functions
     rates: Array = state.v / path_and_force_at(f.addresses, f.p, state.lam, state.v2)[2]
     return rates
@@ -313,7 +313,7 @@ def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
 
 
 def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
-    """What is told of a fit."""
+    """The description of a fit."""
     names, measured = residuals.free.names, residuals.measured
     if not converged:
         raise SolutionError(

@@ -19,7 +19,7 @@ def central_differences(
     function : callable
         ``f(x)`` gives a number or an array.
     at : (n,) array
-        Where the quotients are taken.
+        The place at which the quotients are taken.
     steps : (n,) array
         The steps to both sides, in the units of the arguments.
     low, high : float or (n,) array

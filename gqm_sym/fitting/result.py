@@ -1,4 +1,4 @@
-"""What a fit found, as numbers, text and a figure."""
+"""The result of a fit, as numbers, text and a figure."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -117,7 +117,7 @@ class Fit:
         return figure
 
     def _across(self, count: int) -> tuple[Array, str]:
-        """What the horizontal axis shows: times, the only column that differs, or numbers."""
+        """Return the values of the horizontal axis: times, the only column that differs, or numbers."""
         if self.measured.t is not None:
             return self.measured.t, "t (s)"
         if len(self.measured.columns) == 1:
@@ -127,7 +127,7 @@ class Fit:
 
 
 def with_deviation(value: float, std: float) -> str:
-    """Return a value with its standard deviation as text, with the two digits that tell something of it."""
+    """Return a value with its standard deviation as text, with two digits of the latter."""
     if not isfinite(std):
         return f"{value:.6g}, not determined"
     if std == 0.0:

@@ -1,4 +1,4 @@
-"""How uncertain an answer is where launch and parameters are: by derivatives, and by many exact answers."""
+"""The uncertainty of an answer from that of launch and parameters: by derivatives, and by many exact answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -103,9 +103,9 @@ def uncertainty(
         Run-time parameters, "lam0" or "v0", each with its value and its standard deviation: ``{"L": (1.0, 1e-3)}``.
         They are independent and normally distributed. Or the result of `fit`, with its covariance.
     samples : int
-        How many values are drawn.
+        The number of values that are drawn.
     seed : int
-        Of the random numbers; the same seed gives the same samples.
+        The seed of the random numbers; the same seed gives the same samples.
     fixed
         All else of the launch and the parameters, as for ``module.sweep``.
 
@@ -118,7 +118,7 @@ def uncertainty(
     Raises
     ------
     InputError
-        If a name is unknown, a standard deviation is negative, or the data of a fit do not tell what it found.
+        If a name is unknown, a standard deviation is negative, or the data of a fit do not determine its estimates.
     SolutionError
         If the motion does not have the quantity.
 
@@ -198,7 +198,7 @@ def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tup
 
 
 def _draws(covariance: Array, samples: int, seed: int) -> Array:
-    """Return normally distributed numbers of mean zero, the same on every machine but for rounding."""
+    """Return normally distributed numbers of mean zero, which are the same on every machine up to rounding."""
     deviations = np.sqrt(np.diag(covariance))
     scale = np.where(deviations > 0.0, deviations, 1.0)
     correlation = covariance / np.outer(scale, scale)

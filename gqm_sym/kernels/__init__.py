@@ -17,7 +17,7 @@ from gqm_sym.kernels.train import Train
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KernelRow:
-    """How a kernel is called in a YAML file and in Python, and what it is given."""
+    """The names of a force law in a YAML file and in Python, and its arguments."""
 
     name: str
     make: Callable[..., Kernel]

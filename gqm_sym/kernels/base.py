@@ -164,7 +164,7 @@ class Kernel:
         )
 
     def __str__(self) -> str:
-        """A few lines for people: every force, and what its parameters are measured in."""
+        """Describe the law in a few lines: every force, and the units of its parameters."""
         loss = "conservative" if self.conservative else "dissipative"
         lines = [f"Force law, {loss}", *(f"  {name}: {text}" for name, text in self.terms)]
         return "\n".join([*lines, f"  parameters: {in_words(dict(self.defaults), units_of(self))}"])
@@ -302,13 +302,13 @@ def kernel_formulas(kernel: Kernel) -> Formulas:
 
 
 def units_of(kernel: Kernel) -> dict[str, str]:
-    """The SI units of the parameters of a force law, as far as its formulas and their roles tell them."""
+    """Return the SI units of a force law's parameters, as far as its formulas and their roles determine them."""
     found = found_dimensions(kernel_formulas(kernel), COMMON_DIMENSIONS)
     return {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
 
 
 def units_by_role(kernel: Kernel) -> dict[str, str]:
-    """Return the units of parameters that formulas alone do not tell, where they have their usual names."""
+    """Return the units of parameters that formulas alone do not determine, if they have their usual names."""
     droplet = any(name == "surface_tension" for name, _ in kernel.terms)
     return {name: UNITS[name] for name in ("gamma", "ell_c") if droplet and name in kernel.parameters}
 

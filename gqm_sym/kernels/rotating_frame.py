@@ -1,7 +1,7 @@
-"""A track that rotates about the vertical axis x = 0."""
+"""A track that rotates about the vertical axis x = y = 0."""
 
 from gqm_sym.arguments import checked
-from gqm_sym.kernels.base import Kernel, X, parameter
+from gqm_sym.kernels.base import Kernel, X, Y, parameter
 from gqm_sym.parameters import Given
 
 
@@ -9,7 +9,8 @@ from gqm_sym.parameters import Given
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     """Return the centrifugal force of a track that rotates about the z axis.
 
-    The Coriolis force presses the body sideways against the track, which increases friction.
+    The Coriolis force presses the body sideways against a planar track, which increases friction. On a space curve it
+    is part of the contact force, which then depends on the direction of motion.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     rate, pair = parameter(Omega, "Omega", where="rotating_frame")
     return Kernel(
         terms=(("rotating_frame", f"frame turning about the z axis at {rate}"),),
-        potential=-(rate**2) * X**2 / 2,
+        potential=-(rate**2) * (X**2 + Y**2) / 2,
         spin=rate,
         defaults=(pair,),
     )

@@ -1,7 +1,7 @@
 """A train: mass spread evenly along the track."""
 
 from numbers import Integral
-from typing import Any
+from typing import Any, SupportsIndex
 
 from gqm_sym.arguments import checked, short
 from gqm_sym.errors import DeclarationError
@@ -38,7 +38,12 @@ def Train(*, length: Given | None = None, cars: Any = 1, mass: Given | None = No
         If a name or a value is not allowed.
     """
     size, pair = parameter(length, "length", where="train")
-    if isinstance(cars, bool) or not isinstance(cars, Integral) or not 1 <= int(cars) <= MAX_CARS:
+    if (
+        isinstance(cars, bool)
+        or not isinstance(cars, Integral)
+        or not isinstance(cars, SupportsIndex)
+        or not 1 <= int(cars) <= MAX_CARS
+    ):
         raise DeclarationError(f"train: cars: must be a whole number from 1 to {MAX_CARS}, got {short(cars)}")
     pairs = (pair,) if mass is None else (pair, ("m", read_value(mass, where="train: mass")))
     text = f"a train of length {size}, {cars} car{'' if cars == 1 else 's'}"

@@ -1,8 +1,7 @@
 """Rigorous values of trees without names: exact fractions, or intervals of any required width.
 
 The precision is raised until every question (Is this number negative? Is it in the domain of asin?) has an answer.
-Numbers that cannot be told apart at the last precision, where they agree to 200 digits, count as equal:
-``sqrt(2)**2 - 2`` is zero.
+Numbers that agree to 200 digits, the last precision, count as equal: ``sqrt(2)**2 - 2`` is zero.
 
 mpmath is imported when the first irrational number occurs. Its ``libmp`` has no global state, so that this is safe in
 threads.

@@ -65,7 +65,7 @@ class Number:
 
     @property
     def fraction(self) -> Fraction | None:
-        """The exact value if the number was written as a rational number, else None."""
+        """The exact value of a number that was written as a rational number; None for other numbers."""
         if isinstance(self._source, ast.expr):
             return None
         return Fraction(self._source)

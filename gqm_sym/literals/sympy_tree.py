@@ -56,7 +56,8 @@ def _tree(node: Any, where: str, depth: int) -> ast.expr:
     if head == "Symbol":
         return _symbol(node, where)
     arguments: tuple[Any, ...] = getattr(node, "args", ())
-    # An undefined function may have any name, even "sin"; the module of its class tells it from SymPy's own functions.
+    # An undefined function may have any name, even "sin"; the module of its class distinguishes it from SymPy's
+    # functions.
     known = (type(node).__module__ or "").startswith("sympy.")
     if known and head in ("Add", "Mul", "Pow"):
         operator = {"Add": ast.Add, "Mul": ast.Mult, "Pow": ast.Pow}[head]

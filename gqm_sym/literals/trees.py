@@ -124,7 +124,7 @@ def _chain(tree: ast.expr, direct: type[ast.operator], inverse: type[ast.operato
 
 
 def _place(node: ast.expr) -> str:
-    """Return ``column n: `` for a node that was read from text, else nothing."""
+    """Return ``column n: `` for a node that was read from text, and an empty text for others."""
     column = getattr(node, "col_offset", None)
     return "" if column is None else f"column {column + 1}: "
 

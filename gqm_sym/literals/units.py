@@ -1,8 +1,8 @@
 """Units of measurement: read as exact multiples of SI units, as text or as the units of quantities of pint.
 
 Units are written in the grammar of expressions, ``km/h`` or ``m/s**2``; their names are pint's, which is imported only
-for a name that is not in `_SI`. Nothing is rounded: a foot is 381/1250 m, and a degree is pi/180. A quantity is told by
-its attributes, so that pint is not imported to look whether something is one.
+for a name that is not in `_SI`. Nothing is rounded: a foot is 381/1250 m, and a degree is pi/180. A quantity is
+recognised by its attributes, so that pint need not be imported.
 """
 
 import re
@@ -57,7 +57,7 @@ _SI = {
     "J": Unit(kilogram=1, metre=2, second=-2),
 }
 
-# What stands between a number and its unit, in a text such as "30 deg" or "30deg".
+# The space between a number and its unit, in a text such as "30 deg" or "30deg".
 _GAP = re.compile(
     r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])|(?<=[\d.)])(?=[A-Za-z\u00b0\u00b5])(?![eE][+-]?\d)"
 )
@@ -120,7 +120,7 @@ def split_unit(text: str) -> tuple[str, expr, str] | None:
 
 
 def scale_of(unit: str, wanted: str | None, *, where: str) -> Unit:
-    """How many SI units a unit is, if it is one of the dimension that is wanted.
+    """Return the size of a unit in SI units, if it has the required dimension.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def _registry() -> Any:
 
 
 def _named(name: str) -> Unit:
-    """A unit that pint knows by name."""
+    """Return a unit of pint by its name."""
     registry = _registry()
     from pint import PintError  # only now: the registry imports pint apart from what reading may take
 

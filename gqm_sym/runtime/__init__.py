@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.motion.events import Event, Leg
     from gqm_sym.runtime.motion.extremes import Extreme
     from gqm_sym.runtime.motion.motion import Motion
-    from gqm_sym.runtime.motion.riding.cars import Cars
+    from gqm_sym.runtime.motion.riding.cars import Cars, CarsOfRiders
     from gqm_sym.runtime.motion.riding.exceedance import Exceedance
     from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
     from gqm_sym.runtime.sweep.result import Sweep
 
 __all__ = [
     "Cars",
+    "CarsOfRiders",
     "CompiledModel",
     "Energy",
     "Equilibrium",
@@ -47,6 +48,7 @@ _HOMES = {
     "Equilibrium": "launch.equilibria",
     "Event": "motion.events",
     "Cars": "motion.riding.cars",
+    "CarsOfRiders": "motion.riding.cars",
     "Exceedance": "motion.riding.exceedance",
     "Extreme": "motion.extremes",
     "Leg": "motion.events",

@@ -1,4 +1,4 @@
-"""What generated modules and the runtime agree on.
+"""The interface between generated modules and the runtime.
 
 A generated module evaluates its formulas at many places in one call. Its functions reach the runtime by address, so
 the runtime is compiled once per installation and shared by every module.
@@ -13,7 +13,7 @@ function               arguments                      rows of ``out``
 ====================== ============================== ===============================================================
 path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
                                                       force N = m*(kappa*v2 + n0) [N]
-path_in_space          n, lam, v2, p, out             y [m], and the contact force along x, y and z [N]
+path_in_space          n, lam, v2, v, p, out          y [m], and the contact force along x, y and z [N]; v = sgn(ds/dt)
 rider_loads            n, lam, v2, v, nu, p, out      what a rider feels upwards, to the left and ahead, in units of
                                                       9.80665 m/s2; the rates of these [1/s]; cosine and sine of the
                                                       roll angle, times a positive number; x, y and z of the track [m];
@@ -40,7 +40,9 @@ linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The con
 
 Only modules of space curves have ``path_in_space``. Where such a curve lies in no vertical plane, the contact force has
 a length and no sign: N is that length, kappa the length of the curvature vector, and n0 that of N/m at rest. With
-friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0.
+friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0; on a banked track whose riders
+have an upward direction they belong to the part of N along that. In a frame that turns it depends
+on the sign of ds/dt too: in ``path_and_contact_force`` and ``load_map`` it then is that of a motion forwards.
 
 Only modules of tracks with a declared roll have ``rider_loads``.
 
@@ -88,13 +90,13 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 10
+INTERFACE = 11
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
 PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
-PATH_IN_SPACE = PATH_AND_CONTACT_FORCE
+PATH_IN_SPACE = types.void(types.intp, MANY, MANY, REAL, MANY, MANY)
 LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
 EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
@@ -123,7 +125,7 @@ PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7
 
 
 class Addresses(NamedTuple):
-    """Where the addresses of one generated module's functions stand in memory; 0 for those that it has none of."""
+    """The memory cells with the addresses of one generated module's functions; 0 for missing ones."""
 
     path_and_contact_force: int
     effective_potential: int = 0
@@ -154,7 +156,7 @@ def _addresses(functions: Iterable[Any]) -> Iterator[int]:
 
 
 class BatchAddresses(NamedTuple):
-    """Where the addresses of one module's functions for many orbits at once stand in memory; 0 for missing ones."""
+    """The memory cells with the addresses of one module's functions for many orbits at once; 0 for missing ones."""
 
     potential_divdiff1: int
     potential_divdiff2: int
@@ -190,12 +192,12 @@ class BatchFunctions(NamedTuple):
 
 
 class Dissipation(NamedTuple):
-    """What compiled code takes of a dissipative model: the addresses of two functions, and of what kind its forces are.
+    """The arguments for a dissipative model: the memory cells of two functions, and the kind of its forces.
 
     Attributes
     ----------
     speed_equation, static_balance : int
-        Where the addresses of these functions stand in memory.
+        The memory cells with the addresses of these functions.
     friction : bool
         Whether the force depends on the sign of N: then a leg ends where N changes sign.
     kinked : bool
@@ -221,7 +223,7 @@ class DissipativeFunctions(NamedTuple):
     linear: bool
 
     def addresses(self) -> Dissipation:
-        """Where their addresses stand in memory, with the flags."""
+        """The memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
 
@@ -237,7 +239,7 @@ class SeparatedTerms(NamedTuple):
         ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
         the run-time parameters and what stands behind them.
     potentials, loads : int
-        How many parts U and n0 have.
+        The numbers of parts of U and n0.
     held : tuple of int
         Where in ``p`` the numbers stand that ``function`` reads.
     parts : callable or None
@@ -256,6 +258,17 @@ class ExactPotential(NamedTuple):
     """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives by x and z."""
 
     effective_potential: Callable[..., Any]
+
+
+class ExactChartLaw(NamedTuple):
+    """The formulas of a dissipative module along a charted curve, by what is known at a point of it.
+
+    ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
+    V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N).
+    """
+
+    static_normal_load: Callable[..., Any]
+    speed_slope: Callable[..., Any]
 
 
 class ExactFormulas(NamedTuple):

@@ -26,9 +26,10 @@ from gqm_sym.runtime.launch.speed import (
     Pass1InSpace,
     Pass1OfRider,
     fill_load_map,
+    length,
     load_map_arrays,
     path_and_force_at,
-    path_in_space_at,
+    path_in_space,
 )
 
 if TYPE_CHECKING:
@@ -164,15 +165,17 @@ class CompiledModel(Formulas):
         """Fill what only the load map of a space curve has."""
         if self.path_in_space is None:
             return
-        address, v2 = self.path_in_space.address, arrays.v2.reshape(-1)
+        v2 = arrays.v2.reshape(-1)
         rows, force = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]], arrays.normal_force.reshape(-1)
 
         def fill(part: slice) -> None:
-            found = [*path_in_space_at(address, p, places[part], v2[part])]
+            # From rest the body goes to either side of the launch.
+            side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
+            ahead = np.where(side != 0.0, side, float(launch.direction))
+            found = [*path_in_space(self, p, places[part], v2[part], ahead)]
+            if self.directed:
+                force[part] = length(np.array(found[1:]))
             if self.rider_loads is not None:
-                # From rest the body goes to either side of the launch.
-                side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
-                ahead = np.where(side != 0.0, side, float(launch.direction))
                 found.extend(rider_loads(self, p, places[part], v2[part], ahead, force[part]))
             for row, values in zip(rows, found, strict=True):
                 row[part] = values

@@ -1,4 +1,4 @@
-"""All that emitted modules import: each name is fetched from the room it lives in when a module first asks for it.
+"""All that emitted modules import: each name is fetched from its room when a module first needs it.
 
 A room of the runtime may be moved without touching a module that was generated before.
 """
@@ -37,11 +37,13 @@ _NAMES_BY_HOME = {
     "charts.sampled": "Sampled",
     "charts.space.rail": "SpaceRail",
     "charts.tracing": "Traced",
-    "charts.train": "TrackOfTrain",
+    "charts.train": (
+        "TrackOfTrain train_load train_load_in_plane train_load_rate train_load_slope train_load_slope_in_plane"
+    ),
     "interface": (
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
-        "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "
-        "ORBIT_INVARIANTS_BATCH "
+        "EFFECTIVE_POTENTIAL ExactChartLaw ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH "
+        "LOAD_MAP ORBIT_INVARIANTS_BATCH "
         "PATH_AND_CONTACT_FORCE PATH_IN_SPACE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
         "POTENTIAL_DIVDIFF2_BATCH RIDER_LOADS SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
         "TIME_INTEGRAND_BATCH TURNING_POINT_BATCH"

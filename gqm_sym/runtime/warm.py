@@ -79,7 +79,7 @@ def warm(files: tuple[str, ...] = (), processes: int = 0, progress: Callable[[in
     files : tuple of str
         Paths of generated modules.
     processes : int
-        How many processes work at once; as many as there are cores if it is 0.
+        The number of processes at a time; 0 for one process for each core.
     progress : callable, optional
         Called with the number of files that are done, and that of all.
 

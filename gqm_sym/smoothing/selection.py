@@ -1,8 +1,8 @@
-"""How much to smooth: the weight of roughness, and knots as close as it needs.
+"""The selection of smoothing: the weight of roughness, and the distance of the knots that it needs.
 
-A weight is told by its width w: the spline keeps waves longer than about 2 pi w and drops shorter ones. Widths are
-tried on knots that are close enough for them and not much closer, from coarse to fine: knots at every one of a million
-points would cost time and digits, and say nothing that a few hundred do not.
+A weight is described by its width w: the spline keeps waves longer than about 2 pi w and removes shorter ones. Widths
+are tried on knots that are close enough for them and not much closer, from coarse to fine: knots at every one of a
+million points would cost time and digits, and say nothing that a few hundred do not.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ FINER = 4
 PIECES = 2.0
 # Between one width that is tried and the next. The criteria are so flat that nothing between them is better by much.
 RATIO = 1.12
-# The least width that is tried, in usual distances of points: the spline goes through them.
+# The least width that is tried, in typical distances of points: the spline interpolates them.
 LEAST = 0.003
 # Knots at the points are at least this share of their usual distance apart.
 APART = 0.05
@@ -60,7 +60,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """What is to be least.
+    """The function to be minimised.
 
     For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: but for a constant an
     unbiased estimate of how far the spline is from the true places of the points. (To ask for a residual of n s**2, the

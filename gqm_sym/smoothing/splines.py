@@ -1,13 +1,14 @@
-"""Smoothing splines of degree 5: the smooth curve that points ask for, at the cost of its third derivative.
+"""Smoothing splines of degree 5: the curve near the points that minimises a cost with its third derivative.
 
 The spline f has the least ``sum |p_i - f(u_i)|**2 + weight * integral |D^3 f|**2``. A cubic one, whose cost is that of
-the second derivative, would have kinks in its curvature and so in every load. Beyond the outermost points nothing but
-the cost is left, so that the third derivative vanishes at open ends and curvature goes on evenly there.
+the second derivative, would have kinks in its curvature and so in every load. Beyond the outermost points only the cost
+is left, so that the third derivative vanishes at open ends, and the curvature continues linearly there.
 
 SciPy's own smoothing spline is cubic, and FITPACK's (``splprep``), which may have degree 5, sets a few knots where they
 fit the noise of these very points. With 1 cm of noise its loads are about as good, but the worst of them twice as
 wrong; with 10 cm they are two to forty times as wrong, as its target is chosen; and it tells neither how many numbers
-it fitted nor how good they are. Here matrices are banded, and one Cholesky factorisation a weight tells both.
+it fitted nor how good they are. Here the matrices are banded, and one Cholesky factorisation for each weight gives
+both.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,7 @@ class Basis:
     knots : array
         With those beyond the ends: repeated ends of an open track, or the next rounds of a closed one.
     size : int
-        How many functions there are.
+        The number of functions.
     closed : bool
         Whether they are periodic.
     """
@@ -57,12 +58,12 @@ class Basis:
 
     @property
     def low(self) -> float:
-        """Where the first piece begins."""
+        """The start of the first piece."""
         return float(self.knots[DEGREE])
 
     @property
     def high(self) -> float:
-        """Where the last piece ends."""
+        """The end of the last piece."""
         return float(self.knots[-DEGREE - 1])
 
     def rows(self, u: Array, derivative: int = 0) -> Any:
@@ -76,7 +77,7 @@ class Basis:
         slopes = sparse.eye_array(every, format="csr")
         for _ in range(derivative):
             spans = knots[degree + 1 : -1] - knots[1 : -degree - 1]
-            # Functions that begin and end at a repeated end are none.
+            # Functions that begin and end at a repeated end do not count.
             rates = np.divide(degree, spans, out=np.zeros_like(spans), where=spans > 0.0)
             slopes = sparse.diags_array(rates) @ (slopes[1:] - slopes[:-1])
             knots, degree = knots[1:-1], degree - 1
@@ -89,7 +90,7 @@ class Basis:
         return sparse.csr_array(values @ folded)
 
     def spline(self, coefficients: Array) -> Any:
-        """The spline of a row of coefficients for each function; it goes on beyond open ends as its end pieces do."""
+        """Return the spline with a row of coefficients for each function; its end pieces continue beyond open ends."""
         from scipy.interpolate import BSpline
 
         if not self.closed:
@@ -123,7 +124,7 @@ class Fit:
     residual : float
         The sum of the squared distances of points from it.
     freedom : float
-        How many numbers it fitted: the trace of the matrix that leads from points to their places on it.
+        The number of numbers it fitted: the trace of the matrix that leads from points to their places on it.
     """
 
     coefficients: Array
@@ -138,11 +139,11 @@ class Smoother:
     Parameters
     ----------
     u : (n,) array
-        Where on the curve each point belongs.
+        The place of each point on the curve.
     points : (n, d) array
     basis : Basis
     least : float
-        The least weight that will be asked for.
+        The least weight that will be used.
     """
 
     def __init__(self, u: Array, points: Array, basis: Basis, least: float) -> None:
@@ -157,7 +158,7 @@ class Smoother:
         self._order = order
         self._width = int(max(np.abs(order[part.row] - order[part.col]).max() for part in (gram, rough)))
         self._gram, self._rough = self._banded(gram), self._banded(rough)
-        # Other splines' residuals are told from this one's without the points, and without cancellation.
+        # Residuals of other splines follow from those of this one without the points, and without cancellation.
         self._product = rows.T @ rows
         self._reference = self._solved(self._factor(least), self._sums)
         left = points - rows @ self._reference

@@ -35,7 +35,7 @@ STEEP = 0.3
 NODES = 6
 # Points of the smoothed track in a width: the interpolant through them has its curvature to some 1e-4.
 A_WIDTH = 4.0
-# The fewest points of a smoothed track, and the fewest places at which its errors are told.
+# The least number of points of a smoothed track, and of places at which its errors are stated.
 FEWEST = 16
 # A point this many times as far from the track as usual, and by this share of the usual chord, is stray.
 STRAY = 10.0
@@ -44,7 +44,7 @@ OFF = 0.1
 MEDIAN = 1.4826
 # A track that turns by more than this within its width, or from point to point, is out of order.
 SHARPEST = 0.5 * pi
-# Places at which errors are told, at most, and how much work they may be.
+# The largest number of places at which errors are stated, and the limit of work for them.
 PLACES = 2000
 WORK = 100_000_000
 

@@ -37,7 +37,7 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     try:
         path = (folder / name).resolve(strict=True)
     except FileNotFoundError:
-        raise InputError(f"{name!r}: there is no such file beside the YAML file; check its path") from None
+        raise InputError(f"{name!r}: there is no such file in this folder; check its path") from None
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreadable(name, error, wanted) from None
     if not path.is_relative_to(folder.resolve()):
@@ -78,6 +78,8 @@ def read_rows(name: str, text: str) -> tuple[list[str], list[list[str]]]:
     for count, line in enumerate(lines, start=1):
         if len(line) > LINE_LIMIT:
             raise InputError(f"{name!r}, row {count}: is longer than {LINE_LIMIT} characters; give few numbers a line")
+        if ";" in line and "," in line:
+            raise InputError(f"{name!r}, row {count}: has commas and semicolons; write decimals with a point, as 0.5")
         rows.append(_BETWEEN.split(line.strip()))
     named = rows[0][0][:1].isalpha()
     return (rows[0], rows[1:]) if named else ([], rows)

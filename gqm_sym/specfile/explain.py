@@ -1,4 +1,4 @@
-"""What is wrong with the structure of a file, in words that its author understands."""
+"""Mistakes in the structure of a file, in words that its author understands."""
 
 from collections.abc import Callable, Collection
 from typing import Any, TypeAlias
@@ -10,7 +10,7 @@ from gqm_sym.specfile.locations import descend, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
 from gqm_sym.specfile.schema import FAMILY_MODELS
 
-# What pydantic calls it -> what must stand there.
+# pydantic's name of a type -> the text for messages.
 _WANTED = {
     "string_type": "must be a single value",
     "list_type": "must be a list, as in [a, b]",
@@ -97,7 +97,7 @@ def _explain_unknown(
 
 
 def _sample(loc: tuple[Any, ...], model_at: ModelAt) -> str:
-    """A mapping that may stand at a place of the file."""
+    """A mapping that is allowed at a place of the file."""
     if loc[-1] in _SAMPLES:
         return _SAMPLES[loc[-1]]
     field = getattr(model_at(_path(loc[:-1])), "model_fields", {}).get(loc[-1])

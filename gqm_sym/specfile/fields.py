@@ -1,4 +1,4 @@
-"""Single values of a curve file: what may stand there, and what is said if something else does.
+"""Single values of a curve file: which are allowed, and the messages for others.
 
 Every scalar arrives as text and stays text, so that ``9.81`` keeps meaning 981/100.
 """
@@ -25,7 +25,7 @@ MAX_DIGITS = 9
 # The default of what may be left out. Not "model | None = None": null in the file is a mistake.
 ABSENT: Any = None
 
-# The ways of YAML and of Python to write what is no number.
+# The spellings of YAML and Python for values that are not finite numbers.
 _NOT_FINITE = frozenset({".nan", ".inf", "nan", "inf", "infinity"})
 _COLUMN = re.compile(r"(?:.*?: )?column (\d+): ")
 
@@ -58,7 +58,7 @@ def _checked(check: Callable[[str], object]) -> AfterValidator:
         try:
             check(text)
         except InputError as error:
-            # "where" is empty: the caller knows the place better, from the tree of the file.
+            # "where" is empty, because the caller has the exact place from the tree of the file.
             raise _mistake(*column_of(str(error).removeprefix(": "))) from None
         return text
 
@@ -66,7 +66,7 @@ def _checked(check: Callable[[str], object]) -> AfterValidator:
 
 
 def _check_line(text: str) -> str:
-    # A title goes into the header of emitted code: nothing invisible, nothing that breaks a line.
+    # A title becomes part of the header of emitted code: it must not contain invisible characters or line breaks.
     if not text.isprintable() or len(text) > LINE_LIMIT:
         raise _mistake(f"must be one line of at most {LINE_LIMIT} printable characters")
     return text

@@ -1,4 +1,4 @@
-"""Where in a file something stands, from a path of keys or from the words of a message."""
+"""The position of an entry in a file, from a path of keys or from the words of a message."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ _QUOTED_NAME = re.compile(r"'([A-Za-z]\w*)'")
 
 
 def descend(tree: Node, path: Sequence[str | int]) -> Iterator[tuple[str, Mark, Node]]:
-    """Yield step, place and node along a path, as far as the tree has it.
+    """Yield step, place and node along a path, as far as it exists in the tree.
 
     Steps that are not there (the tag of a union, a missing key) are passed over.
     """
@@ -58,7 +58,7 @@ def locate(tree: Node, message: str, base: tuple[str, ...] = ()) -> tuple[Mark, 
     tree
         The file.
     message
-        Of an error raised while something in the file was declared.
+        The message of an error raised while something in the file was declared.
     base
         Path of what was being declared.
     """

@@ -1,4 +1,4 @@
-"""The tree of a YAML file, whose nodes know their line and column, and what is wrong with it."""
+"""The tree of a YAML file, whose nodes have their line and column, and the mistakes in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -88,7 +88,7 @@ def shown(text: str) -> str:
 
 
 class Mistakes:
-    """What is wrong with one file, collected until all of it has been looked at."""
+    """The mistakes of one file, collected until all of it has been read."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = str(path)

@@ -1,4 +1,4 @@
-"""How a rail of pieces is written: standard pieces, and curves with formulas and a domain."""
+"""The schema of a rail of pieces: standard pieces, and curves with formulas and a domain."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
@@ -42,7 +42,7 @@ class Transition(Section):
 
 
 class PieceRow(NamedTuple):
-    """How a piece is written, and how it is declared from what was written."""
+    """The schema of a piece, and its declaration from a file."""
 
     model: Any
     declare: Callable[..., Piece | Curve]

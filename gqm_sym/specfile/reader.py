@@ -1,7 +1,7 @@
 """Read a curve file: text -> tree -> checked sections -> what they declare.
 
-Every stage notes what it finds wrong and goes on with the rest, so that all mistakes of a file are
-reported together. What is only a consequence of an earlier mistake is not reported.
+Every stage records its mistakes and continues, so that all mistakes of a file are reported together. Consequences of an
+earlier mistake are not reported.
 """
 
 from collections.abc import Iterable, Mapping
@@ -253,7 +253,7 @@ class _Reader:
             self.mistakes.add(mark, f"launch.{key}: {what}", remedy)
 
         if "v0" in launch and _is_true(exact_value(launch["v0"]) < 0):
-            remedy = "give a speed, and direction: -1 to launch against growing parameter"
+            remedy = "give a speed, and direction: -1 to launch towards decreasing parameter"
             note("v0", f"must not be negative, got {launch['v0']}", remedy)
         if "t_max" in launch and not _is_true(exact_value(launch["t_max"]) > 0):
             note("t_max", f"must be positive, got {launch['t_max']}", "give a time in seconds")
@@ -276,7 +276,7 @@ class _Reader:
 
 
 def _is_true(relation: Any) -> bool:
-    # A relation that SymPy cannot decide (two equal numbers in disguise) is no reason to refuse.
+    # A relation that SymPy cannot decide (two equal numbers in different forms) is accepted.
     return bool(relation is sp.true or relation is True)
 
 

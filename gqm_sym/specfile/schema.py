@@ -159,7 +159,7 @@ FAMILY_MODELS: dict[str, type[Section]] = {
 
 
 class CurveRow(NamedTuple):
-    """How a curve kind is written, and how it is declared from what was written."""
+    """The schema of a kind of curve, and its declaration from a file."""
 
     model: Any
     declare: Callable[..., Curve]
@@ -359,7 +359,7 @@ def model_at(path: tuple[str, ...]) -> Any:
 
 
 class _Draft07(GenerateJsonSchema):
-    """What editors understand: draft 7, without the titles that pydantic makes from names."""
+    """A schema for editors: draft 7, without the titles that pydantic makes from names."""
 
     schema_dialect = "http://json-schema.org/draft-07/schema#"
 

@@ -1,4 +1,4 @@
-"""What a curve file says, read and checked."""
+"""The content of a curve file, read and checked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from gqm_sym.specfile.nodes import MapNode, Mistakes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Note:
-    """What a file tells people about a parameter."""
+    """The unit and the description of a parameter in a file."""
 
     unit: str = ""
     description: str = ""
@@ -43,7 +43,7 @@ class Spec:
     launch
         Keyword arguments for ``solve``, numbers as the texts they are; None without a launch.
     tree
-        The file's nodes, which know their places.
+        The file's nodes with their positions.
     """
 
     path: str
@@ -77,7 +77,7 @@ class Spec:
         Raises
         ------
         SpecFileError
-            If there is no launch, a parameter has no value, or the curve none where the launch is.
+            If there is no launch, a parameter has no value, or the curve has no point at the launch.
         """
         mistakes = Mistakes(self.path)
         if self.launch is None:
@@ -105,7 +105,7 @@ class Spec:
         Parameters
         ----------
         message
-            Of an error that something in the file led to.
+            The message of an error that was caused by something in the file.
         base
             Keys on the way to the section it is about, as far as that is known.
         """

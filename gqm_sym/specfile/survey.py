@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.parsers import expat
 
-from gqm_sym.arguments import file_path
+from gqm_sym.arguments import file_path, short
 from gqm_sym.errors import InputError
 from gqm_sym.specfile.beside import ROW_LIMIT, read_beside, read_rows
 
@@ -62,8 +62,10 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
         If there is no such file, or it is anything but a table of points; the message names file and row.
     """
     file = file_path(path, where="read_track: path")
-    if file.is_file():
-        file = file.resolve()
+    try:
+        file = file.resolve(strict=True)
+    except (OSError, ValueError, RuntimeError):
+        raise InputError(f"read_track: path: there is no file {short(str(file))}; give {WANTED}") from None
     found = surveyed(file.name, file.parent)
     width = len(found.rows[0]) if found.rows else 0
     rolls = [()] * len(found.rows) if found.roll is None else [(angle,) for angle in found.roll]
@@ -96,11 +98,14 @@ def surveyed(name: str, folder: Path) -> Survey:
             f"{name!r}, row 1: the columns must be x, z, or x, y, z, perhaps with roll, got {','.join(header)!r:.60}"
         )
     columns = named or _UNNAMED.get(len(rows[0]), ())
-    if columns in (_UNNAMED[2], _UNNAMED[3]) or not columns:
-        return Survey(rows, None, 1 + bool(header))
+    if not (header or columns == _UNNAMED[4]):
+        return Survey(rows, None, 1)
     for row, fields in enumerate(rows, start=1 + bool(header)):
         if len(fields) != len(columns):
-            raise InputError(f"{name!r}, row {row}: must be {len(columns)} numbers, {', '.join(columns)}, got {fields}")
+            raise InputError(
+                f"{name!r}, row {row}: must be {len(columns)} numbers, {', '.join(columns)}, got {fields}; "
+                "a comma separates numbers, and a point is the decimal mark"
+            )
     places = [columns.index(axis) for axis in "xyz" if axis in columns]
     roll = [fields[columns.index("roll")] for fields in rows] if "roll" in columns else None
     return Survey([[fields[k] for k in places] for fields in rows], roll, 1 + bool(header))
@@ -110,6 +115,8 @@ def _number(value: Any, where: str) -> float:
     try:
         number = float(value)
     except ValueError:
+        number = float("nan")
+    if isinstance(value, str) and not (value.isascii() and "_" not in value):  # Python reads these as numbers
         number = float("nan")
     if not isfinite(number):
         raise InputError(f"{where}: {str(value)[:40]!r} is no finite decimal number; leave the row out or mend it")
@@ -153,6 +160,7 @@ class _Reader:
             self.kind = tag
             if len(self.places) == ROW_LIMIT:
                 raise InputError(f"{self.name!r}: has more than {ROW_LIMIT} points, which are the most")
+            self._check_height()
             where = f"{self.name!r}, point {len(self.places) + 1}"
             latitude, longitude = (_number(attributes.get(key, ""), f"{where}: {key}") for key in ("lat", "lon"))
             if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
@@ -161,18 +169,22 @@ class _Reader:
         elif tag == "ele" and self.kind and not self.ended:
             self.height = []
 
+    def _check_height(self) -> None:
+        """Refuse a last point without height."""
+        if self.places and self.places[-1][2] is None:
+            raise InputError(f"{self.name!r}, point {len(self.places)}: has no height (ele); loads need heights")
+
     def _text(self, text: str) -> None:
         if self.height is not None:
             self.height.append(text)
 
     def _end(self, tag: str) -> None:
         tag = tag.rpartition(":")[2]
-        where = f"{self.name!r}, point {len(self.places)}"
         if tag == "ele" and self.height is not None:
-            self.places[-1][2] = _number("".join(self.height), f"{where}: ele")
+            self.places[-1][2] = _number("".join(self.height), f"{self.name!r}, point {len(self.places)}: ele")
             self.height = None
-        elif tag == self.kind and not self.ended and self.places[-1][2] is None:
-            raise InputError(f"{where}: has no height (ele); loads need heights")
+        elif tag == self.kind and not self.ended:
+            self._check_height()
         elif tag in ("trk", "rte") and self.kind:
             self.ended = True
 
@@ -196,7 +208,7 @@ def _local(name: str, places: Sequence[Sequence[float]]) -> list[list[float]]:
         rows.append([out * sin(turn), (along - first[1]) * cos(north) - away * sin(north), height])
         if (far := hypot(*rows[-1][:2])) > FARTHEST:
             raise InputError(
-                f"{name!r}, point {count}: is {far / 1e3:.0f} km from the first; a track goes no further than "
+                f"{name!r}, point {count}: is {far / 1e3:.3g} km from the first; a track goes no further than "
                 f"{FARTHEST / 1e3:.0f} km, as the Earth is round"
             )
     return rows

@@ -82,7 +82,7 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
     given
         ``file``, and what else is given of the section's keys.
     folder
-        Of the YAML file; the points are in it, or in a folder inside.
+        The folder of the YAML file; the points are in it, or in a folder below it.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
 
 
 def _deviation(value: str, unit: str = "") -> float | str:
-    """What was written as smoothing, in metres."""
+    """Return the standard deviation for smoothing in metres."""
     try:
         if unit:
             check_unit(unit, "m")

@@ -12,7 +12,7 @@ from gqm_sym.kernels import KERNELS, Kernel
 from gqm_sym.kernels.base import UNITS, kernel_formulas
 from gqm_sym.literals.units import read_unit
 
-# What is measured in what: parameters of the kernels by their arguments, and the numbers of a launch.
+# Units: of the parameters of force laws by their arguments, and of the numbers of a launch.
 KERNEL_UNITS = UNITS
 LAUNCH_UNITS = {"v0": "m/s", "t_max": "s"}
 
@@ -23,7 +23,7 @@ def expected_units(
     kernel: Kernel | None,
     given: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, str]:
-    """What the run-time parameters of a curve file are measured in: by their roles, and by the formulas they stand in.
+    """The units of the run-time parameters of a curve file, by their roles and by the formulas that contain them.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
 
 
 def launch_units(curve: Curve | None) -> dict[str, str]:
-    """What the numbers of a launch are measured in; the curve's parameter only where the kind of curve tells it."""
+    """Return the units of a launch; that of the curve's parameter only if the kind of curve determines it."""
     own = None if curve is None else parameter_dimension(curve)
     # A parametric curve's parameter may be anything; that of its waves is an angle.
     lam0 = {} if own is None else {"lam0": "rad" if own == NUMBER else "m"}

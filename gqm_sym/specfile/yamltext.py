@@ -1,4 +1,4 @@
-"""YAML text -> a tree of nodes that know their line and column.
+"""YAML text -> a tree of nodes with their line and column.
 
 Only what such a file needs of YAML 1.2 is read: mappings with text keys, sequences and scalars,
 one document a file. Scalars stay text, because ``9.81`` means 981/100 and not the double nearest to
@@ -46,7 +46,7 @@ class _Stop(Exception):
 
 
 def read_text(path: Path, mistakes: Mistakes) -> str:
-    """Read text of a file, refused where it is none.
+    """Read the text of a file, and refuse a file that is not text.
 
     Raises
     ------

@@ -139,7 +139,7 @@ class FitPlan:
         return fit(module, self.data, self.free, **self.fixed)
 
     def as_json(self, found: Fit) -> str:
-        """Return a fit as JSON: estimates, covariance, and how well they fit; null for what the data do not tell."""
+        """Return a fit as JSON: estimates, covariance and quality; null for values that the data do not determine."""
         estimates = {
             name: {"value": value, "std": _finite(found.std[name]), "unit": self.units.get(name, "")}
             for name, value in found.estimates.items()
@@ -247,7 +247,7 @@ class _FitReader(StudyReader[FitPlan]):
         return data | ({SIGMA: sigma} if sigma else {})
 
     def _free(self, file: FitFile, spec: Spec, model: Model) -> Iterator[tuple[str, Any]]:
-        """What is to be found, with guesses and limits as a fit takes them."""
+        """Return the unknowns, with guesses and limits in the form of `gqm_sym.fit`."""
         known = (*LAUNCH, *(name for name, _ in model.defaults))
         for name, entry in file.free.items():
             place = place_of(self.tree, ("free", name))
@@ -263,7 +263,7 @@ class _FitReader(StudyReader[FitPlan]):
             yield name, None if not numbers else numbers if limits else numbers[0]
 
     def _known(self, file: FitFile, spec: Spec, model: Model) -> dict[str, Any]:
-        """What is known of launch and parameters."""
+        """Return the known launch and parameters."""
         names = (*LAUNCH, *CHOICES, *(name for name, _ in model.defaults))
         for name in file.fixed:
             if self.check_known(("fixed", name), spec, names) and name in file.free:

@@ -1,4 +1,4 @@
-"""What a sweep computes: quantities, what varies and what does not, point by point."""
+"""The plan of a sweep: quantities, and varying and fixed arguments, point by point."""
 
 import hashlib
 import json

@@ -30,7 +30,7 @@ from gqm_sym.studies.schema import MOST_POINTS, SweepFile, Table, model_at
 
 SECONDS = 0.5
 
-# What a file asks for, and its schema.
+# The content of a file, and its schema.
 P = TypeVar("P")
 S = TypeVar("S", bound=BaseModel)
 
@@ -60,7 +60,7 @@ def read_sweep(path: Path | str) -> Plan:
 
 
 def read_study(path: Path | str, reader: "type[StudyReader[P]]", *, needed: str) -> P:
-    """Read a file that asks something of the motions on the curve of another file, as `read_sweep` does."""
+    """Read a file about motions along the curve of another file, as `read_sweep` does."""
     file = file_path(path, where="path")
     mistakes = Mistakes(path)
     text = read_text(file, mistakes)
@@ -79,7 +79,7 @@ def read_study(path: Path | str, reader: "type[StudyReader[P]]", *, needed: str)
 
 
 class StudyReader(ABC, Generic[P]):
-    """Goes through one file's tree; notes what is wrong and goes on with the rest."""
+    """Reads the tree of one file, and records all mistakes."""
 
     known: tuple[str, ...]
     units: dict[str, str]
@@ -261,7 +261,7 @@ class _SweepReader(StudyReader[Plan]):
     # -- what is wrong with it --------------------------------------------------------------------
 
     def _check_names(self, axes: list[Axis], fixed: dict[str, str], file: SweepFile, spec: Spec, model: Model) -> None:
-        """Note names that nothing is called by, and those that lack a value; of two values, one goes."""
+        """Record unknown names, and names without a value."""
         grid = "grid" in file.model_fields_set
         places = {axis.name: ("grid", axis.name) if grid else ("table",) for axis in axes}
         for name, path in [*places.items(), *((name, ("fixed", name)) for name in file.fixed)]:

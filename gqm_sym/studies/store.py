@@ -47,11 +47,11 @@ class Store:
 
     @staticmethod
     def folder_of(target: Path) -> Path:
-        """Where the parts of a file lie."""
+        """The folder of the parts of a file."""
         return target.with_name(f"{target.name}.parts")
 
     def length(self, number: int) -> int:
-        """How many points a part has."""
+        """The number of points of a part."""
         extent = self._plan.extent(number)
         return int(extent.stop - extent.start)
 

@@ -238,8 +238,11 @@ BAD: tuple[tuple[Callable[[], object], str], ...] = (
     (lambda: gqm.Curve.space(**WAY, roll=("flat", 3)), r"roll: must be an angle, 'coordinated' or \('coordinated'"),
     (lambda: gqm.Curve.space(**WAY, roll="sin("), "space: roll"),
     (lambda: generated.viviani.solve("3/10").exceedance("vertical", 1), "declare it by Curve.space"),
-    (lambda: generated.viviani.solve("3/10").n_lateral_max, "n_lateral: is what a rider feels"),
-    (lambda: generated.viviani.sweep("n_vertical_max", lam0=0.3), "n_vertical_max: is what a rider feels"),
+    (lambda: generated.viviani.solve("3/10").n_lateral_max, "n_lateral: the load on a rider depends on the banking"),
+    (
+        lambda: generated.viviani.sweep("n_vertical_max", lam0=0.3),
+        "n_vertical_max: the load on a rider depends on the banking",
+    ),
 )
 
 
@@ -271,7 +274,7 @@ def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., Module
     module = build("tall", tall, gqm.Gravity())
     with pytest.raises(SolutionError, match=r"roll: the tangent is vertical at u = 0\.0"):
         module.pass1([0.5, 0.0], lam0=0, v0=1)
-    with pytest.raises(InputError, match="gradient: n_vertical_max has none yet"):
+    with pytest.raises(InputError, match="gradient: there is none of n_vertical_max"):
         loop.sweep("n_vertical_max", lam0=0, v0=20, gradient="v0")
     with pytest.raises(DeclarationError, match="'y' is a coordinate"):
         gqm.Curve.space(**WAY, roll="y")

@@ -266,6 +266,13 @@ def test_no_speed_is_negative(kinds: dict[str, ModuleType]) -> None:
     assert kinds["wells"].solve(**launch).v_min.value == 0.0
 
 
+@pytest.mark.parametrize("seed", [160000162282092, 82690791284912, 35866620081299])
+def test_small_swings_across_the_seam_of_a_ring(seed: int, kinds: dict[str, ModuleType]) -> None:
+    """A chart is read at places less whole laps, whose rounding bounds have (turns lay up to 15 bounds away)."""
+    with mp.workdps(40):
+        assert soak_kinds.rims(random.Random(seed), kinds)[0] == []
+
+
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     """On slopes, springs, circles, rims and coils closed forms, sweeps and threads agree; what does not is told."""
     modules = kinds

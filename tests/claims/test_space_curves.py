@@ -336,7 +336,6 @@ REFUSED = (
     (lambda: gqm.CentralForce(centre=(0, 0, 0, 0)), "two coordinates"),
 )
 FORCES = (
-    (gqm.RotatingFrame(), "rotating_frame: a turning frame is known for planar curves only yet; leave it out"),
     (
         gqm.SurfaceTension(form="printed"),
         "surface_tension: form: the printed form's sign is known for planar curves only",
@@ -369,11 +368,11 @@ def test_corners_of_space_curves_are_refused() -> None:
 
 def test_a_contact_force_without_a_sign_is_told() -> None:
     """What asks for its sign is refused; derivatives are there."""
-    with pytest.raises(InputError, match="contact: 'above' is for curves in a vertical plane"):
+    with pytest.raises(InputError, match="contact: 'above' needs to know which side"):
         generated.viviani.solve("3/10", contact="above")
-    with pytest.raises(InputError, match="contact: 'below' is for curves in a vertical plane"):
+    with pytest.raises(InputError, match="contact: 'below' needs to know which side"):
         generated.viviani.sweep("half_period", lam0=0.3, contact="below")
-    with pytest.raises(InputError, match="contact: 'above' is for curves in a vertical plane"):
+    with pytest.raises(InputError, match="contact: 'above' needs to know which side"):
         gqm.least_speed(generated.viviani, 0.3)
     motion = generated.viviani.solve(0.3)
     step = 1e-5

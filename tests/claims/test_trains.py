@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 from naive import ulps
+from scipy.integrate import solve_ivp
 
 import generated.circle_drag
+import generated.helix_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
 
@@ -31,7 +33,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
     def module(name: str, curve: gqm.Curve, force: Any = None, cars: int = 3) -> ModuleType:
         if name not in built:
-            law = gqm.Gravity() + gqm.Train(cars=cars)
+            law = gqm.Gravity() + gqm.Train(cars=cars) if cars else gqm.Gravity()
             model = gqm.derive(curve, law if force is None else law + force)
             built[name] = gqm.build(model, name=name, folder=folder)
         return built[name]
@@ -218,7 +220,6 @@ def test_declared_in_one_piece() -> None:
     circle = gqm.families.circle()
     assert dict(gqm.derive(circle, train + gqm.Gravity()).defaults)["m"] == 1200
     for force, message in (
-        (gqm.Gravity() + gqm.CoulombFriction(), "coulomb: friction is not known of a train"),
         (gqm.Gravity() + gqm.RotatingFrame(), "rotating_frame: a turning frame"),
         (gqm.Gravity() + gqm.Potential("x**2"), "potentials other than gravity"),
         (gqm.Kernel(terms=()), "potentials other than gravity"),
@@ -241,7 +242,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
         (ParameterError, "length: must be positive", lambda: circle.solve(1, L=1, length=0)),
         (LaunchError, "is for one body", lambda: circle.solve(1, L=1, length=1, contact="above")),
         (InputError, "one body", lambda: circle.sweep("half_period", 1, L=1, length=1, contact="above")),
-        (InputError, "is no train", lambda: generated.circle_drag.solve(1, L=1).cars(0)),
+        (InputError, "is not a train", lambda: generated.circle_drag.solve(1, L=1).cars(0)),
     )
     for kind, message, call in cases:
         with pytest.raises(kind, match=message):
@@ -249,3 +250,135 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
     planes = build("train_over_corners", gqm.Curve.sampled([(0, 1), (1, 0), (3, 0)], kind="linear"))
     with pytest.raises(ParameterError, match="corners"):
         planes.solve(1, length="1/2")
+
+
+def test_what_riders_feel_in_each_car(build: Build) -> None:
+    """It is the acceleration of the places of the cars less gravity, along the rider's directions there."""
+    track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))
+    module = build("train_with_riders", track, cars=5)
+    motion = module.solve(40, 9, length=12)
+    h, time = 2e-3, 2.0
+    times = time + h * np.arange(-3, 4)
+    cars = motion.cars(times)
+    places = np.stack([cars.x, cars.y, cars.z])
+    # Differences of sixth order.
+    first = places @ np.array([-1, 9, -45, 0, 45, -9, 1]) / (60 * h)
+    felt = places @ np.array([2, -27, 270, -490, 270, -27, 2]) / (180 * h * h) + np.array([[0], [0], [9.81]])
+    ahead = first / np.linalg.norm(first, axis=0)
+    left = np.cross([0, 0, 1], ahead.T).T
+    left /= np.linalg.norm(left, axis=0)
+    above = np.cross(ahead.T, left.T).T
+    here = cars.lam[:, 3]
+    roll = [float(module.pass1(lam, 40, 9, length=12).roll) for lam in here]
+    up, side = above * np.cos(roll) + left * np.sin(roll), left * np.cos(roll) - above * np.sin(roll)
+    for load, along in (("vertical", up), ("lateral", side), ("longitudinal", ahead)):
+        told = getattr(cars, f"n_{load}")[:, 3]
+        assert told == pytest.approx((felt * along).sum(axis=0) / 9.80665, abs=2e-8), load
+    middle = motion.state(times)
+    assert cars.n_longitudinal[2] == pytest.approx(middle.n_longitudinal, abs=1e-14)
+    assert cars.n_vertical[2] == pytest.approx(middle.n_vertical, rel=1e-14)
+    assert motion.cars(time).n_lateral == pytest.approx(cars.n_lateral[:, 3], rel=1e-12)
+    assert not hasattr(build("train_on_circle", gqm.families.circle()).solve(1, length=1, L=1).cars(0), "n_vertical")
+
+
+def test_friction_on_a_helix(build: Build) -> None:
+    """All cars press alike there: the train slides as one body, to the same limit."""
+    helix = gqm.families.helix(R=2, c="-2*tan(1/2)", domain=(0, 400))
+    module = build("rubbing_train_on_helix", helix, gqm.CoulombFriction(mu="1/5"), cars=7)
+    motion = module.solve(4, length=3, t_max=60)
+    assert motion.state(58.0).v2 == pytest.approx(56.8285107057949251514199278096, rel=1e-13)
+    cars = motion.cars(1.5)
+    one = generated.helix_coulomb.solve(0, t_max=5, R=2, c="-2*tan(1/2)", mu="0.2").state(1.5)
+    assert motion.state(1.5).v == pytest.approx(one.v, rel=1e-13)
+    assert cars.normal_force == pytest.approx(np.full(7, one.normal_force / 7), rel=1e-13)
+    # Each car would run like that alone.
+    assert np.abs(cars.coupling_force).max() < 1e-12
+
+
+@pytest.mark.parametrize("in_space", [True, False])
+def test_friction_of_each_car(in_space: bool, build: Build) -> None:
+    """Each car rubs by its own contact force, as in Newton's law for all of them by DOP853; couplings add up."""
+    waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
+    curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
+    name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
+    module = build(name, curve, gqm.CoulombFriction(), cars=4)
+    length, mu, v0, launch = 8.0, 0.05, 12.0, 30.0
+    motion = module.solve(launch, v0, length=length, mu=mu)
+    shares = (np.arange(4) + 0.5) / 4 - 0.5
+
+    def pressed(s: float, w: float) -> Any:
+        """|N|/m of each car, from the formulas of the curve."""
+        u = places(s + length * shares)
+        first = np.array([20 + 0 * u, 5 * np.cos(u) * in_space, -3 * np.sin(u)])
+        second = np.array([0 * u, -5 * np.sin(u) * in_space, -3 * np.cos(u)])
+        size = np.linalg.norm(first, axis=0)
+        t = first / size
+        bend = (second - t * (t * second).sum(axis=0)) / size**2
+        return np.linalg.norm(w * bend + 9.81 * (np.array([[0], [0], [1]]) - t * t[2]), axis=0)
+
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+
+    def arc(u: Any) -> Any:
+        at = -3 + (u + 3)[..., None] * (1 + nodes) / 2
+        rate = np.sqrt(400 + 25 * np.cos(at) ** 2 * in_space + 9 * np.sin(at) ** 2)
+        return (u + 3) / 2 * (rate @ weights)
+
+    def places(s: Any) -> Any:
+        u = s / 20.0 - 3
+        for _ in range(6):
+            rate = np.sqrt(400 + 25 * np.cos(u) ** 2 * in_space + 9 * np.sin(u) ** 2)
+            u = u - (arc(u) - s) / rate
+        return u
+
+    def ends(s: float) -> Any:
+        u = places(s + length * np.array([-0.5, 0.5]))
+        return 3 * np.cos(u)
+
+    def slopes(_: float, y: Any) -> Any:
+        s, v, _ = y
+        low, high = ends(s)
+        rubbing = mu * pressed(s, v * v).mean()
+        return [v, -9.81 * (high - low) / length - np.sign(v) * rubbing, rubbing * abs(v)]
+
+    times = [0.5, 1.5, 3.0]
+    truth = solve_ivp(slopes, (0.0, 3.0), [launch, v0, 0.0], "DOP853", times, rtol=1e-12, atol=1e-12).y
+    state = motion.state(np.array(times))
+    assert state.lam == pytest.approx(truth[0], rel=1e-11)
+    assert state.v == pytest.approx(truth[1], rel=1e-11)
+    assert motion.energy(np.array(times)).lost == pytest.approx(truth[2], rel=1e-10)
+    cars = motion.cars(1.5)
+    force = pressed(truth[0][1], truth[1][1] ** 2)
+    assert np.abs(cars.normal_force) == pytest.approx(force / 4, rel=1e-10)
+    low, high = ends(truth[0][1])
+    acceleration = -9.81 * (high - low) / length - mu * force.mean()
+    # A coupling carries what the cars behind it lack: theirs is gravity over their own part of the track.
+    edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
+    lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
+    assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
+
+
+@pytest.mark.parametrize("in_space", [True, False])
+def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
+    """The shorter a train, the nearer is its motion to that of a body with friction; of a nanometre it is that one."""
+    waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
+    curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
+    name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
+    module = build(name, curve, gqm.CoulombFriction(), cars=4)
+    rail = gqm.Curve.piecewise([curve])
+    body = build(f"body_{in_space}", rail, gqm.CoulombFriction(), cars=0).solve(30, 12, mu="0.05", t_max=3).state(2.0)
+    trains = [module.solve(30, 12, mu="0.05", length=length, t_max=3).state(2.0) for length in (2.0, 1.0, 1e-9)]
+    # The cars of a train see the square of its length.
+    wide, half, short = (abs(train.lam - body.lam) for train in trains)
+    assert wide / half == pytest.approx(4.0, rel=0.05)
+    assert short < 1e-12 * body.lam
+    assert trains[2].v == pytest.approx(body.v, rel=1e-12)
+    assert trains[2].normal_force == pytest.approx(body.normal_force, rel=1e-11)
+
+
+def test_a_roll_in_another_parameter_than_arc_length_is_refused() -> None:
+    """It would have to be known by arc length; other rolls are kept."""
+    rolled = {"x": "20*cos(u)", "y": "30*sin(u)", "z": "u", "parameter": "u", "domain": (0, 6)}
+    law = gqm.Gravity() + gqm.Train(length=2)
+    with pytest.raises(DeclarationError, match="roll: u/9 is in u, and the track of a train has arc length"):
+        gqm.derive(gqm.Curve.space(**rolled, roll="u/9"), law)
+    assert gqm.derive(gqm.Curve.space(**rolled, roll=("coordinated", "v_d")), law).rider is not None

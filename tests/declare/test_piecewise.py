@@ -86,7 +86,7 @@ def test_numbers_that_cannot_be(
         (lambda: gqm.Curve.piecewise([]), "piecewise: no pieces; give one or more"),
         (
             lambda: gqm.Curve.piecewise(["line"]),
-            "piecewise: piece 1: 'line' given; give line, arc, clothoid or a curve",
+            "piecewise: piece 1: must be a line, an arc, a clothoid, a transition or a curve with formulas, got 'line'",
         ),
         (
             lambda: gqm.Curve.piecewise([gqm.Curve.graph("x**2")]),

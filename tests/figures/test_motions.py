@@ -8,7 +8,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError
-from gqm_sym.figures import motions
+from gqm_sym.figures import animations
 
 # Lengths of lines of 800 pieces, and of the way towards an equilibrium that is reached in no time.
 SHOWN = 1e-3
@@ -111,7 +111,9 @@ def test_an_unknown_figure(circle: ModuleType) -> None:
 
 def test_animation(circle: ModuleType, tmp_path: Path) -> None:
     """A GIF of as many frames as asked for."""
-    motions.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
+    animations.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
     assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF89a")
     with pytest.raises(InputError, match="duration: must be positive"):
-        motions.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)
+        animations.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)
+    with pytest.raises(InputError, match="path: must end in one of"):
+        animations.animate(circle.solve(1.0), tmp_path / "swing.foo")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import generated.viviani
 import gqm_sym as gqm
@@ -42,6 +43,32 @@ def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
     assert (tmp_path / "ride.svg").stat().st_size > 10_000
 
 
+def test_seats_and_their_animation(tmp_path: Path) -> None:
+    """Loads of three cars stand against the places of these; the frames of an animation show all cars in space."""
+    track = gqm.Curve.space(
+        x="40*cos(u)", y="60*sin(u)", z="6*cos(3*u)", parameter="u", roll=("coordinated", 14), heartline="1.1"
+    )
+    module = gqm.build(gqm.derive(track, gqm.Gravity() + gqm.Train(length=9, cars=4)), name="hilly", folder=tmp_path)
+    motion = module.solve(0, 10, t_max=3)
+    figure = gqm.figures.seats(motion, limits={"vertical": 3})
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        f"{load} load (9.80665 m/s²)" for load in ("vertical", "lateral", "longitudinal")
+    ]
+    times = gqm.figures.sampled(motion).t
+    cars = motion.cars(times)
+    for axes, load in zip(figure.axes, ("vertical", "lateral", "longitudinal"), strict=True):
+        lines = {line.get_label(): line for line in axes.lines}
+        for seat, car in (("first car", 3), ("middle car", 2), ("last car", 0)):
+            s, felt = lines[seat].get_data()
+            assert np.array_equal(s, cars.lam[car])
+            assert np.array_equal(felt, getattr(cars, f"n_{load}")[car])
+    gqm.figures.animate(motion, tmp_path / "ride.gif", duration=0.3, rate=10)
+    with Image.open(tmp_path / "ride.gif") as frames:
+        assert frames.n_frames == 3
+    with pytest.raises(InputError, match="is not a train"):
+        gqm.figures.seats(gqm.build(gqm.derive(track, gqm.Gravity()), name="hilly_body", folder=tmp_path).solve(0, 10))
+
+
 @pytest.mark.parametrize(
     ("limits", "message"),
     [
@@ -58,5 +85,5 @@ def test_bad_limits(hills: ModuleType, limits: Any, message: str) -> None:
 
 def test_no_ride_without_a_banking() -> None:
     """What riders feel is not known there."""
-    with pytest.raises(InputError, match="ride: is what a rider feels"):
+    with pytest.raises(InputError, match="ride: the load on a rider depends on the banking"):
         gqm.figures.ride(generated.viviani.solve("3/10"))

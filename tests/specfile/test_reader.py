@@ -230,7 +230,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         edited(("v0: 0", "v0: -2")),
         [
             "a.yaml:7:25: launch.v0: must not be negative, got -2; "
-            "give a speed, and direction: -1 to launch against growing parameter"
+            "give a speed, and direction: -1 to launch towards decreasing parameter"
         ],
     ),
     "no direction": (

@@ -155,7 +155,7 @@ def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
     [
         ("title: Pendulums", "titel: Pendulums", "1:1: unknown key 'titel'; did you mean title?"),
         ("curve: swing.yaml", "curve: ../swing.yaml", "2:8: curve: '../swing.yaml': must be a path from the YAML"),
-        ("curve: swing.yaml", "curve: none.yaml", "2:8: curve: 'none.yaml': there is no such file beside"),
+        ("curve: swing.yaml", "curve: none.yaml", "2:8: curve: 'none.yaml': there is no such file in this folder"),
         ("[half_period, turning", "[half_time, turning", "3:14: quantities.0: must be 'half_period', 'period'"),
         ("[half_period, turning_points]", "[]", "3:13: quantities: must have"),
         (
@@ -196,7 +196,7 @@ def test_mistakes_have_their_place(line: str, instead: str, message: str, here: 
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (None, "'a.csv': there is no such file beside the YAML file"),
+        (None, "'a.csv': there is no such file in this folder"),
         ("1,2\n3,4\n", "'a.csv', row 1: must name the columns"),
         ("lam0\n", "'a.csv', row 1: must name the columns"),
         ("lam0,lam0\n1,2\n", "'a.csv', row 1: names a column twice"),

@@ -58,7 +58,7 @@ class Algebra:
     variable
         The variable of derivatives.
     halved
-        Angles whose base is to be halved, as `Algebra.uneven` tells.
+        Angles whose base is to be halved, as returned by `Algebra.uneven`.
     """
 
     def __init__(

@@ -1,8 +1,7 @@
 """Exact derivatives of the expressions of the grammar, written so that they can be evaluated.
 
-SymPy's own ``diff`` writes the derivative of ``u**p`` as ``p*u**p/u``, which is 0/0 where ``u``
-vanishes, and brings in ``sign`` and ``Derivative``. Here every result stays inside the heads that
-the emitter knows.
+SymPy's own ``diff`` writes the derivative of ``u**p`` as ``p*u**p/u``, which is 0/0 where ``u`` vanishes, and brings in
+``sign`` and ``Derivative``. Here every result consists of functions that the emitter can write.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +10,7 @@ import sympy as sp
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import DerivationError
-from gqm_sym.sympy_charts import SpaceFunction
+from gqm_sym.sympy_charts import SpaceFunction, TrainLoad
 
 # Factors up to which the product rule is written out in one sum.
 MAX_FLAT_FACTORS = 4
@@ -91,8 +90,9 @@ def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Ex
         # The angle of a tangent: a curve that a law reads by its turning holds one.
         up, along = node.args
         return (along * visit(up) - up * visit(along)) / (along**2 + up**2)
-    if isinstance(node, SpaceFunction):
-        return node.fdiff() * visit(node.args[0])
+    if isinstance(node, SpaceFunction | TrainLoad):
+        rates = ((place, visit(argument)) for place, argument in enumerate(node.args, start=1))
+        return sp.Add(*(node.fdiff(place) * rate for place, rate in rates if rate != 0))
     outer = _OUTER.get(node.func)
     if outer is None:
         raise DerivationError(

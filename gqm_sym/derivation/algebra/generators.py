@@ -150,7 +150,7 @@ def is_integer_power(node: sp.Basic) -> bool:
 
 
 def is_real_power(node: sp.Basic) -> bool:
-    """Whether a node is a power whose exponent is no rational number."""
+    """Whether a node is a power whose exponent is not a rational number."""
     return isinstance(node, sp.Pow) and not isinstance(node.exp, sp.Rational)
 
 

@@ -60,7 +60,7 @@ class Signs:
                 self._positive.setdefault(name)
 
     def sign(self, expression: sp.Expr) -> int | None:
-        """Return 1 if the expression is nowhere negative, -1 if nowhere positive, else None."""
+        """Return 1 if the expression is nowhere negative, -1 if it is nowhere positive, and None otherwise."""
         if expression.is_number:
             return None if not expression.is_real else (1 if expression >= 0 else -1)
         if isinstance(expression, sp.Symbol):

@@ -1,1 +1,1 @@
-"""What forces do along a curve, and the speed that follows."""
+"""Forces along a curve, and the speed that follows from them."""

@@ -1,4 +1,4 @@
-"""What a force law that is not conservative does along a curve: dW/dλ = P - Q W, and what holds a body at rest.
+"""A force law that is not conservative, along a curve: dW/dλ = P - Q W, and the forces that hold a body at rest.
 
 The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
 adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
@@ -17,6 +17,8 @@ from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, Kernel, W
 SIGMA, TURN, PUSH, LOAD, TILT = (sp.Symbol(name, real=True) for name in ("σ", "dΘ/dλ", "F·t", "n₀", "dx/ds"))
 TURNS = tuple(sp.Symbol(f"(t × dt/dλ)_{axis}", real=True) for axis in "xyz")
 LOADS = tuple(sp.Symbol(f"-(t × F)_{axis}", real=True) for axis in "xyz")
+UPRIGHT = tuple(sp.Symbol(name, real=True) for name in ("n₀·u", "κ·u"))
+CORIOLIS = tuple(sp.Symbol(f"2 Ω (t × (ẑ × t))_{axis}", real=True) for axis in "xyz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,9 +37,10 @@ class Dissipation:
         A of a body at rest that is about to move forwards and backwards, under static friction, in the pieces.
     contact
         The contact force per unit mass in the pieces: what of it is there at rest, and what W is multiplied by. Of a
-        curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it.
+        curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it; but on
+        a banked one both are what it has along the upward direction of riders.
     friction, kinked, linear
-        Whether it depends on the contact force, has a kink where κ changes sign, and is linear in W.
+        Whether the law depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
 
     pieces: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -45,7 +48,7 @@ class Dissipation:
     decay: sp.Expr
     acceleration: sp.Expr
     holds: tuple[sp.Expr, sp.Expr]
-    contact: tuple[sp.Expr, sp.Expr]
+    contact: tuple[sp.Expr, ...]
     friction: bool
     kinked: bool
     linear: bool
@@ -56,7 +59,11 @@ class Dissipation:
 
 
 def dissipation(
-    kernel: Kernel, pieces: dict[sp.Symbol, sp.Expr], coordinates: dict[sp.Symbol, sp.Expr], signs: Signs
+    kernel: Kernel,
+    pieces: dict[sp.Symbol, sp.Expr],
+    coordinates: dict[sp.Symbol, sp.Expr],
+    signs: Signs,
+    cars_load: sp.Expr | None = None,
 ) -> Dissipation:
     """Put a curve into a force law that is not conservative.
 
@@ -65,11 +72,14 @@ def dissipation(
     kernel
         The force law.
     pieces
-        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT, and on a curve in no vertical plane TURNS and LOADS.
+        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT, and on a curve in no vertical plane TURNS and
+        LOADS, CORIOLIS in a frame that turns, and UPRIGHT where its riders have an upward direction.
     coordinates
         What the coordinates are along the curve, where a law of the user's own names them.
     signs
-        Of expressions on the curve.
+        The signs of expressions on the curve.
+    cars_load
+        The mean of |N|/m over the cars of a train, in λ and W; None for one body.
     """
     v, nu = DIRECTION, CONTACT_SIGN
     # The curvature of a curve in no vertical plane has no sign.
@@ -77,20 +87,27 @@ def dissipation(
     extra = kernel.tangential_law.xreplace(coordinates)
     sliding, other, contact = v * nu * kernel.friction, extra, (LOAD, KAPPA)
     rubbing = sp.S.Zero
-    if kernel.friction and TURNS[0] in pieces:
+    if kernel.friction and cars_load is not None:
+        contact, rubbing, sliding = (cars_load, sp.S.Zero), v * kernel.friction * SIGMA * cars_load, sp.S.Zero
+    elif kernel.friction and TURNS[0] in pieces:
         # σ |N|/m, in which nothing is infinite at a cusp.
-        force = sp.sqrt(sp.Add(*((turn * W + SIGMA * load) ** 2 for turn, load in zip(TURNS, LOADS, strict=True))))
+        vectors = zip(TURNS, LOADS, CORIOLIS if kernel.spin else (0, 0, 0), strict=True)
+        parts = (turn * W + SIGMA * (load + v * sp.sqrt(W) * aside) for turn, load, aside in vectors)
+        force = sp.sqrt(sp.Add(*(part**2 for part in parts)))
         contact, rubbing, sliding = (force / SIGMA, sp.S.Zero), v * kernel.friction * force, sp.S.Zero
-    if kernel.spin:
+    elif kernel.spin:
         # The contact force has a part out of the plane: friction is not linear in W.
         sideways = 2 * kernel.spin * TILT
         other -= v * kernel.friction * sp.sqrt((LOAD + KAPPA * W) ** 2 + sideways**2 * W)
         sliding = sp.S.Zero
+    if UPRIGHT[0] in pieces:
+        contact = UPRIGHT
     slope = differentiate(other, W)
     linear = W not in sp.expand(slope).free_symbols and not rubbing
     if linear:
         slope = sp.expand(slope)
     rest = sp.expand(other - slope * W) if linear else other - slope * W
+    load = sp.Abs(LOAD) if cars_load is None else cars_load.xreplace({W: sp.S.Zero})
     resisting, rubbing_slope = v * resistance.xreplace({KAPPA: TURN}), differentiate(rubbing, W)
     return Dissipation(
         pieces=tuple(pieces.items()),
@@ -100,7 +117,7 @@ def dissipation(
             PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other - rubbing / SIGMA
         )
         / kernel.inertia,
-        holds=(_held(kernel, resistance, extra, 1), _held(kernel, resistance, extra, -1)),
+        holds=(_held(kernel, resistance, extra, load, 1), _held(kernel, resistance, extra, load, -1)),
         contact=contact,
         friction=bool(kernel.friction),
         kinked=bool(resistance.atoms(sp.Abs)),
@@ -108,8 +125,8 @@ def dissipation(
     )
 
 
-def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, way: int) -> sp.Expr:
-    against = resistance + kernel.static_friction * sp.Abs(LOAD)
+def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, way: int) -> sp.Expr:
+    against = resistance + kernel.static_friction * load
     return (PUSH - way * against + extra.xreplace({DIRECTION: sp.Integer(way), W: sp.S.Zero})) / kernel.inertia
 
 

@@ -1,5 +1,6 @@
-"""What a force law becomes along a curve: potential, static normal load and tangential acceleration."""
+"""A force law along a curve: potential, static normal load and tangential acceleration."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -9,8 +10,8 @@ from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
 from gqm_sym.errors import DeclarationError
-from gqm_sym.kernels.base import Kernel, X, Y, Z
-from gqm_sym.sympy_charts import MEAN_HEIGHT
+from gqm_sym.kernels.base import DIRECTION, Kernel, W, X, Y, Z
+from gqm_sym.sympy_charts import MEAN_HEIGHT, train_load, train_load_in_plane
 
 Place = tuple[sp.Expr, sp.Expr, sp.Expr]
 
@@ -35,6 +36,8 @@ class Forces:
         σ n₀, in which no absolute values are left.
     loads
         Of a curve in no vertical plane: the components of t × (-F), so that t × N/m = W t × dt/ds - t × F.
+    coriolis
+        Of such a curve in a frame that turns: the components of what ds/dt adds to t × N/m, for each unit of it.
     """
 
     potential: sp.Expr
@@ -44,6 +47,7 @@ class Forces:
     static_normal_load: sp.Expr
     pressure: sp.Expr
     loads: tuple[sp.Expr, ...] = ()
+    coriolis: tuple[sp.Expr, ...] = ()
 
 
 def pulls(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
@@ -54,8 +58,25 @@ def pulls(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
     return tuple(form.xreplace(dict(zip(axes, place, strict=True))) for form in written)
 
 
+def turned_force(
+    bend: Sequence[sp.Expr],
+    loads: Sequence[sp.Expr],
+    coriolis: Sequence[sp.Expr],
+    w: sp.Expr,
+    direction: sp.Expr = DIRECTION,
+) -> tuple[sp.Expr, ...]:
+    """The vector t × N/m at V² = w, which has the length of N/m; ``direction`` is the sign of ds/dt."""
+    fixed = (turn * w + load for turn, load in zip(bend, loads, strict=True))
+    return tuple(
+        part + direction * sp.sqrt(w) * aside for part, aside in zip(fixed, coriolis or (0, 0, 0), strict=True)
+    )
+
+
 def is_planar(heading: Heading, place: Place, kernel: Kernel) -> bool:
-    """Whether it is proved that no force acts across a vertical plane, so that the contact force lies in it."""
+    """Whether it is proved that no force acts across a vertical plane, so that the contact force lies in it.
+
+    The Coriolis force does: `Forces` leaves it out of a planar curve's contact force, but not out of a vector.
+    """
     cosine, sine = heading
     pull_x, pull_y, *_ = pulls(place, kernel)
     return bool(sp.expand(without_waves(cosine * pull_y - sine * pull_x)) == 0)
@@ -103,7 +124,21 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
         static_normal_load=load * sp.Abs(shape.per_length),
         pressure=load * sp.Abs(shape.size),
         loads=tuple(absorb_bars(part * shape.per_length) for part in crossed),
+        coriolis=_coriolis(kernel.spin, shape) if kernel.spin else (),
     )
+
+
+def _coriolis(spin: sp.Expr, shape: Geometry) -> Place:
+    """The components of 2 Ω t × (ẑ × t)."""
+    across, along, up = shape.tangent
+    return -2 * spin * up * across, -2 * spin * up * along, 2 * spin * (across**2 + along**2)
+
+
+def load_of_cars(kernel: Kernel, lam: sp.Symbol, *, in_space: bool) -> sp.Expr:
+    """The mean of |N|/m over the cars of a train, which friction is proportional to."""
+    pull = differentiate(kernel.potential, Z)
+    head = train_load if in_space else train_load_in_plane
+    return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), pull)
 
 
 def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:

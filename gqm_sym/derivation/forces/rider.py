@@ -1,4 +1,4 @@
-"""What a rider on a banked track feels, in closed form.
+"""The loads on a rider of a banked track, in closed form.
 
 With t × N/m = T the contact force has the component T·(t × u) along any unit vector u across the track. Riders sit
 upright along u = u₀ cos ψ + l₀ sin ψ, where l₀ is horizontal and points to the left, u₀ = t × l₀, and ψ is the roll
@@ -12,7 +12,7 @@ import sympy as sp
 
 from gqm_sym.declare.banking import Banking
 from gqm_sym.derivation.algebra.differentiate import differentiate
-from gqm_sym.derivation.forces.forces import Forces, Place
+from gqm_sym.derivation.forces.forces import Forces, Place, turned_force
 from gqm_sym.derivation.geometry.geometry import Geometry, cross
 from gqm_sym.kernels.base import DIRECTION, W
 
@@ -67,7 +67,7 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     Parameters
     ----------
     banking
-        How the track is banked.
+        The banking of the track.
     shape, law
         The curve and the applied forces along it.
     acceleration
@@ -93,6 +93,19 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     )
 
 
+def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, sp.Expr] | None:
+    """Curvature and static load along the rider's upward direction, so that N/m has the component κ W + n₀ along it.
+
+    None in a vertical plane, where N has a sign of its own; where that direction depends on the motion; and in a frame
+    that turns.
+    """
+    if shape.heading is not None or law.coriolis or (banking.angle is None and banking.speed is None):
+        return None
+    upright = _in_space(banking, shape, law).vertical
+    load = upright.xreplace({W: sp.S.Zero})
+    return differentiate(upright, W), load
+
+
 def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     """In a vertical plane, whose normal carries the contact force: that alone has no lateral part."""
     assert shape.heading is not None
@@ -111,7 +124,7 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     across, along, _ = way
     turned = _turned(shape, law, W)
     if banking.angle is None:
-        loaded = turned if banking.speed is None else _turned(shape, law, banking.speed**2)
+        loaded = turned if banking.speed is None else _turned(shape, law, banking.speed**2, forwards=sp.S.One)
         size = sp.sqrt(sp.Add(*(part**2 for part in loaded)))
         up_x, up_y, up_z = (part / size for part in cross(loaded, way))
         roll = (loaded[0] * along - loaded[1] * across, loaded[2])
@@ -135,9 +148,9 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     )
 
 
-def _turned(shape: Geometry, law: Forces, w: sp.Expr) -> Place:
-    """The vector t × N/m at V² = w."""
-    along_x, along_y, along_z = (bend * w + load for bend, load in zip(shape.bend, law.loads, strict=True))
+def _turned(shape: Geometry, law: Forces, w: sp.Expr, forwards: sp.Expr = DIRECTION) -> Place:
+    """The vector t × N/m at V² = w, of a motion forwards (1) or backwards (-1)."""
+    along_x, along_y, along_z = turned_force(shape.bend, law.loads, law.coriolis, w, forwards)
     return along_x, along_y, along_z
 
 

@@ -54,12 +54,12 @@ class SpeedField:
 
     @property
     def held(self) -> sp.Expr:
-        """W as other forms hold it: itself if closed, else its symbol."""
+        """Return W for use in other forms: W itself if it is closed, otherwise its symbol."""
         return self.squared if self.form == CLOSED else W
 
     @property
     def note(self) -> str:
-        """What kind of form it is, and what the signs in it are."""
+        """The kind of the form, and the meaning of the signs in it."""
         meanings = {DIRECTION: "the sign of ds/dt", CONTACT_SIGN: "the sign of N"}
         found = [f"{s.name} is {text}" for s, text in meanings.items() if s in self.squared.free_symbols]
         jumps = ["atan2 is continued without its jumps by 2*pi"] if self.squared.has(sp.atan2) else []

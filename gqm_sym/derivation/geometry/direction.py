@@ -46,7 +46,7 @@ class Direction:
     below: Polynomial
 
     def scale(self, root: "Root") -> list[Power]:
-        """What stands before the parts over the weight of the root."""
+        """The factor of the parts, over the weight of the root."""
         one = self.algebra.one
         return spell_product(self.algebra, self.common, self.below if root.weight == one else one)
 

@@ -309,7 +309,7 @@ def _turning_rate(way: Direction, root: Root, pair: tuple[int, int]) -> list[Pow
     reduced = spell_quotient(algebra, rate.top, rate.bottom)
     if root.square is None or rate.bottom.is_ground or not rate.top:
         return reduced
-    # Over the very piece that stands in σ, so that both powers become one.
+    # Divided by the same factor that is in σ, so that both powers become one.
     weight = algebra.times(root.weight, root.weight)
     part = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, weight)))
     shared = [*spell_quotient(algebra, part.top, part.bottom), (root.square, -1)]

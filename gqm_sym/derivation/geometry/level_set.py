@@ -41,11 +41,11 @@ class LevelSet:
 
     @property
     def rows(self) -> tuple[sp.Expr, ...]:
-        """What the runtime traces the curve by: F, F_x, F_z, F_xx, F_xz and F_zz."""
+        """The functions by which the runtime traces the curve: F, F_x, F_z, F_xx, F_xz and F_zz."""
         return (self.value, self.slope_x, self.slope_z, self.bend_xx, self.bend_xz, self.bend_zz)
 
     def closed_forms(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The forms for people."""
+        """The forms as they are printed."""
         return (
             ("F", self.value),
             ("dF/dx", self.slope_x),
@@ -57,7 +57,7 @@ class LevelSet:
 
     @property
     def note(self) -> str:
-        """How the rows of the chart follow from them."""
+        """The rows of the chart that follow from them."""
         x, z = self.level.start
         sign = "" if self.level.tangent > 0 else "-"
         return (

@@ -1,1 +1,1 @@
-"""What symmetry says of a potential well."""
+"""Consequences of the symmetry of a potential well."""

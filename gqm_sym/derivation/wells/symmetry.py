@@ -13,7 +13,7 @@ _WAVES = (sp.sin, sp.cos)
 
 @dataclass(frozen=True, slots=True)
 class Symmetry:
-    """Where an effective potential and σ are even functions of the distance.
+    """Places about which an effective potential and σ are even functions of the distance.
 
     Attributes
     ----------

@@ -40,8 +40,8 @@ def multiply(table: Any) -> Any:
         )
         held = global_constant(builder, "table", numbers)
         held.align = 8 * LANES
-        # LLVM would take the entries of a table that it knows for single constants: it would load each from an address
-        # of its own, and keep all of them on the stack during a loop. An empty piece of assembly hides the table.
+        # LLVM would turn the entries of a constant table into single constants: it would load each from an address of
+        # its own, and keep all of them on the stack during a loop. An empty piece of assembly hides the table.
         opaque = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
         entries = builder.asm(opaque, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
         totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]

@@ -158,9 +158,10 @@ class Chart:
         return signs
 
     def rounded(self) -> Array:
-        """Return copies of the block, in each of which one row of one chart is changed.
+        """Return copies of the block, in each of which one row of one chart is changed, or its places.
 
-        The change is `MAGNIFIED` times what rounding may make of the row.
+        The change is `MAGNIFIED` times what rounding may make of it. On a closed chart whole laps are subtracted from
+        places.
         """
         blocks, begin = [], 0
         while begin < self.block.size:
@@ -174,10 +175,10 @@ class Chart:
                 slopes = sizes[:, :2].max(axis=1) * records[:, 1]
                 sizes[:, 2] += slopes
                 sizes[:, 3] += slopes * records[:, 1]
-            for row in range(ROWS):
+            changes = [(6 + row * TERMS, ROW_ROUNDINGS * sizes[:, row]) for row in range(ROWS)]
+            for column, change in (*changes, (0, self.period)) if self.period else changes:
                 block = self.block.copy()
-                constants = block[first + 6 + row * TERMS : first + count * RECORD : RECORD]
-                constants += MAGNIFIED * ROW_ROUNDINGS * ULP * sizes[:, row]
+                block[first + column : first + count * RECORD : RECORD] += MAGNIFIED * ULP * change
                 blocks.append(block)
             begin += int(self.block[begin])
         return np.array(blocks)
@@ -256,7 +257,7 @@ class SpaceChart(Chart):
 
 
 class PieceData(NamedTuple):
-    """What the pieces of a chart are made from.
+    """The data from which the pieces of a chart are made.
 
     Attributes
     ----------
@@ -415,7 +416,7 @@ def _block(
 
 
 def tangents_of(angles: Array) -> tuple[Array, Array]:
-    """Return cosines and sines, exactly 0 where an angle is a multiple of pi/2 but for its rounding."""
+    """Return cosines and sines, exactly 0 where an angle is a multiple of pi/2 up to rounding."""
     waves = np.cos(angles), np.sin(angles)
     cosines, sines = (np.where(np.abs(wave) <= ULP * np.abs(angles), 0.0, wave) for wave in waves)
     return cosines, sines

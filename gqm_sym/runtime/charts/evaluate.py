@@ -114,8 +114,8 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
 def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
     """Fill a register's numbers of ``out``, from ``to`` on, with a row of the chart at the places from ``at`` on.
 
-    Lanes before ``first`` keep what they have. The powers of u stand at ``terms``; ``numbers`` are the length of all
-    laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
+    Lanes before ``first`` keep what they have. The powers of u are stored at ``terms``; ``numbers`` are the length of
+    all laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -223,6 +223,15 @@ def chart_alpha(chart, s):  # type: ignore[no-untyped-def]
 def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
     """Signed curvature."""
     return chart_row(chart, 3, s)
+
+
+@Inner
+def derivatives_at(chart, k, u, laps):  # type: ignore[no-untyped-def]
+    """Return alpha, kappa and x at a place that `find` has found: in space the derivatives of a coordinate."""
+    start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
+    first = laps * chart[5] + polynomial(_powers(chart, start, 2), u)
+    high, low = _constant(chart, start, 0, laps)
+    return first, polynomial(_powers(chart, start, 3), u), high + (low + polynomial(_powers(chart, start, 0), u))
 
 
 @Inner

@@ -3,7 +3,7 @@
 It is solved at Chebyshev nodes: the tangents there are integrated, and evaluated again at the places that this gives,
 until nothing changes. The tangents have unit length to rounding, so arc length is preserved, and rounding of F enters
 only the direction. Along the exact solution F is constant. The mean of its values at the nodes, in which rounding
-averages out, tells how far the piece lies beside F = 0, and the piece is moved by as much along the gradient.
+averages out, is the distance of the piece from F = 0, and the piece is moved by that along the gradient.
 """
 
 from math import fabs, inf, isfinite, sqrt

@@ -40,7 +40,8 @@ MAX_ITERATIONS = 10
 MAX_FIT_ERROR = 8.0 * 2.0**-52
 MIN_POINTS = 64
 
-# A turn between stitched planes that is smaller than this, relative to the rounding of the points, is no corner.
+# A turn between two lines that is smaller than this, relative to the rounding of the points, does not count as a
+# corner.
 MIN_TURN = 8.0 * 2.0**-52
 
 

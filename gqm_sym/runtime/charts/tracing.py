@@ -56,7 +56,7 @@ def _rows_at(field, p, sign, at):  # type: ignore[no-untyped-def]
 
 
 class Side(NamedTuple):
-    """Pieces on one side of the start, in the order and the direction of growing arc length.
+    """Pieces on one side of the start, in the order and the direction of increasing arc length.
 
     Attributes
     ----------
@@ -321,7 +321,7 @@ def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-de
             for row, rate in ((0, dz), (1, -dx)):
                 high, low = product(step, rate)
                 out[row, i], out[2 + row, i] = add(out[row, i], out[2 + row, i], high, low + step_low * rate)
-            # The step was exact but for this share of it.
+            # The step was exact except for this share of it.
             doubt = work[value + ERROR + i] + 1e-14 * fabs(work[value + i])
             error = max(error, doubt / fabs(slope) * sqrt(dx * dx + dz * dz))
     return error

@@ -1,1 +1,1 @@
-"""How functions are compiled, called by address, buffered and spread over threads."""
+"""Compilation of functions, calls by address, buffers and threads."""

@@ -20,7 +20,7 @@ from gqm_sym.runtime.compiled.uncompiled import in_python
 
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    """Lower the call of what stands at an address: arrays by the address of their data, numbers as they are."""
+    """Lower the call of a function at an address: arrays are passed by the address of their data, numbers by value."""
     values = []
     for kind, value in zip(signature.args[1:], args[1:], strict=True):
         if isinstance(kind, types.Array):

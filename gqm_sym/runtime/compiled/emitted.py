@@ -35,22 +35,22 @@ def _c_function(signature: Any) -> Any:
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 
-# Where the addresses of all functions stand. None of it is freed, so that an address always means one function: what is
-# computed with it may be kept under it.
+# The memory cells with the addresses of all functions. None of it is freed, so that an address always means one
+# function: what is computed with it may be kept under it.
 _SLOTS: list[ctypes.c_void_p] = []
 
-# The functions that may be called by address, by where their addresses stand.
+# The functions that may be called by address, by the cells of their addresses.
 _AT: WeakValueDictionary[int, "Emitted"] = WeakValueDictionary()
 
 
 def run_at(address: int, *arguments: Any) -> None:
-    """Run the function whose address stands at an address, for functions that run as plain Python."""
+    """Run the function whose address is in a memory cell, for functions that run as plain Python."""
     go_on()
     _AT[address].run(*(value.ctypes.data if isinstance(value, np.ndarray) else value for value in arguments))
 
 
 class Emitted:
-    """A function of a generated module, which compiled code calls by the address that stands at its ``address``.
+    """A function of a generated module, which compiled code calls by the address in the cell ``address``.
 
     Python runs it at first, unless its compiled code is in the cache; it is compiled when that has taken some time. The
     results are the same to the last bit (`uncompiled`).
@@ -79,7 +79,7 @@ class Emitted:
 
     @property
     def address(self) -> int:
-        """Where the address of the code stands, of which there is some from now on."""
+        """Return the cell with the address of the code, which exists from now on."""
         self._begin()
         return ctypes.addressof(self._slot)
 
@@ -175,7 +175,7 @@ def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Em
 
     numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
     it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
-    that is made from the function's own text. What else changes in the module compiles nothing anew.
+    that is made from the function's own text. Other changes of the module cause no compilation.
 
     Parameters
     ----------

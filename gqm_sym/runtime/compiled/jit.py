@@ -23,7 +23,7 @@ COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
 STAMPS = Stamps()
 
-# The digest of the whole runtime, by which processes and stored parts of studies know that they belong together.
+# The digest of the whole runtime, by which processes and stored parts of studies recognise that they belong together.
 STAMP = STAMPS.of_all
 
 

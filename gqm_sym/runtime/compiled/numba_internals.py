@@ -142,7 +142,7 @@ class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
     def _finalize_specific(self) -> None:
-        """Make the machine code, and tell it where the environments are of what it was linked with."""
+        """Make the machine code, and set the addresses of the environments of the code that it is linked with."""
         super()._finalize_specific()
         for variable in self._final_module.global_variables if HAS_ENVIRONMENTS else ():
             found = None if variable.is_declaration else lookup_environment(variable.name)
@@ -151,7 +151,7 @@ class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _NoEnvironments:
-    """Stands for a generator of code where there is no code that could read an environment."""
+    """Takes the place of a code generator if no code could read an environment."""
 
     def set_env(self, name: str, environment: Any) -> None:
         """Do nothing."""
@@ -231,9 +231,9 @@ class LinkedPipeline(CallbackPipeline):
 class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
     """Files of one function's compiled code: one for each key, which is named by the key and holds it.
 
-    numba's own scheme numbers the files in an index that is written before the code. Processes that compile versions
-    of a function at the same time may give both the same number, and a process that is killed in between leaves the
-    number of an older file behind: the next process would then run code that it did not ask for.
+    numba's own scheme numbers the files in an index that is written before the code. Processes that compile versions of
+    a function at the same time may give both the same number, and a process that is killed in between leaves the number
+    of an older file behind: the next process would then run the wrong code.
     """
 
     def __init__(self, folder: str, base: str, source_stamp: Any) -> None:
@@ -272,12 +272,12 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
     """numba's disk cache, read before numba prepares to compile, and aware of changes anywhere in the runtime.
 
     The preparation imports and registers everything that compiling may need (SciPy's linear algebra as well) and takes
-    0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own
-    file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the files
-    that it may come from (`stamps`), and the name of the function's module. For a function of a generated module that
-    name is made from its text (`jit.compiler`), which alone tells it apart: where all machine code is in one folder
-    (``NUMBA_CACHE_DIR``), modules with the same function share it. A file that cannot be read is compiled again, and a
-    file that cannot be written is left out.
+    0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own file only, but
+    compiled code contains functions of several files: the key holds ``stamp``, the digest of the files that it may come
+    from (`stamps`), and the name of the function's module. For a function of a generated module that name is made from
+    its text (`jit.compiler`), which alone identifies it: where all machine code is in one folder (``NUMBA_CACHE_DIR``),
+    modules with the same function share it. A file that cannot be read is compiled again, and a file that cannot be
+    written is left out.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def _steps(pipeline: type[Any]) -> dict[str, Any]:
 
 
 class Compiler:
-    """How functions are compiled and cached; `jit` holds the only one.
+    """The way in which functions are compiled and cached; `jit` has the only one.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""What compiled code was made from: the files of the runtime that it may contain code of.
+"""The sources of compiled code: the files of the runtime whose code it may contain.
 
-A compiled function contains code of the functions that it calls, and these stand in its own file or in files that it
-imports, directly or through others. So an edit of one file compiles what imports it anew, and nothing else.
+A compiled function contains code of the functions that it calls, which are in its own file or in files that it imports,
+directly or through others. So an edit of one file compiles what imports it anew, and nothing else.
 """
 
 import hashlib

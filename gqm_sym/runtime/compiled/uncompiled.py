@@ -5,7 +5,7 @@ Compiling an entry point takes seconds, and Python runs it in milliseconds. So f
 what is not in the cache of compiled code (`emitted.Emitted`, `jit.entry`).
 
 Python's numbers are NumPy's here, which divide by zero as compiled code does, and elementary functions are those of the
-C library that compiled code calls. What cannot be run so is left to the compiler.
+C library that compiled code calls. Functions that cannot be run so are left to the compiler.
 """
 
 import ast
@@ -86,7 +86,7 @@ def begin_launch() -> None:
 
 
 class Trial:
-    """How much Python has run of a function, by which it is decided when to compile it.
+    """The work that Python has done for a function, which decides when it is compiled.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Trial:
         The time after which it is worth compiling.
     record : Path, optional
         A file that gets one byte for each launch, so that a script which is run again and again has its functions
-        compiled too. It stands beside the compiled code and may be missing.
+        compiled too. It is stored beside the compiled code and may be missing.
     """
 
     def __init__(self, seconds: float, record: Path = Path(os.devnull)) -> None:
@@ -109,7 +109,7 @@ class Trial:
         return self.left <= 0.0 or self._launches > MAX_LAUNCHES
 
     def _recorded(self) -> int:
-        """How many launches the record had, to which one more is added."""
+        """The number of launches in the record before this one."""
         with suppress(OSError), self._record.open("ab") as file:
             return file.write(b".") and file.tell() - 1
         return 0
@@ -139,7 +139,7 @@ def paused() -> Iterator[None]:
 def sharing_arrays() -> Iterator[None]:
     """Let no entry point run as plain Python in this thread, for others write into parts of the same arrays.
 
-    What plain Python has written before it gives up is taken back, and what others have written would be as well.
+    If plain Python gives up, its writes are undone, and so would be those of other threads.
     """
     before, _SHARING.on = _SHARING.on, True
     try:
@@ -294,7 +294,7 @@ def _plain_inner(inner: Any) -> Callable[..., Any]:
 
 
 def _plain_value(value: Any) -> Any:
-    """What compiled code means by a global value."""
+    """Return the meaning of a global value in compiled code."""
     if value is None or isinstance(value, bool | int | str | np.ndarray):
         return value
     if isinstance(value, float):
@@ -324,7 +324,7 @@ def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., An
     given = vars(builtins) | given
     names = {name: _plain_value(given[name]) for name in code.co_names if name in given}
     numbers = tuple(_plain_value(number) if type(number) in (float, tuple) else number for number in code.co_consts)
-    names["__builtins__"] = builtins  # what NumPy is asked for may import
+    names["__builtins__"] = builtins  # attributes of NumPy may cause imports
     return FunctionType(code.replace(co_consts=numbers), names)
 
 

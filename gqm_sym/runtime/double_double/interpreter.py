@@ -170,7 +170,7 @@ INTERPRETER = Emitted(
 
 @intrinsic
 def call_interpreter(_, address, operations, first, last, work, n):  # type: ignore[no-untyped-def]
-    """Call `evaluate`, whose address stands at an address."""
+    """Call `evaluate` by the address in a memory cell."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         address, operations, first, last, work, n = args

@@ -57,7 +57,7 @@ NO_TIMES = np.empty((3, 0))
 
 
 class Integrand(NamedTuple):
-    """What the time per share of an interval depends on.
+    """The inputs of the time per share of an interval.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Integrand(NamedTuple):
     level : (high, low, error)
         U + V**2/2, which is constant.
     start, width : (high, low)
-        Where the interval begins, and how much the curve's parameter grows over it.
+        The start of the interval, and the increase of the curve's parameter over it.
     """
 
     tape: Any
@@ -354,7 +354,7 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
     launch : (lam0, lam0_low, v0, v0_low)
         Launch place and speed in m/s as two doubles each.
     offsets : (float, float)
-        How far the lower and the upper turning point are from the launch, approximately.
+        Approximate distances of the lower and the upper turning point from the launch.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     nodes : (4, n) array
@@ -397,7 +397,7 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
 
 
 class Orbit(NamedTuple):
-    """What is known of an orbit in double-double arithmetic.
+    """The properties of an orbit in double-double arithmetic.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is integrated over a panel of phase angles, in double-double arithmetic: time and arc length, with a bound."""
+"""The integrands over a panel of phase angles, in double-double arithmetic: time and arc length, with a bound."""
 
 from math import fabs
 from typing import Any

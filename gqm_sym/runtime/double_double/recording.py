@@ -41,7 +41,7 @@ class Tape(NamedTuple):
         What `interpreter.evaluate` carries out: first what does not depend on the place, then what the effective
         potential and ds/dlam need, then what only the potential's slope needs.
     parts : tuple of int
-        Where these three parts end.
+        The ends of these three parts.
     registers : tuple of int
         Where in the work space the registers begin of: the first run-time parameter, the place, the effective
         potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative where there is none). For a
@@ -74,7 +74,7 @@ class BoundTape(NamedTuple):
 
     @property
     def operands(self) -> tuple[Any, ...]:
-        """What compiled code takes: the tape with the interpreter's address, the work space, the parameters."""
+        """Return the arguments of compiled code: interpreter and tape, the work space, the parameters."""
         return (interpreter.INTERPRETER.address, *self.tape), self.work, self.parameters
 
 

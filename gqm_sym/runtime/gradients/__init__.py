@@ -1,1 +1,1 @@
-"""How the answers of a periodic motion change with its launch and parameters, in double-double arithmetic."""
+"""Derivatives of a periodic motion with respect to launch and parameters, in double-double arithmetic."""

@@ -37,7 +37,7 @@ def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> lis
 
 
 def _times(a: TapeNumber, b: TapeNumber) -> TapeNumber:
-    """Return the product, of which a factor 1 is no operation."""
+    """Return the product, where a factor of 1 is not an operation."""
     if a.known == 1:
         return b
     return a if b.known == 1 else a * b

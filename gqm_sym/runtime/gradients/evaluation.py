@@ -31,7 +31,7 @@ MAX_ROUNDING = 1e-17
 # The change of an integral over a panel when it is halved, as a share of that of the absolute values.
 MAX_PANEL_CHANGE = 1e-20
 
-# What is told instead of the number of nodes: digits were lost, or the nodes are too few whatever the digits.
+# The codes in place of the number of nodes: digits were lost, or the nodes are too few with any number of digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
 
 # What there is of each mean: the high and the low double, a bound on the error, and the mean of the absolute values.
@@ -99,7 +99,7 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
         for j in range(found.shape[0]):
             size = sums[j, 3] / n
             high, low = sums[j, 0] / n, sums[j, 1] / n
-            if not size <= sums[j, 2] / n:  # else it is zero as far as rounding can tell
+            if not size <= sums[j, 2] / n:  # otherwise it is zero within rounding
                 step = fabs(add(high, low, -found[j, 0], -found[j, 1])[0]) / size
                 change = step if not step <= change else change
                 rounding = max(rounding, sums[j, 2] / (n * size))
@@ -113,7 +113,7 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
 
 @entry(INTEGER(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX), checked=False)
 def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results of a program over its range, and return with how many nodes, or why there are none.
+    """Fill the means of all results of a program over its range, and return the number of nodes or a code of failure.
 
     Parameters
     ----------

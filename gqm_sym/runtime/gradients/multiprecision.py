@@ -180,7 +180,7 @@ class MultiprecisionOrbit:
 
     @property
     def _zero(self) -> float:
-        """What is below this is rounding."""
+        """Smaller values are rounding."""
         return float(10.0 ** (-ZERO_DIGITS * self._context.dps))
 
     def _share_of_change(self, means: list[Any], last: list[Any], sizes: Array) -> float:

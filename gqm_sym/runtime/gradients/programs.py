@@ -1,4 +1,4 @@
-"""What gradients evaluate: formulas of a motion with their derivatives, recorded as tapes.
+"""The programs of gradients: formulas of a motion with their derivatives, recorded as tapes.
 
 ``half`` below is half of V**2, as a function of a place, the run-time parameters, the launch place lam0, its speed v0,
 and a change of the energy, which is zero: ``half = v0**2/2 + energy + U(lam0) - U(lam)``. The variables are what
@@ -8,7 +8,6 @@ derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in t
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from itertools import combinations_with_replacement
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -37,11 +36,11 @@ class Program(NamedTuple):
     operations : (m, 4) array of int
         What the interpreter carries out: first what does not depend on the place.
     first : int
-        How many operations do not depend on the place.
+        The number of operations that do not depend on the place.
     inputs : int
         The number of inputs, whose registers come first; those of the place's coordinates follow them.
     outputs : array of int
-        Where in the work space the registers of the results begin.
+        The start of the registers of the results in the work space.
     work : array
         The registers, of which those of constants are filled.
     constants : tuple
@@ -57,7 +56,7 @@ class Program(NamedTuple):
 
     @property
     def operands(self) -> tuple[Any, ...]:
-        """What compiled code takes, the address of the interpreter first."""
+        """The arguments of compiled code, beginning with the address of the interpreter."""
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
@@ -211,7 +210,7 @@ def turning_point_program(source: AnySource) -> Program:
 
 @lru_cache(maxsize=64)
 def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
-    """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
+    """Return the integrand over the phase angle of a libration, with its derivatives at the same phase angle.
 
     The place is the square of the sine of half the phase angle. The inputs behind those of the source are both turning
     points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi
@@ -239,64 +238,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     return assemble(op, [*rates, *powers, *ds_partials])
 
 
-@lru_cache(maxsize=16)
-def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """As `turning_point_program`, and then the second derivatives by the variables in ``rows``, as `pairs_of` them."""
-    op = Recorder(source.variables)
-    here = source.local(op, op.place)
-    step, *moves = [-(part / here.half_slope) for part in (here.half, *here.half_partials)]
-    changes = {i: gradient(op, moves[i], [op.place, *op.values]) for i in rows}
-    seconds = [changes[i][1 + j] + changes[i][0] * moves[j] for i, j in pairs_of(rows)]
-    return assemble(op, [step, *moves, *seconds])
-
-
-def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
-    """The pairs of variables of which there are second derivatives: each with itself and those behind it."""
-    return list(combinations_with_replacement(rows, 2))
-
-
-@lru_cache(maxsize=16)
-def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """The second derivatives of dt/dphi at the same phase angle, as `pairs_of` the variables in ``rows``.
-
-    The inputs are as of `libration_program`, with the second derivatives of each turning point behind its first ones.
-    """
-    n, pairs = source.variables, pairs_of(rows)
-    op = Recorder(n + 2 * (1 + n + len(pairs)))
-    a, b, *ends = op.values[n:]
-    low, high, share = ends[: len(ends) // 2], ends[len(ends) // 2 :], op.place
-    width = b - a
-    lam = a + width * share
-    half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, lam)
-    rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
-    by_launch = [op.number(0)] * LAUNCH_VARIABLES
-    moved = [at_low + (at_high - at_low) * share for at_low, at_high in zip(low, high, strict=True)]
-    wider = [(at_high - at_low) / width for at_low, at_high in zip(low, high, strict=True)]
-    # The changes of half of V**2 and of ds/dlam as a whole, for near the turning points the parts of them are large.
-    faster = [part + half_slope * move for part, move in zip(half_partials, moved, strict=False)]
-    longer = [part + ds_slope * move for part, move in zip([*ds_partials, *by_launch], moved, strict=False)]
-    log_rates = [wider[k] + longer[k] / ds - faster[k] / (2 * half) for k in range(n)]
-    second = {k: [gradient(op, q[k], [lam, *op.values[:n]]) for q in (faster, longer)] for k in rows}
-    outputs = []
-    for k, (i, j) in enumerate(pairs, start=n):
-        by_half, by_ds = (by[1 + j] + by[0] * moved[j] for by in second[i])
-        by_half, by_ds = by_half + half_slope * moved[k], by_ds + ds_slope * moved[k]
-        change = wider[k] - wider[i] * wider[j] + by_ds / ds - longer[i] * longer[j] / (ds * ds)
-        change = change - (by_half - faster[i] * faster[j] / half) / (2 * half)
-        outputs.append(rate * (log_rates[i] * log_rates[j] + change))
-    return assemble(op, outputs)
-
-
-@lru_cache(maxsize=16)
-def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
-    """The second derivatives of dt/dshare at the same share of a lap, as `pairs_of` the variables in ``rows``."""
-    op, *_, rate = _lap_rate(source, direction)
-    first = gradient(op, rate, op.values[: source.variables])
-    second = {i: gradient(op, first[i], op.values[: source.variables]) for i in rows}
-    return assemble(op, [second[i][j] for i, j in pairs_of(rows)])
-
-
-def _lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, TapeNumber, TapeNumber, TapeNumber]:
+def lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, TapeNumber, TapeNumber, TapeNumber]:
     """A tape with the length of a lap in lam, and ds/dlam, V**2 and dt/dshare at a share of it."""
     op = Recorder(source.variables + 1)
     p = op.values[: source.parameters]
@@ -308,14 +250,14 @@ def _lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, Tap
 
 @lru_cache(maxsize=64)
 def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] | None = None) -> Program:
-    """What is integrated over a lap, as a share of which the place is given, with its derivatives at the same share.
+    """Return the integrand over a lap, with the place as a share of the lap, and its derivatives at the same share.
 
     The inputs are the variables, and the place where the lap begins: it is that of the launch, but does not change with
     it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
     ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as for a
     libration.
     """
-    op, lap, ds, v2, rate = _lap_rate(source, direction)
+    op, lap, ds, v2, rate = lap_rate(source, direction)
     if wanted is not None:
         return assemble(op, gradient(op, rate, [op.values[k] for k in wanted]))
     outputs: list[Any] = []
@@ -326,7 +268,7 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
 
 @lru_cache(maxsize=64)
 def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int) -> Program:
-    """What states consist of at a place, each with its derivatives by the run-time parameters and by the place.
+    """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
     ds/dlam, m*kappa, m*n0, U without losses, y of a space curve, and m**2 times ``load_along_curvature`` of one in no
@@ -353,57 +295,6 @@ def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNum
         return curvature * w + load
     product = formulas.load_along_curvature(op, lam, op.values)
     return op.sqrt(curvature * curvature * w * w + 2 * product * w + load * load)
-
-
-@lru_cache(maxsize=64)
-def law_program(law: ExactLaw, parameters: int) -> Program:
-    """The law of a motion with losses at a place and a V**2, the two coordinates.
-
-    The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
-    place and the parameters, and dW/dlam, where W is V**2, and its derivatives by the place, W and the parameters.
-    """
-    op, ds, slope = _law(law, parameters)
-    (lam, w), p = op.places, op.values[:parameters]
-    return assemble(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
-
-
-@lru_cache(maxsize=64)
-def load_program(law: ExactLaw, parameters: int) -> Program:
-    """The slope of the contact force per mass along a motion with losses, and its derivatives by the place and by W.
-
-    The inputs are those of `law_program`.
-    """
-    op, _, slope = _law(law, parameters)
-    lam, w = op.places
-    load = load_per_mass(op, law, lam, w)
-    by_place, by_w = gradient(op, load, [lam, w])
-    load_slope = by_place + by_w * slope
-    return assemble(op, [load_slope, *gradient(op, load_slope, [lam, w])])
-
-
-def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
-    """A tape with ds/dlam and dW/dlam."""
-    op = Recorder(parameters + 2, coordinates=2)
-    (lam, w), p, signs = op.places, op.values[:parameters], op.values[parameters:]
-    return op, op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
-
-
-@lru_cache(maxsize=64)
-def force_program(law: ExactLaw, parameters: int) -> Program:
-    """dW/dlam at a place and a V**2, and its derivative by the place; the inputs are those of `law_program`."""
-    op, _, slope = _law(law, parameters)
-    return assemble(op, [slope, *gradient(op, slope, [op.place])])
-
-
-@lru_cache(maxsize=64)
-def range_program(domain: Callable[..., Any], parameters: int) -> Program:
-    """Both ends of the parameter's range and its period, each with its derivatives by the run-time parameters.
-
-    Those that do not exist are zero.
-    """
-    op = Recorder(parameters)
-    numbers = [0 if number is None else number for number in domain(op, op.values)]
-    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
 
 
 @lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ from gqm_sym.arguments import names, one_of, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
-from gqm_sym.runtime.gradients.programs import pairs_of
+from gqm_sym.runtime.gradients.second_programs import pairs_of
 from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 
 # What has second derivatives.
@@ -27,7 +27,7 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
     Raises
     ------
     InputError
-        If a name is none of a run-time parameter, ``lam0`` and ``v0``.
+        If a name is neither a run-time parameter nor ``lam0`` or ``v0``.
     """
     rows = {name: row for row, name in enumerate((*parameters, "lam0", "v0"))}
     wanted = ("lam0", "v0", *parameters) if wrt is None else names(wrt, where="wrt")

@@ -1,8 +1,8 @@
-"""How states at given times depend on the launch and the parameters, however many periods have gone by.
+"""Derivatives of states at given times with respect to launch and parameters, after any number of periods.
 
 At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time at which the launch stands on it, and of the periods
-that have gone by. Below, ``delay`` is how much further on, in time, the body is along the changed orbit.
+changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is how much further on, in time, the body is along the changed orbit.
 """
 
 from typing import Any, NamedTuple
@@ -41,7 +41,7 @@ class Sensitivity(NamedTuple):
 
 
 class _Along(NamedTuple):
-    """What changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
+    """The changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class OrbitSensitivity:
         return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
 
     def _places(self, share: Array) -> Array:
-        """How places change at shares of the phase, within the lap."""
+        """Return the changes of places at shares of the phase, within the lap."""
         if self._derivatives.direction:
             return self._lap_gradient * share
         upper = np.sin(np.pi * share) ** 2
@@ -97,7 +97,7 @@ class OrbitSensitivity:
         return places
 
     def _along(self, share: Array, lam: Array, v: Array) -> _Along:
-        """What changes at shares of the phase, at which the places and velocities are known."""
+        """Return the changes at shares of the phase, at which the places and velocities are known."""
         derivatives = self._derivatives
         (rates, times), arcs = self._rates(share), self._arcs(share)[1]
         path, places = derivatives.at_places(lam), self._places(share)
@@ -119,7 +119,7 @@ class OrbitSensitivity:
         )
 
     def _at_launch(self, motion: Any, points: Any) -> _Along:
-        """What changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        """Return the changes at the launch, whose phase angle has more digits once the period is known exactly."""
         phi = points.trajectory.segments[0].phi_start
         if phi not in self._launches:
             v0 = motion.direction * motion.problem.launch.v0.value
@@ -128,7 +128,7 @@ class OrbitSensitivity:
         return self._launches[phi]
 
     def _launch_delay(self, launch: _Along, motion: Any) -> Array:
-        """How much later than the lower turning point a libration is launched, by all variables.
+        """Return the derivatives of the time from the lower turning point to the launch of a libration.
 
         The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
         """
@@ -181,7 +181,7 @@ class OrbitSensitivity:
         return [arcs, arcs, *others]
 
     def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
-        """The derivatives of lam alone, as of `at`, where v and ds/dlam are known."""
+        """The derivatives of lam alone, as in `at`, where v and ds/dlam are known."""
         share, launch = self._share(points), self._at_launch(motion, points)
         delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
         found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
@@ -195,7 +195,7 @@ class OrbitSensitivity:
         return share
 
     def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
-        """How much further on, in time, the body is at the times of points."""
+        """Return the changes of time along the orbit at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
             delay: Array = -times - points.laps * gradient

@@ -1,9 +1,11 @@
-"""Fourier series of what changes along an orbit, and their integrals."""
+"""The changes along an orbit as a series with its integrals: of Fourier, or of Legendre on panels."""
 
 import numpy as np
+from numpy.polynomial.legendre import legint, legvander
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 
 # Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
 # number at most.
@@ -62,3 +64,43 @@ def _powers(bases: Array, count: int) -> Array:
         powers[done : done + more] = powers[:more] * (powers[done - 1] * bases)
         done += more
     return powers
+
+
+class PanelSeries:
+    """Functions of a share of the phase by their values at the nodes of panels.
+
+    Parameters
+    ----------
+    edges : (m+1,) array
+        The edges of the panels.
+    samples : (k, m, RULE) array
+        The values of k functions.
+    """
+
+    def __init__(self, edges: Array, samples: Array) -> None:
+        self._edges = edges
+        terms = samples @ to_legendre()
+        halves = 0.5 * np.diff(edges)[:, None]
+        integrals = np.moveaxis(legint(np.moveaxis(terms, -1, 0), lbnd=-1), 0, -1) * halves
+        totals = np.cumsum(integrals.sum(axis=-1), axis=1)
+        integrals[:, 1:, 0] += totals[:, :-1]
+        self._terms = np.concatenate([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
+
+    def __call__(self, share: Array) -> tuple[Array, Array]:
+        """The values at shares, and the integrals from 0 to there: a row for each function."""
+        panel = np.clip(np.searchsorted(self._edges, share, side="right") - 1, 0, len(self._edges) - 2)
+        left, right = self._edges[panel], self._edges[panel + 1]
+        waves = legvander(np.clip((2.0 * share - left - right) / (right - left), -1.0, 1.0), RULE)
+        parts = [
+            np.einsum("knj,nj->kn", self._terms[:, panel[i : i + BLOCK]], waves[i : i + BLOCK])
+            for i in range(0, max(share.size, 1), BLOCK)
+        ]
+        found, integrals = np.split(np.concatenate(parts, axis=1), 2)
+        return found, integrals
+
+
+def to_legendre() -> Array:
+    """The matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
+    rule = panel_rule()
+    table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
+    return table

@@ -43,7 +43,7 @@ def fourier(motion: Any, quantity: str, n: int) -> Fourier:
     """
     one_of(quantity, QUANTITIES, where="fourier: quantity")
     if not (isinstance(n, int) and 0 <= n <= MAX_STEPS // 4):
-        raise InputError(f"fourier: n must be a whole number from 0 to {MAX_STEPS // 4}, got {short(n)}")
+        raise InputError(f"fourier: n: must be a whole number from 0 to {MAX_STEPS // 4}, got {short(n)}")
     if motion.kind == "circulation" and quantity in GROWING:
         raise SolutionError(f"fourier: {quantity} of a circulation grows and does not repeat; ask for x, z, v or force")
     steps = MIN_STEPS

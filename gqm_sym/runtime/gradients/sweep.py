@@ -16,7 +16,7 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
 from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, begin, evaluate_block, fill_means_of
-from gqm_sym.runtime.gradients.orbit import source_of
+from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.programs import (
     Program,
     circulation_program,
@@ -135,7 +135,7 @@ def fill_extreme(program, work, sign, ends, tangents, shares, found):  # type: i
     ends : (2, 2) array
         Both places: a row of high doubles, and one of low ones.
     tangents : (2, 3, n) array
-        How both places move; empty for a lap, which has no ends.
+        The changes of both places; empty for a lap, which has no ends.
     shares : (k,) array
         The grid.
     found : (n + 2,) array
@@ -242,7 +242,7 @@ class Launches(NamedTuple):
 
     @property
     def table(self) -> Array:
-        """What compiled code takes: the variables of each launch, then its turning points."""
+        """Return the arguments of compiled code: the variables of each launch, then its turning points."""
         return np.hstack([self.given, np.zeros((len(self.given), 1)), self.spans])
 
     @property

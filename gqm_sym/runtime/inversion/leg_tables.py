@@ -1,9 +1,9 @@
 """The state of a body on a trajectory of many segments at any times, in one call from Python.
 
-What is needed of all segments is stored in one record (`records.record`), because passing many arrays would take
-longer than reading them. All segments are of the kinds FROM_TURN and REGULAR (`quadrature.substitution`), and have
-polynomials for the phase angle over time (`table`), and for arc length and speed over the phase angle. Intervals of
-time follow each other from launch.
+The data of all segments are stored in one record (`records.record`), because passing many arrays would take longer than
+reading them. All segments are of the kinds FROM_TURN and REGULAR (`quadrature.substitution`), and have polynomials for
+the phase angle over time (`table`), and for arc length and speed over the phase angle. Intervals of time follow each
+other from launch.
 
 =================== ========================================================================================
 section             contents

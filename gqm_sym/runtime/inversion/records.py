@@ -181,7 +181,7 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
 def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore[no-untyped-def]
     """The bound on the error of a curve parameter, from those of the time and of the table, and from its rounding."""
     rate = choose(ds > 0.0, fabs(v) / ds, 0.0)
-    of_time = choose(time_error < inf, rate * time_error, inf)  # where nothing is known of the time, rest is no place
+    of_time = choose(time_error < inf, rate * time_error, inf)  # without a known time, rest has no place
     return of_time + table_error + ULP * (1.5 * fabs(lam - in_lap) + 2.0 * fabs(in_lap))
 
 

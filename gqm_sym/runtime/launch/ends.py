@@ -1,4 +1,4 @@
-"""How far a motion can go in each direction from its launch, and what ends it there."""
+"""The ends of a motion in each direction from its launch."""
 
 from dataclasses import dataclass
 from math import fabs, inf, isfinite
@@ -26,7 +26,7 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 # A `FoundEnd` as Python gets it: making a plain tuple is faster.
 END_TYPE = types.Tuple((types.int64, REAL, REAL))
 
-# `orbit_kind` of a motion that is no periodic one, or that doubles cannot decide.
+# `orbit_kind` of a motion that is not periodic, or that doubles cannot decide.
 NO_ORBIT = -1
 
 # A launch from rest may be an equilibrium if the change of the effective potential over the first step, by its slope,
@@ -44,8 +44,8 @@ CUSP_SHARE = 1e-7
 # the number of places at which the slope of the potential on the way is looked at.
 LIP_SHARE, WAY_MARKS = 1e-12, 5
 
-# Distance from a place at which ds is compared with that at the place itself, to tell whether it is a cusp; as a share
-# of the first step.
+# Distance from a place at which ds is compared with that at the place itself, to decide whether it is a cusp; as a
+# share of the first step.
 NEAR_CUSP = 1e-3
 
 # Places at which V**2 nearly vanishes that a search passes.
@@ -71,7 +71,7 @@ def first_zero_from(fns, p, lam0, w0, direction, begin, length, step):  # type: 
 
 @Inner
 def distance_to_axis(start, direction, axis, step):  # type: ignore[no-untyped-def]
-    """How far the first axis of symmetry is ahead; negative if there is one only (``step`` 0) and it is behind."""
+    """The distance to the first axis of symmetry ahead; negative if the only axis (``step`` 0) is behind."""
     away = direction * (axis - start)
     return choose(step > 0.0, away - step * whole_below(away / step), away)
 
@@ -113,7 +113,7 @@ def downhill(fns, p, lam0, step):  # type: ignore[no-untyped-def]
 
 @Inner
 def ends(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
-    """How far a motion can go in each direction, and in which direction it begins.
+    """The ends of a motion in each direction, and the direction in which it begins.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def orbit_kind(direction, ahead, behind, v0, period):  # type: ignore[no-untyped
 
 @dataclass(frozen=True, slots=True)
 class EndOfMotion:
-    """How far the motion can go in one direction, and what is there.
+    """The end of the motion in one direction, and its kind.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ def search_beyond_barriers(
     found : (what, near, far)
         What the search has found so far (`zeros.FoundEnd`).
     length, step : float
-        How far from the launch place to search, and the first step behind such a place.
+        The distance from the launch to search, and the first step beyond a place.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def _too_many_barriers(problem: Problem) -> SolutionError:
 
 
 def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, float]) -> EndOfMotion:
-    """What ends the motion in one direction, by what a search found and, where needed, by extended precision."""
+    """Return the end of the motion in one direction, from a search and, where needed, from extended precision."""
     lam0, period, step = problem.lam0, problem.period, starting_step(problem)
     length = period or distance_to_end(problem, direction)
     for _ in range(MAX_BARRIERS):

@@ -43,7 +43,7 @@ NODES, MAX_TAIL = 17, 1e-13
 # By how much of a period a closed curve is cut behind its start, which often is an equilibrium or opposite to one.
 SHIFT = 0.01234
 
-# A slope of this size has underflowed: it tells nothing.
+# A slope of this size has underflowed and is not used.
 TINY = 1e-290
 
 # A slope below this share of that a piece away is rounding, and so is a stiffness.
@@ -122,7 +122,7 @@ def equilibria(formulas: Formulas, p: ParameterValues, between: Any = None) -> t
     Raises
     ------
     InputError
-        If the range is none.
+        If the range is not a pair of numbers in ascending order.
     SolutionError
         If the potential is constant, or has too many equilibria to be listed. (Stretches on which it is constant, where
         others are not, are left out.)

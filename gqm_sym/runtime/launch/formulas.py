@@ -21,6 +21,7 @@ from gqm_sym.runtime.interface import (
     BatchFunctions,
     CompiledFunctions,
     DissipativeFunctions,
+    ExactChartLaw,
     ExactFormulas,
     ExactLaw,
     ExactPotential,
@@ -117,7 +118,7 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential, ExactLaw or None
+    exact : ExactFormulas, ExactPotential, ExactLaw, ExactChartLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
@@ -130,7 +131,7 @@ class Formulas:
     source, text : str
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
     effective_potential, bounds : Emitted or None
-        Of a dissipative module: functions that only its equilibria need; a conservative one has them in ``functions``.
+        Functions for the equilibria of a dissipative module; a conservative one has them in ``functions``.
     units : mapping of str to str
         SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
         and angles.
@@ -142,11 +143,16 @@ class Formulas:
     separated : SeparatedTerms or None
         Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
     path_in_space : Emitted or None
-        Of a space curve: what fills its third coordinate and the contact force as a vector.
+        The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+    sided : bool
+        Whether the sign of the contact force, or on a banked space curve of its part along the upward direction of
+        riders, tells on which side of the track the body is.
+    directed : bool
+        Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
     rider_loads : Emitted or None
-        Of a track with a declared roll: what fills the loads on a rider.
+        The function that fills the loads on a rider of a banked track.
     """
 
     name: str
@@ -157,7 +163,7 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | ExactChartLaw | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
     load_map: Emitted | None = None
@@ -173,6 +179,8 @@ class Formulas:
     separated: SeparatedTerms | None = None
     path_in_space: Emitted | None = None
     signed: bool = True
+    sided: bool = True
+    directed: bool = False
     rider_loads: Emitted | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
@@ -234,10 +242,10 @@ class Formulas:
         return values if isinstance(values, tuple) else (values,)
 
     def separated_factors(self, p: Sequence[Array]) -> list[Array]:
-        """What stands before the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
+        """Return the factors of the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
 
-        A factor does not depend on how many others are asked for: elementary functions of NumPy may differ in their
-        last bits between single numbers and arrays, and between arrays with and without gaps.
+        A factor does not depend on the number of others that are computed with it: elementary functions of NumPy may
+        differ in their last bits between single numbers and arrays, and between arrays with and without gaps.
         """
         assert self.separated is not None
         with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""The words for kinds of motion, for what ends a motion or a leg of it, for events, and for what a motion is asked.
+"""The names of the kinds of motion, of the ends of motions and legs, of events, and of the quantities of a motion.
 
 =================== ====================================================================================
 word                what it means as the end of a leg or the kind of an event

@@ -109,7 +109,7 @@ class Problem:
 
     @property
     def decider(self) -> ExactProblem | RoundedProblem:
-        """What decides where doubles cannot: extended precision if there is any, else tests with rounding margins."""
+        """The decisions that doubles cannot make: by extended precision, or by rounding margins without it."""
         exact = self.functions.exact
         return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
 

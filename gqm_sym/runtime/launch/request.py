@@ -21,7 +21,8 @@ CONTACTS = tuple(ONLY_SIGN)
 # The largest speed in m/s whose square is in the range of doubles with room for what it is multiplied by.
 MAX_SPEED = 1e150
 
-# The largest launch place on a closed curve, in laps: beyond, doubles know places to a thousandth of a lap or worse.
+# The largest launch place on a closed curve, in laps: beyond it, doubles resolve places to a thousandth of a lap or
+# worse.
 MAX_LAPS = 2.0**43
 
 
@@ -49,7 +50,7 @@ class LaunchRequest(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Where and how a motion begins, in exact numbers.
+    """The launch of a motion, in exact numbers.
 
     Attributes
     ----------
@@ -124,7 +125,7 @@ def _read_direction(given: Any) -> int:
 
 
 def check_contact(formulas: Formulas, contact: Any) -> None:
-    """Refuse what says which side of the track can push, where it is none of `CONTACTS` or there are no sides.
+    """Refuse a side of contact that is not one of `CONTACTS`, or that the curve does not have.
 
     Raises
     ------
@@ -137,10 +138,13 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
             f"contact: {contact!r} is for one body; a train is held from all sides, which is 'bilateral', and "
             "`Motion.cars` tells the contact force of each car"
         )
-    if ONLY_SIGN[contact] and not formulas.signed:
+    if ONLY_SIGN[contact] and not formulas.sided:
         raise LaunchError(
-            f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "
-            "sides, which is 'bilateral'"
+            f"contact: {contact!r} needs to know which side of this space curve the body is on: declare the upward "
+            "direction by Curve.space(..., roll=...), as an angle (0 is level) or for a speed; without it the body is "
+            "held from all sides, which is 'bilateral'"
+            if not formulas.directed
+            else f"contact: {contact!r} is not known in a frame that turns about a space curve; leave it 'bilateral'"
         )
 
 

@@ -22,6 +22,9 @@ FIELDS = (
     *("roll", "track_x", "track_y", "track_z"),
 )
 
+# What loads are measured in, in m/s**2.
+STANDARD_GRAVITY = 9.80665
+
 # A tangent whose horizontal part has a smaller square is vertical to rounding.
 MIN_LEVEL = 1e-20
 
@@ -39,16 +42,16 @@ def rider_loads_at(address, p, lam, v2, v, nu):  # type: ignore[no-untyped-def]
 
 
 def check_banked(formulas: "Formulas", asked: str) -> None:
-    """Refuse to tell what a rider feels where it is not declared how the track is banked.
+    """Refuse to compute loads on a rider if the banking of the track is not declared.
 
     Raises
     ------
     InputError
-        If it is not.
+        If it is not declared.
     """
     if formulas.rider_loads is None:
         raise InputError(
-            f"{asked}: is what a rider feels, and that depends on how the track is banked; declare it by "
+            f"{asked}: the load on a rider depends on the banking, which is not declared; declare it by "
             "Curve.space(..., roll=...), with an angle or 'coordinated'"
         )
 

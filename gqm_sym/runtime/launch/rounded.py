@@ -48,7 +48,7 @@ class RoundedProblem:
         return float(speed_squared_at(f.addresses, f.p, self.lam0, 0.0, self.w0, np.array([place]), offset)[0])
 
     def _equilibrium(self, near: float, far: float) -> float | None:
-        """Where the effective potential's slope changes sign between two places; None if it does not."""
+        """Return the place between two others where the potential's slope changes sign; None if it does not."""
         sign = np.sign(self._potential(near)[1])
         if sign == np.sign(self._potential(far)[1]):
             return None

@@ -8,7 +8,7 @@ potentials loses.
 
 from itertools import pairwise
 from math import fabs, nan
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -25,6 +25,9 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put, settle
 from gqm_sym.runtime.compiled.types import ADDRESSES, INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS, SPACE_ROWS
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.formulas import Formulas
 
 # Places filled at a time: few enough that what is streamed drains into memory while the next are computed.
 BLOCK = 256
@@ -327,9 +330,28 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
     return out
 
 
-@entry(MATRIX(INTEGER, VECTOR, VECTOR, VECTOR), nogil=True)
-def path_in_space_at(address, p, lam, v2):  # type: ignore[no-untyped-def]
-    """Rows y and contact force along x, y and z at places ``lam`` of a space curve, given V**2 there."""
+@entry(MATRIX(INTEGER, VECTOR, VECTOR, VECTOR, REAL), nogil=True)
+def path_in_space_at(address, p, lam, v2, v):  # type: ignore[no-untyped-def]
+    """Rows y and contact force along x, y and z at places ``lam`` of a space curve, given V**2 and sgn(ds/dt) there."""
     out = np.empty((SPACE_ROWS, lam.size))
-    call_path_in_space(address, lam.size, lam, v2, p, out)
+    call_path_in_space(address, lam.size, lam, v2, v, p, out)
     return out
+
+
+def path_in_space(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction: Array) -> Array:
+    """Rows y and contact force along x, y and z at places ``lam`` of a space curve.
+
+    ``direction`` holds signs of ds/dt, or V itself; they matter in a frame that turns only.
+    """
+    assert formulas.path_in_space is not None
+    address = formulas.path_in_space.address
+    rows: Array = path_in_space_at(address, p, lam, v2, 1.0)
+    if formulas.directed and (back := direction < 0.0).any():
+        rows[:, back] = path_in_space_at(address, p, lam[back], v2[back], -1.0)
+    return rows
+
+
+def length(vector: Array) -> Array:
+    """The lengths of vectors, whose components are the rows."""
+    found: Array = np.sqrt((vector * vector).sum(axis=0))
+    return found

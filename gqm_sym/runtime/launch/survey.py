@@ -1,4 +1,4 @@
-"""What every launch of a conservative model needs, in one call of compiled code: its ends and the time between them."""
+"""The ends and the time of a launch of a conservative model, in one call of compiled code."""
 
 import numpy as np
 from numba import types

@@ -32,7 +32,7 @@ CONSTANT_SHARE = 1e-13
 
 # By what factor the terms of V**2 on a step may be larger than at the zero on it and before. It must cover what terms
 # are larger by inside the formulas, which are not seen here: CONSTANT_SHARE allows for 450 roundings, so that divided
-# differences may cancel to their last three or four digits. If it is too large, extended precision is asked in vain.
+# differences may cancel to their last three or four digits. If it is too large, extended precision is used in vain.
 TERMS_GROWTH = 1e3
 
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
@@ -46,7 +46,7 @@ MAX_ZERO_ERROR_SHARE = 1e-6
 
 
 class FoundEnd(NamedTuple):
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ def zero_on_step(fns, p, lam0, w0, near, far, sizes, arrays):  # type: ignore[no
 def stays_positive(lower, upper, width, narrow, v2_near, v2_far, size):  # type: ignore[no-untyped-def]
     """Whether V**2 > 0 all along a step, by the bounds of its slope and its values at both ends.
 
-    Returns 1 if it is, 0 if the step must be halved to tell, and -1 if doubles cannot tell.
+    Returns 1 if it is, 0 if the step must be halved for a decision, and -1 if doubles cannot decide.
     """
     least = max(v2_near + lower * width, v2_far - upper * width)
     if upper <= 0.0 or least > CONSTANT_SHARE * size:

@@ -103,7 +103,7 @@ NOTHING: Array = np.empty(0)
 
 
 class Joints(NamedTuple):
-    """Where a curve is not smooth.
+    """The places where a curve is not smooth.
 
     Attributes
     ----------
@@ -126,12 +126,12 @@ class Joints(NamedTuple):
 
 
 def room_ahead(breaks: int) -> int:
-    """How many breaks may lie ahead of a body on a curve with so many of them a lap."""
+    """Return the largest number of breaks ahead of a body on a curve with a number of them in each lap."""
     return (LAPS_AHEAD + 3) * breaks
 
 
 def room_kept(breaks: int) -> int:
-    """How many numbers are kept of a curve with so many breaks."""
+    """Return the number of values that are kept for a curve with a number of breaks."""
     return 4 * GAP_COLUMNS * breaks
 
 
@@ -191,7 +191,7 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
     """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
 
-    Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
+    Next to an equilibrium a body turns, or moves on, by a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -222,7 +222,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
 
 @Inner
 def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
-    """Whether the body, which turns at a place, has come to rest on a corner there as far as times can tell.
+    """Whether the body, which turns at a place, has come to rest on a corner there within the resolution of times.
 
     Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
     factor. The body is at rest if the sum of all that follow is less than a rounding of the time.

@@ -67,7 +67,7 @@ from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIMIT, NARROWED, SPE
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Reading
 
-# What is asked of each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
+# The question for each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
 # equilibrium; RUN_AGAIN is to follow one of them once more for its panels, or a part of it.
 FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
 
@@ -108,9 +108,9 @@ class Track(NamedTuple):
     Attributes
     ----------
     chart : array
-        What stands behind the run-time parameters; empty for a curve with formulas, which has no breaks.
+        The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
     breaks, corners, drops : arrays
-        As of `legs.advance.Joints`.
+        As in `legs.advance.Joints`.
     """
 
     chart: Array
@@ -131,7 +131,7 @@ class Observed(NamedTuple):
     arrival : float
         The time of the first arrival at the target; infinite so far.
     peak : float
-        The largest of what is asked for, or minus the smallest.
+        The largest value of the quantity, or minus the smallest.
     """
 
     arrival: float
@@ -159,7 +159,7 @@ def sought(question):  # type: ignore[no-untyped-def]
 
 @Inner
 def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
-    """What the legs so far have shown, once one more has been followed."""
+    """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
     if question == ARRIVAL and body[ENDING] != AT_ONCE:
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
@@ -213,7 +213,7 @@ def conclude(body, question, observed):  # type: ignore[no-untyped-def]
 
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
-    """The number that is asked for of one body, and its status."""
+    """Return the answer for one body with its status."""
     observed = Observed(inf, -inf)
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     force, sign = sought(question)

@@ -59,7 +59,7 @@ def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:
     given : (n, PLACE) array or sequence of sequences
         LAM0 to V2 of each body.
     lines : int
-        How many lines more there are.
+        The number of lines more.
 
     Returns
     -------

@@ -92,7 +92,7 @@ class Reading(NamedTuple):
     pieces: Sequence[TabulatedPiece] = ()
 
     def has(self, t: float, errors: bool) -> bool:
-        """Whether it holds up to a time, with all errors if these are asked for."""
+        """Whether it holds up to a time, with all errors if these are required."""
         return t <= self.until and (self.pieces[-1].has_all_errors or not errors)
 
 
@@ -106,7 +106,7 @@ class DissipativeMotion(FollowedMotion):
 
     _known_changes: Changes | None = None
     _reading = Reading()
-    # What is read of the first piece that one time was asked of.
+    # The data of the first piece for which a single time was requested.
     _first_reading = Reading()
 
     @property
@@ -206,13 +206,13 @@ class DissipativeMotion(FollowedMotion):
         )
 
     def _reading_up_to(self, t: float, errors: bool) -> Reading:
-        """What compiled code reads of the motion up to a time, or up to an approach to an equilibrium before it."""
+        """Return the record for compiled code up to a time, or up to an approach to an equilibrium before it."""
         return self._reading if self._reading.has(t, errors) else self._extended(t, errors)
 
     def _reading_at(self, t: float, errors: bool) -> Reading:
-        """What compiled code reads of the motion at one time.
+        """Return the record for compiled code at one time.
 
-        Of a motion of which only times on one piece are asked, one after the other, only that piece is tabulated.
+        If only times on one piece are requested, one after the other, only that piece is tabulated.
         """
         first = self._first_reading
         if self._reading.has(t, errors=False):
@@ -258,7 +258,7 @@ class DissipativeMotion(FollowedMotion):
             self._follow_amply(EXTENSION * len(made))
             ahead = [timed for timed in self._pieces[len(made) :] if timed.segment.v2 is None]
             made += [tabulated(timed, self.problem.period) for timed in ahead]
-        # Once errors have been asked for, they are found for later pieces too.
+        # Once errors have been requested, they are computed for later pieces too.
         errors = errors or (len(before.pieces) > 0 and before.pieces[0].has_all_errors)
         if len(made) > len(before.pieces) or (made and errors and not made[0].has_all_errors):
             made = self._with_errors(made, self._pieces) if errors else made
@@ -303,7 +303,7 @@ class DissipativeMotion(FollowedMotion):
 
     @property
     def _changes(self) -> Changes:
-        """How the legs so far change."""
+        """The derivatives of the legs so far."""
         self._follow_again()
         runs = self._all_runs
         if self._known_changes is None or self._known_changes.followed < len(runs):

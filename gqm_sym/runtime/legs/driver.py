@@ -54,7 +54,7 @@ from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_ne
 from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
-from gqm_sym.runtime.legs.variations.equation import Law
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
 # The most panels of legs that are stored; each takes some kilobytes.
@@ -73,7 +73,7 @@ LAST_DIGIT = ULP / 64.0
 NEAR_EQUILIBRIUM = 1e-13
 
 # How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
-# body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
+# body is not a product of a factor and V**2, but a difference of forces that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
 # Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
@@ -110,7 +110,7 @@ def _track(problem: Problem) -> Track:
 
 
 class Driver:
-    """A body that is driven by some legs more, each time that this is asked for.
+    """A body that is driven by some more legs at each request.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ class Driver:
     ending : str
         The name of what ended the motion, or nothing.
     last_swing : float
-        How far from the equilibrium the body turned last, once its swing has died away.
+        The distance of the last turn from the equilibrium, once the swing has died away.
     force_error : float
         By what share the force next to the unstable equilibrium of a frame may be wrong.
     launch_error : float or None
@@ -248,7 +248,7 @@ class Driver:
             )
 
     def _followed(self) -> tuple[int, Array]:
-        """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
+        """Return the end of the last of the next legs (`advance`), and the records of all; one if the body stays."""
         legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
         while True:
             records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
@@ -299,9 +299,9 @@ class Driver:
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
 
     def _force_cancels(self, record: Array) -> bool:
-        """Whether terms of the force cancel where a leg ends, or starts, so that doubles do not tell it."""
+        """Whether terms of the force cancel at the end or the start of a leg, so that doubles do not resolve it."""
         with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
-            law, heading = Law(self.problem), int(record[HEADING])
+            law, heading = FormulaLaw(self.problem), int(record[HEADING])
             return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
         return False
 
@@ -342,7 +342,7 @@ class Driver:
         if frame is None or not (frame.is_stable or lam0):
             return
         if isinstance(problem.formulas.exact, ExactLaw):
-            frame = sharpened(frame, Law(problem).at_rest)
+            frame = sharpened(frame, FormulaLaw(problem).at_rest)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
         self.force_error = 0.0 if frame.is_stable else frame.error / frame.reach
         unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact

@@ -22,7 +22,7 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Traject
 
 
 class FollowedMotion(Motion):
-    """A motion that loses energy, followed as far as is asked; `DissipativeMotion` has what is asked of it."""
+    """A motion that loses energy, followed as far as required; `DissipativeMotion` has the questions."""
 
     _whole: Trajectory | None = None
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
@@ -123,7 +123,7 @@ class FollowedMotion(Motion):
         return [*self._layout.runs, *self._driver.runs]
 
     def _runs_as_legs(self) -> list[Leg]:
-        """The runs that `legs` tells of, which changes of contact sign and corners do not cut."""
+        """The runs of `legs`, which are not cut at changes of the contact sign and at corners."""
         everything, lap = self._all_runs, self.problem.period
         stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._driver.elapsed]
         shown = everything[: self._beginning or None]
@@ -150,7 +150,7 @@ class FollowedMotion(Motion):
 
     def _follow_amply(self, enough: float) -> None:
         """Follow the motion until there are enough pieces, or as far as it can be followed."""
-        with suppress(SolutionError, BudgetError):  # it is raised when that is asked for
+        with suppress(SolutionError, BudgetError):  # it is raised when that is requested
             while len(self._pieces) < enough and not self._driver.ending and self._driver.elapsed < self._horizon:
                 self._go_on()
 

@@ -17,7 +17,7 @@ from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_record import INHERITED, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIMIT, TURN
-from gqm_sym.runtime.legs.variations.equation import Law
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 NO_CHARTS: Array = np.empty((0, 0))
@@ -37,7 +37,7 @@ def _changed_charts(problem: Problem) -> Array:
 
 
 class InheritedErrors:
-    """The errors with which legs begin, computed as far as they are asked for.
+    """The errors with which legs begin, computed as far as required.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class InheritedErrors:
         return Errors(abs(lam0.low) if known is None else known, 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)
 
     def _time_error_of_force(self, run: Run) -> float:
-        """What the error of the force makes of the time in which a body departs from an equilibrium."""
+        """Return the effect of the error of the force on the time in which a body departs from an equilibrium."""
         if run.frame is None or run.frame.is_stable:
             return 0.0
         return self._driver.force_error * float(run.record[TIME_FROM_START] + run.record[TIME_FROM_END])
@@ -117,7 +117,7 @@ class InheritedErrors:
             by_place = [k for k, run in enumerate(missing) if run.frame is None]
             if by_place and isinstance(driver.problem.formulas.exact, ExactLaw):
                 with suppress(SolutionError):  # formulas may be too long
-                    errors = Law(driver.problem).force_errors_along([missing[k] for k in by_place])
+                    errors = FormulaLaw(driver.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
                         terms[k] = of_panels / rounding_share(driver.dissipation.linear)
             self._terms += terms

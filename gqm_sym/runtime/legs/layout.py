@@ -64,7 +64,7 @@ class Layout:
         def without(changes: Iterable[float], place: float) -> list[float]:
             return [change for change in changes if abs(change - place) > rounding]
 
-        # A change in the middle of a run ends the part before it, and is none of the part behind.
+        # A change in the middle of a run belongs to the part that it ends, and not to the next one.
         changes = without(run.changes, segment.b) if sense < 0 and run.ahead else list(run.changes)
         if not end or run.what == LIFTOFF:
             found, changes = len(changes), without(changes, segment.b if sense > 0 else segment.a)

@@ -1,4 +1,4 @@
-"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
 
 Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
@@ -7,7 +7,7 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`). Along a chart
+from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). Along a chart
 it follows from the forces on charts that are changed by what their rows may be off by (`Chart.rounded`). A law that is
 not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
 followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
@@ -112,7 +112,7 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """What some panels say of the motion between the place where they begin and the middle of the run.
+    """Data of some panels on the motion between the place where they begin and the middle of the run.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
     sizes : (array, array)
-        ``terms`` and ``charts`` of `carry`.
+        ``terms`` and ``charts``, as in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -278,7 +278,7 @@ def carry(dissipation, p, turns, before, share, terms, charts, record):  # type:
     Returns
     -------
     place, v2, time : float
-        As of `Errors`.
+        As in `Errors`.
     """
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction

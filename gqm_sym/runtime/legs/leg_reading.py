@@ -1,4 +1,4 @@
-"""What the record of a leg says: the time at a place, the place at a time, and the largest speed or contact force."""
+"""Readings of the record of a leg: the time at a place, the place at a time, and the largest speed or contact force."""
 
 from math import fabs, inf, sqrt
 

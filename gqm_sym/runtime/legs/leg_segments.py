@@ -54,7 +54,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
     Returns
     -------
     edges, edge_times, lengths, time_terms, length_terms : arrays
-        As of `time_panels.lay`; the last phase angle is 1.
+        As in `time_panels.lay`; the last phase angle is 1.
     speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
     error : float
@@ -92,7 +92,7 @@ class Run(NamedTuple):
     what : int
         What ended it (`runs.ends`).
     end : str
-        The name of its end, as of `Leg.end`.
+        The name of its end, as in `Leg.end`.
     frame : Frame or None
         The surroundings of an equilibrium by which it was followed.
     before : array or None
@@ -109,7 +109,7 @@ class Run(NamedTuple):
     passed: Array | None = None
 
     def with_panels(self, records: list[Array], until: float) -> "list[Run]":
-        """The run in parts with panels, the last of which ends where and when this one does, but for rounding.
+        """The run in parts with panels, the last of which ends at the same place and time up to rounding.
 
         ``until`` is the last time of the motion.
         """

@@ -1,4 +1,4 @@
-"""What compiled code reads of the segments of a motion with losses: tables of places, states and panels."""
+"""The record of the segments of a motion with losses for compiled code: tables of places, states and panels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ SLOTS_PER_INTERVAL = 4
 
 
 class TabulatedPiece(NamedTuple):
-    """What compiled code needs of a piece of a motion, as rows of the sections of `inversion.leg_tables`.
+    """The record of a piece of a motion for compiled code, as rows of the sections of `inversion.leg_tables`.
 
     Attributes
     ----------
@@ -50,16 +50,16 @@ class TabulatedPiece(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """The numbers by which the table of a segment becomes rows for its times from launch, as of `TimedSegment`.
+    """The numbers by which the table of a segment becomes rows for its times from launch, as in `TimedSegment`.
 
     Attributes
     ----------
     from_turn : float
         1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
     last, turn_offset : float
-        As of `Segment.speed_series`, and of `Segment`.
+        As in `Segment.speed_series`, and of `Segment`.
     relative_error : float
-        Of its times.
+        The errors of its times.
     lam_before : float
         By how much the curve parameter has grown in all laps before it.
     """
@@ -103,7 +103,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
     marks : (4, n+1) array
         Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths.
     time_terms, length_terms, speed_terms : arrays
-        As of `read_panels`.
+        As in `read_panels`.
     timing : Timing
     """
     edges, times, lengths = marks[0], marks[1], marks[3]
@@ -153,7 +153,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
 
 
 def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
-    """What compiled code needs of a piece, which is no approach to an equilibrium, with its own errors."""
+    """Return the record of a piece, which is not an approach to an equilibrium, with its own errors."""
     segment = timed.segment
     assert segment.speed_series is not None
     edges, _, lengths, time_terms, length_terms, error = segment.panels[:6]

@@ -17,7 +17,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
-from gqm_sym.runtime.motion.events import Event, Leg, liftoff
+from gqm_sym.runtime.motion.events import Event, Leg, liftoff, sided_force
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
@@ -40,7 +40,7 @@ SHOWN_PHASE = 8.0
 
 @dataclass(slots=True)
 class OpenEnd:
-    """How far a motion to infinity or to a pole has been computed; it is continued when more is asked for.
+    """How far a motion to infinity or to a pole has been computed; it is continued on request.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ class AperiodicMotion(Motion):
     """A motion that does not repeat: its segments follow each other, and each is passed once in each direction at most.
 
     If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
-    pole is continued when later times or farther places are asked for; `t_end`, `legs` and `events` tell of as many
-    segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` say, whatever has been asked for before.
+    pole is continued when later times or farther places are requested; `t_end`, `legs` and `events` cover as many
+    segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` allow, whatever was requested before.
     """
 
     def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
@@ -135,7 +135,7 @@ class AperiodicMotion(Motion):
         if self.lifted_off:
             return
         side = ONLY_SIGN[self.problem.launch.contact]
-        lost = liftoff(timed, side, first=not self._segments) if side else None
+        lost = liftoff(self.problem.formulas, timed, side, first=not self._segments) if side else None
         if lost is not None:
             timed = replace(timed, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
             self.kind, self.open_end = "transit", None
@@ -189,7 +189,7 @@ class AperiodicMotion(Motion):
         return tuple(self._segments if count == inf else self._segments[: int(count)])
 
     def _segments_ahead(self) -> float:
-        """How many segments `legs` and `events` cover; infinite if there are not so many yet, or all lead to a pole."""
+        """The number of segments of `legs` and `events`; infinite if there are fewer so far, or all lead to a pole."""
         panels = 0
         for k, timed in enumerate(self._segments if self._is_endless else ()):
             panels += timed.segment.edges.size
@@ -342,5 +342,4 @@ class MotionAtRest(Motion):
 def _is_pulled(problem: Problem) -> bool:
     """Whether a track that can push from one side only would have to pull a body at rest at the launch place."""
     f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
-    force = path_and_force_at(f.addresses, f.p, np.array([problem.lam0]), np.zeros(1))[4, 0]
-    return bool(side * force < 0.0)
+    return bool(side) and bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1))[0] < 0.0)

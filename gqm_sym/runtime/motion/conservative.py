@@ -165,7 +165,7 @@ def _check_ridges(problem: Problem, end: float) -> None:
 
 
 def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOfMotion:
-    """What ends the motion behind the launch place, if there is a turning point ahead."""
+    """Return the end of the motion behind the launch place, if there is a turning point ahead."""
     if problem.w0 == 0.0:
         return EndOfMotion("turn", problem.lam0)
     f, period = problem.functions, problem.period

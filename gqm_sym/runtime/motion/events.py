@@ -2,17 +2,25 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.speed import path_and_force_at
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.rider import rider_loads
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.formulas import Formulas
+    from gqm_sym.runtime.launch.problem import Problem
 
 # Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
 SAMPLES_PER_PANEL = 24
@@ -89,11 +97,30 @@ def contact_force(segment: Segment, phi: Array) -> Array:
     return force
 
 
-def contact_signs(segment: Segment, phi: Array) -> Array:
-    """The sign of N at phase angles of a segment; 0 where N is zero within rounding, or not a number."""
+def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Array:
+    """The contact force in N at phase angles of a timed segment; in a frame that turns its direction counts."""
+    if not problem.formulas.directed:
+        return contact_force(timed.segment, phi)
+    places, v2 = timed.segment.places(phi), timed.segment.speeds(phi) ** 2
+    forces = path_in_space(problem.formulas, problem.functions.p, places, v2, np.full(phi.size, timed.direction))
+    return length(forces[1:])
+
+
+def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Array) -> Array:
+    """What tells on which side of the track a body is: N, or the vertical load on the riders of a space curve."""
+    force: Array
+    if formulas.signed:
+        force = path_and_force_at(f.addresses, f.p, places, v2)[4]
+    else:
+        force = rider_loads(formulas, f.p, places, v2, np.ones(places.size), np.zeros(places.size))[0]
+    return force
+
+
+def contact_signs(formulas: "Formulas", segment: Segment, phi: Array) -> Array:
+    """The sign of N at phase angles of a segment, as `sided_force`; 0 where it is zero within rounding, or NaN."""
     f, places = segment.functions, segment.places(phi)
-    force = contact_force(segment, phi)
-    load = path_and_force_at(f.addresses, f.p, places, np.zeros_like(phi))[4]
+    force = sided_force(formulas, f, places, segment.speeds(phi) ** 2)
+    load = sided_force(formulas, f, places, np.zeros_like(phi))
     parts = np.abs(force - load) + np.abs(load)
     finite = np.isfinite(parts)
     least = (
@@ -103,13 +130,15 @@ def contact_signs(segment: Segment, phi: Array) -> Array:
     return signs
 
 
-def contact_changes(timed: TimedSegment) -> Array:
+def contact_changes(formulas: "Formulas", timed: TimedSegment) -> Array:
     """The phase angles of a timed segment at which N changes sign, in ascending order."""
     segment = timed.segment
+    if not formulas.sided:
+        return np.empty(0)
     changes = sign_changes(
         segment,
-        lambda phi: contact_signs(segment, phi),
-        lambda phi: np.sign(contact_force(segment, phi)),
+        partial(contact_signs, formulas, segment),
+        lambda phi: np.sign(sided_force(formulas, segment.functions, segment.places(phi), segment.speeds(phi) ** 2)),
     )
     if timed.end == "singular-point":
         changes = changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
@@ -210,7 +239,7 @@ def corner_crossings(timed: TimedSegment, corners: Array, time_scale_error: floa
     return found
 
 
-def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
+def liftoff(formulas: "Formulas", timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
     """When and where contact is lost on a timed segment: time from the segment's end ``a``, and phase angle.
 
     The result is None if contact lasts. It is lost where N changes its sign, and at corners where the track bends away.
@@ -222,7 +251,7 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
     first : bool
         Whether the motion begins with this segment; contact may then be lost at launch.
     """
-    changes = contact_changes(timed)
+    changes = contact_changes(formulas, timed)
     crossed = crossings(timed, changes, 0.0)
     if first:
         start, stop, share = timed.phi_start, timed.phi_stop, _launch_share(timed)
@@ -231,7 +260,7 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
         # N may vanish at the launch itself; its sign half-way to the first change then decides.
         # At a cusp it is infinity times zero, so that places a little ahead are looked at.
         near = start + share * (stop - start)
-        here, then = contact_signs(timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
+        here, then = contact_signs(formulas, timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
     lost = sorted([*crossed, *corner_crossings(timed, timed.segment.functions.drops(side), 0.0)])

@@ -1,8 +1,9 @@
 """Extremes of a function on an interval by ever finer grids, and of speed and contact force along a motion."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -11,8 +12,11 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.events import contact_force
+from gqm_sym.runtime.motion.events import contact_force_on
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.problem import Problem
 
 # Points of each of the finer grids, and how many of them follow each other: each is 64 times as fine as the one before.
 GRID_POINTS, GRIDS = 129, 8
@@ -33,7 +37,7 @@ BEFORE_CORNER = 1e-13
 # a share of the phase angle.
 BESIDE_JOINT = 64.0 * ULP
 
-# Values that differ by less than so many roundings are equal: the earlier one is told.
+# Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
 
 
@@ -95,7 +99,7 @@ class Extreme(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """What is the largest or the least somewhere along a motion.
+    """A quantity with a largest or least value along a motion.
 
     Attributes
     ----------
@@ -109,9 +113,13 @@ class Quantity(NamedTuple):
     of_state: Callable[[Any], float]
 
 
-# |ds/dt| in m/s, and the contact force in N.
+# |ds/dt| in m/s.
 SPEED = Quantity(lambda timed, phi: timed.segment.speeds(phi), lambda state: abs(state.v))
-CONTACT_FORCE = Quantity(lambda timed, phi: contact_force(timed.segment, phi), lambda state: float(state.normal_force))
+
+
+def force_of(problem: "Problem") -> Quantity:
+    """The contact force in N, as a quantity along motions."""
+    return Quantity(partial(contact_force_on, problem), lambda state: float(state.normal_force))
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:

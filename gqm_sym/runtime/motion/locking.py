@@ -1,4 +1,4 @@
-"""One answer at a time: a motion computes what it is asked for and keeps it, and many threads may ask."""
+"""One answer at a time: a motion computes answers on request and keeps them, and many threads may request them."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -28,7 +28,7 @@ class Lock:
 
 
 class HasLock(Protocol):
-    """What has a lock as ``_lock``."""
+    """An object with a lock ``_lock``."""
 
     _lock: Lock
 

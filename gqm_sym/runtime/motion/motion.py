@@ -1,4 +1,4 @@
-"""The motion that a launch begins, and what can be asked of it."""
+"""The motion that begins with a launch, with all its answers."""
 
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
@@ -7,17 +7,17 @@ from gqm_sym.errors import SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest
-from gqm_sym.runtime.motion.extremes import CONTACT_FORCE, SPEED, Extreme, extreme
+from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.parts.derivatives import Derivatives
 from gqm_sym.runtime.motion.parts.history import History
-from gqm_sym.runtime.motion.riding.cars import Cars, cars
+from gqm_sym.runtime.motion.riding.cars import Cars, CarsOfRiders, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import load_extreme
 
 
 class Motion(History, Derivatives):
-    """A motion along a curve, computed as far as it is asked for; many threads may ask at once.
+    """A motion along a curve, computed as far as required; many threads may read it at once.
 
     Attributes
     ----------
@@ -134,13 +134,13 @@ class Motion(History, Derivatives):
     @locked
     def normal_force_max(self) -> Extreme:
         """The largest contact force along the normal; as `v_max`."""
-        return extreme(self, CONTACT_FORCE, 1)
+        return extreme(self, force_of(self.problem), 1)
 
     @property
     @locked
     def normal_force_min(self) -> Extreme:
         """The least contact force along the normal, which may be negative; as `v_max`."""
-        return extreme(self, CONTACT_FORCE, -1)
+        return extreme(self, force_of(self.problem), -1)
 
     n_vertical_max, n_vertical_min = load_extreme("vertical", 1), load_extreme("vertical", -1)
     n_lateral_max, n_lateral_min = load_extreme("lateral", 1), load_extreme("lateral", -1)
@@ -177,8 +177,8 @@ class Motion(History, Derivatives):
         return exceedance(self, load, levels, side, limits)
 
     @locked
-    def cars(self, t: Any) -> Cars:
-        """Return the places, the contact forces and the coupling forces of the cars of a train.
+    def cars(self, t: Any) -> Cars | CarsOfRiders:
+        """Return the places, contact forces and coupling forces of the cars of a train, on banked tracks with loads.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class Motion(History, Derivatives):
 
         Returns
         -------
-        Cars
+        Cars, or CarsOfRiders on a banked track
             Arrays whose first axis is the cars, or the couplings between them.
 
         Raises
@@ -245,7 +245,7 @@ class Motion(History, Derivatives):
         return page(self)
 
     def __str__(self) -> str:
-        """A few lines for people: the kind, the launch, times and parameters."""
+        """Describe the motion in a few lines: kind, launch, times and parameters."""
         rows = summary(self)
         width = max(len(label) for label, _ in rows)
         texts = ((label, repr(value) if isinstance(value, float) else value) for label, value in rows)

@@ -10,9 +10,10 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.charts import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, OrbitDerivatives, asked_for, without_formulas
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for, without_formulas
 from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier

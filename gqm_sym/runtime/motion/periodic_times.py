@@ -29,7 +29,7 @@ CHART_ROUNDING = 16 * ULP
 # The latest time that doubles answer where double-double arithmetic does not suffice, in periods from launch.
 EARLY = 0.999
 
-# The most pieces of a chart on a segment whose times are computed in extended precision without being asked for.
+# The largest number of pieces of a chart on a segment for which times are computed in extended precision by default.
 MAX_CHART_PIECES = 250
 
 
@@ -63,7 +63,7 @@ class PeriodicTimes(Motion):
 
     Its times come from double-double arithmetic. Where that does not suffice, doubles answer within the first period,
     and extended precision beyond it and for what is listed of a period. Which of them answers depends on the latest
-    time that is asked for, and on no question before.
+    time in the call, and not on earlier calls.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class PeriodicTimes(Motion):
         a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
         b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
         a, b = max(a, self.problem.low), min(b, self.problem.high)
-        if not a < b:  # the same double: extended precision tells them apart from where doubles have them
+        if not a < b:  # the same double: extended precision distinguishes their places from those in doubles
             return segment
         self._offsets = behind, ahead
         if a == segment.a and b == segment.b:
@@ -221,7 +221,7 @@ class PeriodicTimes(Motion):
         return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
     def _repeated(self, times: timing.Timing) -> Repeated:
-        """What repeats itself, with these times."""
+        """The repeated part of a motion, with these times."""
         duration = times.duration
         segment = self._segment if times.edge_times is None else self._segment.with_edge_times(times.edge_times)
         total = segment.total_time
@@ -231,7 +231,7 @@ class PeriodicTimes(Motion):
         return Repeated(segment, duration, self.direction * self.problem.period, time_scale_error)
 
     def _trajectory_of(self, times: Times) -> Trajectory:
-        """One period with these times, made when it is first asked for."""
+        """One period with these times, made on the first request."""
         if times.trajectory is None:
             (segment, period, lap, time_scale_error), duration = times.repeated, times.timing.duration
             if self.kind == "libration":

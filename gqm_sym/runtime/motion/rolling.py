@@ -10,7 +10,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
-from gqm_sym.runtime.motion.events import Leg, crossings, sign_changes
+from gqm_sym.runtime.motion.events import Leg, contact_force_on, crossings, sign_changes
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 if TYPE_CHECKING:
@@ -32,7 +32,10 @@ def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float)
     def friction_margin(phi: Array) -> Array:
         """The sign of the largest possible static friction less the friction that rolling needs."""
         f, places = timed.segment.functions, timed.segment.places(phi)
-        _, _, ds, _, force = path_and_force_at(f.addresses, f.p, places, timed.segment.speeds(phi) ** 2)
+        ds, force = (
+            path_and_force_at(f.addresses, f.p, places, np.zeros(phi.size))[2],
+            contact_force_on(problem, timed, phi),
+        )
         # The slope of the effective potential by arc length is -F.t/(1 + beta).
         needed = beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
         signs: Array = np.sign(mu * np.abs(force) / mass - needed)

@@ -1,4 +1,4 @@
-"""Where a motion is at a time: segments in the order of time, repeated if the motion is periodic."""
+"""A motion as segments in the order of time, repeated if the motion is periodic."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -69,7 +69,7 @@ class Repeated(NamedTuple):
     segment : Segment
         The segment.
     period, lap, time_scale_error
-        As of `Trajectory`.
+        As in `Trajectory`.
     """
 
     segment: Segment
@@ -177,7 +177,7 @@ def circulation(segment: Segment, duration: Pair) -> TimedSegment:
 
 @dataclass(frozen=True, slots=True)
 class PhasePoints:
-    """Where a motion is at given times.
+    """The places of a motion at given times.
 
     Attributes
     ----------

@@ -40,7 +40,7 @@ MAX_NODES = 1 << 13
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """What lies ahead of a place of the curve: ``what`` is "turn", "equilibrium" or "clear", ``place`` where it is."""
+    """The obstacle ahead of a place of the curve: ``what`` is "turn", "equilibrium" or "clear", at ``place``."""
 
     what: str
     place: Any = None

@@ -77,7 +77,7 @@ class FormulaTrack:
         return self.domain(self.context, self.values)[2]
 
     def elsewhere(self) -> Any:
-        """Return a place at a distance that is no round number, for the potential may be the same at such distances."""
+        """Return a place at a distance that is not a round number, because potentials may agree at round distances."""
         return self.lam0 + self.context.mpf("0.7390851332151607")
 
     def joints(self, low: Any, high: Any) -> None:

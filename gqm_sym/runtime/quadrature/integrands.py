@@ -26,7 +26,7 @@ NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
 
 
 class Integrand(NamedTuple):
-    """What the integrands along a segment depend on.
+    """The inputs of the integrands along a segment.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ MIN_USABLE_RATIO = 1e-9
 MIN_CANCELLATION_RATIO = 1e-2
 
 # The shortest panel, as a share of its distance from the start of the segment, next to which a slow launch gains its
-# speed over a distance as short as doubles can tell; and the shortest there, as a share of the whole segment.
+# speed over the shortest distance that doubles resolve; and the shortest there, as a share of the whole segment.
 MIN_PANEL_SHARE, MIN_FIRST_PANEL_SHARE = 2.0**-48, 2.0**-960
 
 # How many panels may wait while those before them are halved, besides the first ones: as often as the first is halved.

@@ -31,7 +31,7 @@ trapezoid_workspace, trapezoid_rates = on_stack(4 * MAX_NODES), on_stack(MAX_NOD
 
 
 class Orbit(NamedTuple):
-    """What the integrand of a half period or of a lap time depends on.
+    """The inputs of the integrand of a half period or of a lap time.
 
     Attributes
     ----------

@@ -87,7 +87,7 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
     Parameters
     ----------
     stamp
-        The digest of the runtime that asks (`jit.STAMP`).
+        The digest of the calling runtime (`jit.STAMP`).
     source, text, name
         The file of the module, its text, and its name.
     quantity, arguments

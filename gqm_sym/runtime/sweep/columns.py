@@ -78,7 +78,7 @@ def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
 def columns_of(
     formulas: "Formulas", given: tuple[Any, ...], launches: dict[str, Array]
 ) -> tuple[list[Array], list[Array]]:
-    """The columns of the parameters, with what stands behind them, and those of the curve's domain.
+    """Return the columns of the parameters, with the chart behind them, and those of the curve's domain.
 
     Where all launches have the same parameters, they are found once; otherwise they must broadcast with the launches.
     """

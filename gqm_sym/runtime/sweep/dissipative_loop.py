@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 # from how many on a thread is worth starting.
 MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
-# What the driver is asked for each quantity, by its name. Motions that lose energy have no period.
+# The question to the driver for each quantity, by its name. Motions that lose energy have no period.
 QUESTIONS = {
     "t_end": legs.END_TIME,
     "rest_position": legs.REST_PLACE,
@@ -46,7 +46,7 @@ QUESTIONS = {
 
 
 class Asked(NamedTuple):
-    """What is asked of all bodies.
+    """The question for all bodies.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
     if quantity.startswith("normal_force") and not formulas.signed:
-        return None  # the panels of a leg resolve its law of motion, and that may know nothing of the contact force
+        return None  # the panels of a leg resolve its law of motion, which may not contain the contact force
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
     return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 

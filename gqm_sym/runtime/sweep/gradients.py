@@ -45,7 +45,7 @@ def sweep_with_gradient(
     """
     rows = selected(formulas.parameters, wrt)
     if quantity in LOAD_EXTREMES:
-        raise InputError(f"gradient: {quantity} has none yet, as all that a rider feels; leave gradient out")
+        raise InputError(f"gradient: there is none of {quantity}, which is a load on a rider; leave gradient out")
     check_force(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")

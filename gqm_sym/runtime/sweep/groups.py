@@ -104,7 +104,7 @@ def groups_of(
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:
-    """Which run-time parameters, with what stands behind them, launches of one group have in common.
+    """The run-time parameters, with the chart behind them, that the launches of one group have in common.
 
     The curve and its table depend on no others; bodies that lose energy are driven with all parameters the same.
     """
@@ -115,7 +115,7 @@ def _held(formulas: "Formulas", count: int) -> list[int]:
 
 
 def _source(formulas: "Formulas") -> Source:
-    """What a table of the model's potential and load is made from."""
+    """The formulas from which a table of the model's potential and load is made."""
     terms, mass = formulas.separated, list(formulas.parameters).index("m")
     if terms is None:
         return Source(formulas.functions.addresses(), 0, 1, 1, mass)
@@ -178,7 +178,7 @@ def _tabulated_range(
 def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
     """The table of a curve with formulas between two places; it is made once for the same parameters.
 
-    The exact formulas tell modules apart whose functions stood at the same place in memory, one after the other.
+    The exact formulas distinguish modules whose functions used the same memory one after the other.
     """
     pieces = np.linspace(first, last, MIN_PIECES + 1)
     return CurveTable(*tabulate(source, NO_PARTS, np.array(values), pieces))
@@ -199,7 +199,7 @@ def tabulated(
     parameters: int,
     values: tuple[float, ...],
 ) -> CurveTable:
-    """The table of a chart; it is made once for the same parameters. Behind these many stand functions of them."""
+    """The table of a chart; it is made once for the same parameters. These are followed by functions of them."""
     chart, true = chart_with(maker, values), None
     if exact_parts is not None and maker.is_exact(chart):
         p = tuple(read_number(value, where="p") for value in values)

@@ -18,7 +18,7 @@ GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
 # first size beside each other.
 FINER, MAX_GRIDS = 4, 256
 
-# A grid resolves a function if its mean is the same over every second point, but for this share of its range, and for
+# A grid resolves a function if its mean over every second point is the same up to this share of its range, and for
 # rounding. The mean of the contact force itself converges later than those of the coordinates and of ds, which turn
 # where the curve bends: a bend that is shorter than the grid's steps is seen in these alone.
 MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
@@ -36,7 +36,7 @@ GRID_POINTS = GRID_INTERVALS + 1
 SUM, COARSE_SUM, LEAST, LARGEST = range(4)
 FUNCTIONS, COORDINATES = 4, 3
 # The highest peaks of a grid: the top of the parabola, the point of the grid, and the values before it, at it and after
-# it. As many are refined as reach the highest but for this share of the range, for the grid does not tell them apart.
+# it. Those within this share of the range from the highest are refined, because the grid does not distinguish them.
 PEAKS, PEAK_ROW, TIED = 4, 5, 0.02
 line_buffer, pair_buffer, frame_buffer, point_buffer, sum_buffer, peak_buffer = (
     on_stack(n) for n in (GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, 3, 4 * FUNCTIONS, PEAKS * PEAK_ROW)

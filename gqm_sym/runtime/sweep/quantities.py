@@ -1,4 +1,4 @@
-"""The quantities that a sweep can be asked for, and the codes that say what became of each launch.
+"""The quantities of sweeps, and the codes for the outcome of each launch.
 
 The codes are plain integers, because compiled functions compare them.
 """
@@ -15,8 +15,8 @@ from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.launch import kinds
 from gqm_sym.runtime.motion.extremes import Extreme
 
-# The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
-# offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
+# The quantities that compiled code computes. SPANS is for batches only, on the way to another quantity: the offsets of
+# both turning points from the launch, or for a circulation the length of a lap and NaN.
 HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME, MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE, SPANS, END_TIME = range(
     10
 )
@@ -64,14 +64,14 @@ ANSWERS = types.NamedTuple((MATRIX, types.int8[::1], types.int8[::1]), Answers)
 
 
 class Quantity(NamedTuple):
-    """How one quantity of a sweep is found.
+    """The way in which one quantity of a sweep is found.
 
     Attributes
     ----------
     code : int
-        The number by which compiled code knows it, or NOT_COMPILED.
+        The number of the quantity in compiled code, or NOT_COMPILED.
     width : int
-        How many numbers compiled code fills in for each launch.
+        The number of numbers compiled code fills in for each launch.
     columns : slice or int
         Which of these numbers are the quantity; a slice gives the values one more axis.
     of_motion : callable

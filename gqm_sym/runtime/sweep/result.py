@@ -1,4 +1,4 @@
-"""What a sweep returns: the values of one quantity, with the launches that they belong to."""
+"""The result of a sweep: the values of one quantity with their launches."""
 
 from collections.abc import Mapping
 from math import prod
@@ -163,7 +163,7 @@ class Sweep(SweepArrays):
         return f"<p>{self._summary()}</p>{table(titles, rows)}{f'<p>... and {hidden} more</p>' if hidden else ''}"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        """The values, as `numpy.asarray` asks for them."""
+        """Return the values for `numpy.asarray`."""
         return self.values.astype(dtype or self.values.dtype, copy=bool(copy))
 
     def __getattr__(self, name: str) -> Any:
@@ -197,6 +197,6 @@ def columns_of(sweep: Sweep) -> dict[str, Any]:
 
 
 def _counts(codes: NDArray[np.int8], names: tuple[str, ...], first: int) -> dict[str, int]:
-    """How often each code from ``first`` on occurs, by the codes' names."""
+    """Return the number of occurrences of each code from ``first`` on, by the codes' names."""
     found, counts = np.unique(codes[codes >= first], return_counts=True)
     return {names[code]: int(count) for code, count in zip(found, counts, strict=True)}

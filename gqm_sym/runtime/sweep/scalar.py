@@ -73,7 +73,7 @@ from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
 
 class GivenCurve(NamedTuple):
-    """What the launches of a loop share.
+    """The common data of the launches of a loop.
 
     Attributes
     ----------

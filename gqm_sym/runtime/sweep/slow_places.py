@@ -88,7 +88,7 @@ def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
 
 @Inner
 def rate_at(curve, orbit, place):  # type: ignore[no-untyped-def]
-    """The time per unit of the parameter at a place where V**2 does not vanish; 0 where doubles do not tell it."""
+    """Return the time per unit of the parameter where V**2 does not vanish; 0 if doubles do not resolve it."""
     point = point_buffer()
     point[0], point[1] = place, place - orbit.lam0
     call_potential_divdiff1(curve.fns.potential_divdiff1, 1, orbit.lam0, point[:1], point[1:2], curve.p, point[2:])

@@ -86,7 +86,9 @@ def sweep(
     if quantity in LOAD_EXTREMES:
         check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
-        raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+        raise InputError(
+            f"lam: must be given with 'time_at', and with no other quantity, got {short(lam)} with {quantity!r}"
+        )
     if t_max is not None and as_doubles(t_max, "t_max").ndim:
         raise InputError(f"t_max: must be one number, the same for all launches, got {short(t_max)}")
     check_contact(formulas, contact)
@@ -105,10 +107,10 @@ def sweep(
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
-    if asked is not None or has_compiled_route(formulas, found, t_max):
+    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.drops.size:
-                continue  # tables know no corners
+                continue  # tables do not contain corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
                 track = Track(group.chart, group.joints, group.corners, group.drops)
@@ -130,20 +132,22 @@ def sweep(
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
 
 
-def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
+def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for motions that lose energy, and of motions with a last time they know only when they end. The grid on
-    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere.
+    They do not do so for motions that lose energy, and for motions with a last time they know only the end. The grid on
+    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere,
+    and they do not distinguish the sides of a space curve.
     """
-    if not formulas.signed and quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE):
+    of_force = quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE)
+    if not formulas.signed and (of_force or ONLY_SIGN[contact]):
         return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
 class Asked(NamedTuple):
-    """What is asked of all launches: the code of a quantity, and side and last time as `GivenCurve` has them.
+    """The question for all launches: the code of a quantity, and side and last time in the form of `GivenCurve`.
 
     ``lows`` is by how much each run-time parameter differs from its double, 0 of those that are arrays.
     """

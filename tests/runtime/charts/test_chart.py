@@ -61,7 +61,7 @@ def test_rows_are_off_by_no_more_than_they_may(radius: float) -> None:
     angle = s.astype(np.longdouble) / np.longdouble(radius)
     exact = [radius * np.sin(angle), -radius * np.cos(angle), angle, np.full_like(angle, 1.0 / radius)]
     found = chart.points(s)
-    for row, block in enumerate(chart.rounded()):
+    for row, block in enumerate(chart.rounded()[:4]):
         changed = replace(chart, block=block).points(s)
         assert np.all(np.abs(found[row] - exact[row]) <= np.abs(changed[row] - found[row]) / MAGNIFIED)
         assert np.array_equal(np.delete(changed, row, 0), np.delete(found, row, 0))

@@ -295,7 +295,7 @@ def test_options_of_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("points", "data", "message"),
     [
-        ("track.csv", None, "'track.csv': there is no such file beside the YAML file"),
+        ("track.csv", None, "'track.csv': there is no such file in this folder"),
         ("track.csv", "x,z\n1,2\n2,oops", "'track.csv', row 3: 'oops' is no decimal number"),
         ("track.csv", f"x,z\n{ROWS}\n11,12.1", "'track.csv', row 14: repeats row 13"),
         ("track.csv", "1,2\n1,2,3", "'track.csv', row 2: must be two numbers"),

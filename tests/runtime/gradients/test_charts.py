@@ -11,7 +11,6 @@ from mpmath import mp, mpf
 from paths import ROOT
 
 import gqm_sym as gqm
-from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 from gqm_sym.runtime.motion import timing
 
@@ -171,12 +170,7 @@ def test_sweeps_and_fits(ring: ModuleType) -> None:
     assert found.estimates == pytest.approx({"R": 1.25, "lam0": 0.7}, rel=1e-9)
 
 
-def test_what_is_not_there(generated_folder: Path, ring: ModuleType) -> None:
-    """Motions with losses along charts, and unknown names."""
-    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
-    force = gqm.Gravity() + gqm.QuadraticDrag(b="1/10")
-    damped = gqm.build(gqm.derive(curve, force), name="gradient_damped_ring", folder=generated_folder)
-    with pytest.raises(SolutionError, match="where energy is lost"):
-        damped.solve(lam0=1.0).gradient("turning_points")
+def test_unknown_names(ring: ModuleType) -> None:
+    """They are refused."""
     with pytest.raises(gqm.errors.InputError, match="there is no parameter 'L'"):
         ring.solve(lam0=1.0).gradient("period", "L")

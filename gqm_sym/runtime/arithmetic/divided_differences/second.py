@@ -144,7 +144,7 @@ def divdiff2_atanh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff2_abs(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """|u|[x,y,w]: 0 where the points have one sign, else by the point that stands alone."""
+    """|u|[x,y,w]: 0 where the points have one sign, otherwise from the point with the other sign."""
     a, b, c, u, v = ordered(x, y, w, h1, h2)
     if a >= 0.0 or c <= 0.0:
         return 0.0

@@ -88,7 +88,7 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     number : int
         The piece.
     span : (float, float)
-        Where the part begins and ends, as shares of the piece whose difference is a double.
+        The start and the end of the part, as shares of the piece whose difference is a double.
     points : (RULE,) array
         Places in [-1, 1] on the part.
     differences : (2, m, 2, RULE) array

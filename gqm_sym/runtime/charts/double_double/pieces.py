@@ -56,7 +56,7 @@ class TrueCurve(NamedTuple):
     terms : (n, 4, NODES) array
         Powers of u for x and z, the high doubles of each before the low ones.
     counts : (n, 2) array of int
-        How many powers need two doubles, and how many there are.
+        The number of powers that need two doubles, and the number of all powers.
     errors : (n, 2) array
         Bounds on the errors of the coordinates, and on those of their derivatives by u.
     lengths : (n, 3) array
@@ -328,6 +328,11 @@ def _tables() -> tuple[Array, Array, Array, Array]:
 def sample_places() -> Array:
     """Return the Chebyshev points in [-1, 1] at which pieces are sampled, as rows of the high and the low doubles."""
     return _tables()[0]
+
+
+def chebyshev_fit() -> Array:
+    """Return the matrix that takes values at these points to Chebyshev coefficients, as two doubles each."""
+    return _tables()[1]
 
 
 # The coordinates of one piece at the Chebyshev points as an array (2, 2, NODES), and a bound on their errors; and its

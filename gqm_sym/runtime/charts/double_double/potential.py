@@ -24,7 +24,7 @@ from gqm_sym.runtime.double_double.nodes import RULE
 
 
 class Path(NamedTuple):
-    """What the time along a curve depends on: the curve, the tape of the potential, its registers, and the level.
+    """The inputs of the time along a curve: the curve, the tape of the potential, its registers, and the level.
 
     The energy level is two doubles, a bound on what differences from it are off by at turning points, and one on its
     own error, by which turning points are shifted.

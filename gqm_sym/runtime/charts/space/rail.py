@@ -29,7 +29,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 
 # The coefficients of each of the three rates of a transition, in powers of the distance from its beginning.
 POWERS = 6
-# The numbers that define each piece: the length of a transition stands before the coefficients of its rates.
+# The numbers that define each piece: the length of a transition, followed by the coefficients of its rates.
 PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
 
 # On a part of a piece the frame turns by less than a half even where distances are RADIUS times as long: terms of its
@@ -57,7 +57,7 @@ class Pen(NamedTuple):
 class Pieces(NamedTuple):
     """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes.
 
-    Behind the coordinates stands the roll angle of a banked rail.
+    The coordinates are followed by the roll angle of a banked rail.
     """
 
     lengths: Array

@@ -1,9 +1,9 @@
 """Small motions about an equilibrium e that is not at 0: places as distances from e, and the force on them.
 
-Doubles know a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e. So
-the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance from
-e. Functions of the interface then serve the legs with distances for places: P becomes
-``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
+Doubles resolve a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e.
+So the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance
+from e. Functions of the interface then serve the legs with distances for places: P becomes ``C(d) + (P(e + d, W) - P(e
++ d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
 
 Swings about a stable equilibrium stay so near to it. From an unstable one a launched body departs, the later the nearer
 it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
@@ -53,8 +53,8 @@ MAX_SECANTS, SECANT_SHARE = 40, 2.0**-30
 # The force without speed may differ between the two directions by this share: there is no friction.
 FRICTIONLESS_SHARE = 1e-12
 
-# What stands in front of the module's parameters: the address of its speed equation, e as two doubles, the range, and
-# the coefficients of C(d)/d by powers of d over the range.
+# The numbers before the module's parameters: the address of its speed equation, e as two doubles, the range, and the
+# coefficients of C(d)/d by powers of d over the range.
 ADDRESS, PLACE, PLACE_LOW, RANGE, TERMS = range(5)
 OWN = TERMS + DEGREE
 
@@ -71,7 +71,7 @@ class Frame(NamedTuple):
     p : array
         Their parameters.
     error : float
-        Of the place of the equilibrium.
+        The error of the place of the equilibrium.
     """
 
     dissipation: Dissipation
@@ -89,7 +89,7 @@ class Frame(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """How far from the equilibrium the force is known well."""
+        """Return the distance from the equilibrium up to which the force is accurate."""
         return RANGE_SHARE * float(self.p[RANGE])
 
     def distance(self, place: float, low: float) -> tuple[float, float]:
@@ -186,7 +186,7 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     start : (float, float, float)
         A place as two doubles, and V**2 there.
     reach : float
-        How far from there functions may be smooth.
+        The distance from there over which functions may be smooth.
     """
     middle, size = start[0], reach
     for _ in range(MAX_HALVINGS):
@@ -217,7 +217,7 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
 
 
 def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array]]) -> Frame:
-    """The frame with equilibrium and force from double-double arithmetic: doubles know them to a rounding of e.
+    """Return the frame with equilibrium and force from double-double arithmetic, more accurate than e in doubles.
 
     Parameters
     ----------

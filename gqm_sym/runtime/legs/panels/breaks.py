@@ -17,7 +17,7 @@ CLEARANCE_SHARE = 2.0**-51
 
 @Inner
 def clearance(start, limit):  # type: ignore[no-untyped-def]
-    """How far from the breaks between two places curves are evaluated."""
+    """The distance from breaks between two places at which curves are evaluated."""
     return CLEARANCE_SHARE * max(fabs(start), fabs(limit))
 
 

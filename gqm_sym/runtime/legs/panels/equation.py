@@ -136,7 +136,7 @@ class March(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Where a panel begins.
+    """The start of a panel.
 
     Attributes
     ----------

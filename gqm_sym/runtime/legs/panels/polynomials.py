@@ -177,13 +177,13 @@ def _crossing(c, low, high):  # type: ignore[no-untyped-def]
 
 @Inner
 def _sign(value, noise):  # type: ignore[no-untyped-def]
-    """The sign of a number; 0 if it is no more than noise."""
+    """Return the sign of a number, or 0 if the number is within the noise."""
     return 0 if fabs(value) <= noise else (1 if value > 0.0 else -1)
 
 
 @Inner
 def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
-    """What bounds by the coefficients say of a series on a part of the panel.
+    """Return the result of bounds by the coefficients for a series on a part of the panel.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     before : int
         The sign with which it starts, if it was not known before.
     x : float
-        Where in [-1, 1] it crosses zero.
+        The place in [-1, 1] where it crosses zero.
     """
     spread = 0.0
     for k in range(1, COUNT):
@@ -228,7 +228,7 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
     """The first place in [-1, 1] where a series takes the other sign; none is missed.
 
     The panel is halved until bounds by the coefficients prove that the series has one sign or is monotone. On a part
-    where it is no more than ``noise`` it has no sign, so that touching zero without a change of sign is no change.
+    where it is no more than ``noise`` it has no sign, so that touching zero without a change of sign does not count.
 
     Parameters
     ----------

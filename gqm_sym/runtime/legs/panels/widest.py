@@ -69,12 +69,12 @@ NEVER, MAYBE, ALWAYS = range(3)
 
 
 class PanelRequest(NamedTuple):
-    """What is asked of the next panel.
+    """The requirements on the next panel.
 
     Attributes
     ----------
     max_width : float
-        How wide it may be, in the march variable.
+        The largest width, in the march variable.
     step : float
         The width to begin with.
     largest_v2 : float

@@ -35,11 +35,11 @@ class Change(NamedTuple):
     Attributes
     ----------
     turn : float
-        Where V**2 becomes negative.
+        The place where V**2 becomes negative.
     touch : float
-        Where V**2 vanishes within its noise without changing its sign.
+        The place where V**2 vanishes within its noise without changing its sign.
     load : float
-        Where N changes its sign.
+        The place where N changes its sign.
     first : float
         The smallest of these.
     """

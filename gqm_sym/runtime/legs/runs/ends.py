@@ -1,4 +1,4 @@
-"""What ends a run, and where."""
+"""The end of a run: its code and its place."""
 
 from math import fabs, inf
 from typing import NamedTuple
@@ -8,14 +8,14 @@ from gqm_sym.runtime.legs.panels.breaks import located, within
 from gqm_sym.runtime.legs.panels.equation import slope_at
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
 
-# What ended a run:
+# The codes of the end of a run:
 #
 # ========== ==================================================================================================
 # TURN       V**2 vanished, and the body turns or rests
 # LIMIT      the end of the domain, or of the range of breaks that were given
 # LIFTOFF    N took the sign that it cannot have
 # ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not linear in
-#            V**2, it is closer to it than its place in doubles can tell
+#            V**2, it is closer to it than doubles resolve its place
 # PAUSED     it has run far enough for once
 # NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
 # SPENT      too many panels were needed
@@ -54,7 +54,7 @@ class Timed(NamedTuple):
 
 
 class End(NamedTuple):
-    """How a run ended.
+    """The code of the end of a run.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class End(NamedTuple):
     half_c : float
         c/2 of the march variable (`panels.equation.March`); infinite where it is the distance itself.
     change_count, panel_count : int
-        How often N has changed its sign, and how many panels were recorded.
+        The number of sign changes of N, and of recorded panels.
     upcoming : int
         The index of the next break.
     """
@@ -93,7 +93,7 @@ class End(NamedTuple):
 
 @Inner
 def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
-    """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near.
+    """Return the end of a run where no panel is possible, with its distance and V**2: a turn, if one is near.
 
     Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
     there, and the body never comes to it.
@@ -132,7 +132,7 @@ def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[
 
 @Inner
 def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
-    """What ends a run after a panel, or GOES_ON."""
+    """Return the code of the end of a run after a panel, or GOES_ON."""
     if change.first <= 1.0:
         if change.first == change.turn:
             return TURN
@@ -144,7 +144,7 @@ def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
 
 @Inner
 def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # type: ignore[no-untyped-def]
-    """What ends a run before a panel, or GOES_ON."""
+    """Return the code of the end of a run before a panel, or GOES_ON."""
     if contact_sign != 0 and contact_sign == -only_sign:
         return LIFTOFF
     if not has_room:

@@ -130,9 +130,9 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
     ----------
     forces : Forces
     end : runs.ends.End
-        How the leg ends.
+        The end of the leg.
     breaks, off
-        As of `runs.run.run`.
+        As in `runs.run.run`.
     record, used
         The field is entered in the record after the numbers that are used already.
 
@@ -223,12 +223,12 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
 
 
 class Followed(NamedTuple):
-    """What became of a leg that was followed; the rest of it is in the record.
+    """The outcome of a leg that was followed; its other data are in the record.
 
     Attributes
     ----------
     what, contact_sign : int
-        As of `runs.ends.End`.
+        As in `runs.ends.End`.
     direction : int
         At a turn, the one that `released` finds; otherwise that of the motion.
     could_stay : bool
@@ -236,7 +236,7 @@ class Followed(NamedTuple):
     is_whole : bool
         Whether the leg was one polynomial.
     step, no_turn_until, v2 : float
-        As of `runs.ends.End`.
+        As in `runs.ends.End`.
     """
 
     what: int

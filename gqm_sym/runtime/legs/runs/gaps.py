@@ -1,4 +1,4 @@
-"""What the forces between two breaks of the curve do to a body, kept for all bodies that pass.
+"""The effect of the forces between two breaks of the curve on a body, kept for all bodies that pass.
 
 Bodies pass such a gap by it where forces are linear in V**2. Then ``V**2 = (w + G)/(1 + E)`` with w = V**2 at the first
 break, E = exp(q) - 1, and the integral G of exp(q) P (`panels.equation`): E and G depend on the place alone. With the
@@ -204,7 +204,7 @@ ROUNDINGS_OF_TIMES = 1e-12
 
 
 class Passed(NamedTuple):
-    """How far a run has come.
+    """The state of a run.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Passed(NamedTuple):
         V**2 there, and the largest so far.
     ahead : Ahead
     panel_count : int
-        How many panels were recorded.
+        The number of recorded panels.
     """
 
     left: float

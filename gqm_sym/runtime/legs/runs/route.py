@@ -18,7 +18,7 @@ REST_STEPS = 4
 
 
 class Start(NamedTuple):
-    """Where a run begins.
+    """The start of a run.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class Start(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What is read of the record of a leg.
+    """The data that are read from the record of a leg.
 
     Attributes
     ----------
     what : int
         TIMES to PANELS (`leg_record`).
     force : bool
-        Of PEAKS, whether the contact force is read instead of the speed.
+        For PEAKS, whether the contact force is read in place of the speed.
     sign : float
         1 for the largest, -1 for the smallest.
     best : float
@@ -187,7 +187,7 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
 
 @Inner
 def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-untyped-def]
-    """What is ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``."""
+    """Return the data ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``."""
     upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
     if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
         return ahead
@@ -196,7 +196,7 @@ def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-unt
 
 @Inner
 def limited(forces, march, panel, ahead, change, run_length, point):  # type: ignore[no-untyped-def]
-    """What is ahead of a panel that begins at the distance ``run_length`` and has these changes.
+    """Return the data ahead of a panel that begins at the distance ``run_length`` and has these changes.
 
     V**2 at a break is as exact as at launch, so that a panel after it that has a turn is as narrow as the first one.
     """

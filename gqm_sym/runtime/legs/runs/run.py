@@ -76,7 +76,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     start : Start
     route : Route
     off : float
-        How far from the breaks the curve is evaluated (`panels.breaks`).
+        The distance from breaks at which the curve is evaluated (`panels.breaks`).
     record : array
         Filled with panels up to the middle, and changes of N's sign (`leg_record`).
 

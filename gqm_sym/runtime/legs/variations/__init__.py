@@ -1,1 +1,1 @@
-"""How motions with losses change with their launch and parameters: the variational equation along their legs."""
+"""Derivatives of motions with losses by the variational equation along their legs."""

@@ -1,4 +1,4 @@
-"""What is asked of the changes of a motion with losses: states at times, turning points, ends and extremes."""
+"""Derivatives of a motion with losses: of states at given times, turning points, ends and extremes."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -10,12 +10,11 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-from gqm_sym.runtime.gradients.orbit import path_rows
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
-from gqm_sym.runtime.legs.variations.equation import LawRows, States
+from gqm_sym.runtime.legs.variations.law import LawRows, States
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
@@ -25,8 +24,9 @@ MAX_STEP, NEWTON_STEPS = 1e-5, 3
 # Points that are taken together.
 BLOCK = 4096
 
-# An extreme this near to the end of a motion, as a share of its time, is there.
-AT_END = 1e-12
+# An extreme this near to the end of a motion, as a share of its time, is there; and one this near to a place where the
+# force jumps, as a share of the place. This share of the time later or earlier, it is on one side of it.
+AT_END, AT_BREAK, BESIDE = 1e-12, 1e-9, 1e-13
 
 
 class Switch(NamedTuple):
@@ -63,7 +63,9 @@ class StateChanges:
     Attributes
     ----------
     lam, s, x, z, v, normal_force, y : arrays
-        As of `gradients.sensitivity.Sensitivity`, but places within the lap.
+        As in `gradients.sensitivity.Sensitivity`, but for places by the labels of points, within the lap.
+    labels, arc : array
+        How the labels of the places change, and as of `changes.Origin`.
     acceleration : array
         How the velocity changes with time.
     states : States
@@ -82,15 +84,15 @@ class StateChanges:
             for start in range(0, max(v.size, 1), BLOCK)
         ]
         found = np.concatenate(parts, axis=-1)
-        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y = found[:7]
-        self.acceleration = found[7, 0]
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found[:8]
+        self.acceleration, self.labels = found[8, 0], found[0]
 
     def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
         """The attributes for some of the points: a row for each, and for the acceleration a row of equal rows."""
         along = changes.along(half, w)
         self.states = States(*along.places, v**2, along.heading, along.contact_sign)
         self.law = law = changes.law.rows(self.states)
-        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *along.places)
+        path = changes.law.path(*along.places)
         lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
         faster = 0.5 * v * along.y - acceleration * along.delay
 
@@ -101,7 +103,7 @@ class StateChanges:
         x, z, force = changed(path.x), changed(path.z), path.force_changes(v, faster, changed)
         y = np.zeros_like(lam) if path.y is None else changed(path.y)
         accelerations = np.broadcast_to(acceleration, lam.shape)
-        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, y, accelerations])
+        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, y, along.arc, accelerations])
 
 
 def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
@@ -115,6 +117,9 @@ def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], A
 
 def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
     """How the places of a motion at times, of two doubles each, change."""
+    if changes.law.by_arc_length:  # the stretch of the way is needed, too
+        found: Array = states_at(motion, changes, t, low).lam
+        return found
     points, f = motion._phase_points(t, low), motion.problem.functions
     (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
     ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
@@ -126,7 +131,9 @@ def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChang
     """How the states of a motion at times, of two doubles each, change."""
     points = motion._phase_points(t, low)
     found = StateChanges(changes, points, motion._velocities(points))
-    found.lam += points.laps * changes.lap[:, None]
+    found.lam = changes.told(found.lam, found.arc, points.laps)
+    if changes.law.by_arc_length:
+        found.s = found.lam
     return found
 
 
@@ -162,7 +169,7 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
 def turning_points(motion: Any, changes: Changes) -> Array:
     """The derivatives of the turning points of a motion."""
     turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
-    columns = [changes.ends[k].sigma + changes.runs[k].laps * changes.lap for k in turns]
+    columns = [changes.told(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns]
     if motion.problem.w0 == 0.0:
         columns.insert(0, np.eye(changes.variables)[-2])
     return np.array(columns).reshape(-1, changes.variables).T[:, : len(motion.turning_points)]
@@ -175,21 +182,21 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         return zero, zero
     run, origin = changes.runs[k], changes.ends[k]
     if what == "rest":
-        return origin.sigma + run.laps * changes.lap, origin.delay
+        return changes.told(origin.sigma, origin.arc, run.laps), origin.delay
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
     law, v = changes.law.rows(at_end), run.record[HEADING]
     if what == "liftoff":
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
-        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *place)
+        path = changes.law.path(*place)
         curvature, load = path.curvature[:, 0], path.load[:, 0]
         faster = origin.y - law.slope[0] * origin.sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
-        moved = -change / (changes.law.parameters[0, changes.mass] * changes.law.loads(at_end)[0, 0])
+        moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
-    return moved + run.laps * changes.lap, origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
+    return changes.told(moved, origin.arc, run.laps), origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
@@ -228,28 +235,50 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     """The derivatives of an extreme of a motion.
 
     Inside a leg it changes as the quantity does at a fixed time, since it is stationary there (envelope theorem), and
-    so it does where the horizon cuts the motion. Where the motion ends by itself, its time changes too.
+    so it does where the horizon cuts the motion. Where the motion ends by itself, its time changes too. An extreme at a
+    place where the force jumps stays there.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
-    t, t_end, moved = found.t, motion.t_end, np.zeros(changes.variables)
-    if abs(t_end - t) <= AT_END * t_end:
-        t, moved = t_end, end(motion, changes)[1]
+    t_end, moved = motion.t_end, np.zeros((changes.variables, 1))
+    if abs(t_end - found.t) <= AT_END * t_end:
+        t, moved = t_end, end(motion, changes)[1][:, None]
     else:
-        t = _improved(motion, changes, of_speed, found)
-    at = states_at(motion, changes, np.array([t]), np.zeros(1))
+        t, is_stationary = _improved(motion, changes, of_speed, found)
+        if not is_stationary and np.abs(found.lam - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(found.lam):
+            # On the side of the extreme, and from two times back to its own.
+            sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * BESIDE * t_end
+            states = [motion.state(side[0]) for side in sides]
+            values = [abs(state.v) if of_speed else state.normal_force for state in states]
+            near, far = _changed(
+                motion, changes, of_speed, sides[np.argmin(np.abs(np.subtract(values, found.value)))]
+            ).T
+            on_place: Array = 2.0 * near - far
+            return on_place
+    at_time: Array = _changed(motion, changes, of_speed, np.array([t]), moved)[:, 0]
+    return at_time
+
+
+def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
+    """How the speed or the contact force changes at times that themselves change; if not told how, the places stay."""
+    at, v = states_at(motion, changes, t, np.zeros_like(t)), motion.state(t).v
+    if moved is None:
+        moved = -at.labels * at.law.ds / v
     if of_speed:
-        faster: Array = np.sign(motion.state(t).v) * (at.v[:, 0] + at.acceleration[0] * moved)
+        faster: Array = np.sign(v) * (at.v + at.acceleration * moved)
         return faster
-    law, mass = changes.law, changes.law.parameters[0, changes.mass]
-    rate = mass * law.loads(at.states)[0, 0] * motion.state(t).v / at.law.ds[0]
-    stronger: Array = at.normal_force[:, 0] + rate * moved
+    law = changes.law
+    rate = law.parameters[0, law.mass] * law.loads(at.states)[0] * v / at.law.ds
+    stronger: Array = at.normal_force + rate * moved
     return stronger
 
 
-def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> float:
-    """The time of an extreme inside a leg by Newton's method; it is left where the quantity is not stationary."""
+def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
+    """The time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
+
+    The time is left where it is not.
+    """
     t = found.t
     for _ in range(NEWTON_STEPS):
         at = states_at(motion, changes, np.array([t]), np.zeros(1))
@@ -258,6 +287,6 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> floa
         bend, v = by_place[0] + by_w[0] * law.slope[0], motion.state(t).v
         step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
-            return float(found.t)
+            return float(found.t), False
         t += step
-    return float(t)
+    return float(t), True

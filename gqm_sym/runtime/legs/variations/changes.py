@@ -1,9 +1,9 @@
-"""How a motion with losses changes from leg to leg: its turning points, their times, and its states between them.
+"""Changes of a motion with losses from leg to leg: of its turning points, their times, and its states between them.
 
 Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
 (`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
-sgn(dlam/dt). Both halves of a leg agree on these in the middle, which tells how the turn at the end moves. A body that
-is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
+sgn(dlam/dt). Both halves of a leg agree on these in the middle, which determines how the turn at the end moves. A body
+that is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
 speed.
 """
 
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import values
-from gqm_sym.runtime.gradients.programs import range_program
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
-from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels, States, one_state
+from gqm_sym.runtime.legs.variations.chart_law import law_of
+from gqm_sym.runtime.legs.variations.equation import Panels
+from gqm_sym.runtime.legs.variations.law import LawRows, States, one_state
 
 
 class Origin(NamedTuple):
@@ -54,7 +54,7 @@ class Along(NamedTuple):
     Attributes
     ----------
     sigma, y, delay, arc : arrays
-        As of `Origin`, at given distances from the origin, with ``y`` as a share of V**2.
+        As in `Origin`, at given distances from the origin, with ``y`` as a share of V**2.
     places : (array, array)
         The places as two doubles each.
     heading, contact_sign : arrays
@@ -84,8 +84,6 @@ class Changes:
     ----------
     law : Law
         The law of motion.
-    mass : int
-        Which of the run-time parameters is the mass.
     followed : int
         How many runs there were, with approaches to an equilibrium.
     runs : list of Run
@@ -95,8 +93,7 @@ class Changes:
     """
 
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
-        self.law, self._problem = Law(problem), problem
-        self.mass = list(problem.formulas.parameters).index("m")
+        self.law, self._problem = law_of(problem), problem
         self.followed, self.runs = len(runs), [run for run in runs if run.what != ASYMPTOTE]
         counts = [(run.ahead, run.back) for run in self.runs]
         halves = [(k, is_back) for k, count in enumerate(counts) for is_back in (False, True) if count[is_back]]
@@ -155,7 +152,7 @@ class Changes:
         rows = self.law.rows(States(*map(np.concatenate, zip(marks, panels.nodes, strict=True))))
         count = len(runs)
         starts, ends, middles = (rows.part(k * count, (k + 1) * count) for k in range(3))
-        panels.solve(rows.part(3 * count, None))
+        panels.solve(rows.part(3 * count, None), self.breaks)
         laps, zero, origin = 0, np.zeros(self.variables), self._launched(starts)
         for k, run in enumerate(runs):
             v = float(run.record[HEADING])
@@ -163,6 +160,9 @@ class Changes:
             laps = run.laps
             origin = origin._replace(sigma=origin.sigma - folded, arc=origin.arc + starts.ds[k] * folded)
             if run.ahead:
+                if k and not runs[k - 1].back:  # it goes on from where the last run ended
+                    jump = panels.jump(self._half(k - 1, False)[1] - 1, self._half(k, False)[0], 0)
+                    origin = origin._replace(y=origin.y + jump * origin.sigma)
                 if start_v2[k] > 0.0 and np.isfinite(run.half_c):
                     moved = -origin.y / starts.slope[k]
                     later = origin.delay + v * starts.ds[k] * moved / start_v2[k] ** 0.5
@@ -180,6 +180,8 @@ class Changes:
                 last = self._half(k, True)[1] - 1
                 still = origin._replace(y=zero)
                 more = self._mixed(still, panels.ends[:, last]) - origin.y
+                if run.ahead:
+                    more -= panels.jump(self._half(k, False)[1] - 1, last, 1) * origin.sigma
                 more /= ends.slope[k] * panels.ends[-1, last]
                 still = still._replace(sigma=origin.sigma + more)
                 delay = (
@@ -190,13 +192,21 @@ class Changes:
                 self._origins.append(origin)
             self.ends.append(origin)
 
+    @property
+    def breaks(self) -> Array:
+        """The places at which the force may jump, on all laps that the motion takes."""
+        breaks, period = self._problem.functions.breaks, self._problem.period
+        if not period or not breaks.size:
+            return breaks
+        ends = [run.record[at] for run in self.runs for at in (START, END)]
+        laps = np.arange(np.floor(min(ends) / period) - 1.0, np.floor(max(ends) / period) + 2.0)
+        everywhere: Array = (breaks + period * laps[:, None]).ravel()
+        return everywhere
+
     @cached_property
     def ranges(self) -> Array:
         """The derivatives of both ends of the parameter's range and of its period: a row for each, by all variables."""
-        domain = self._problem.formulas.domain_of
-        assert domain is not None
-        found = values(range_program(domain, self.law.count), self.law.parameters, np.zeros(1))[:, 0, 0]
-        return self.by_all(found.reshape(3, -1)[:, 1:].T).T
+        return self.by_all(self.law.ranges.T).T
 
     @property
     def lap(self) -> Array:
@@ -215,7 +225,8 @@ class Changes:
         """How the launch changes."""
         n, launch = self.law.count, self._problem.launch
         sigma, y, delay, arc = np.zeros((4, n + 2))
-        sigma[n], arc[n] = 1.0, -starts.ds[0]
+        sigma += self.law.launch_moves
+        arc -= starts.ds[0] * sigma
         y[n + 1] = 2.0 * launch.v0.value
         if launch.v0.value == 0.0:
             heading = float(self.runs[0].record[HEADING])
@@ -227,6 +238,15 @@ class Changes:
                 upwards = self.law.rows(one_state(self.runs[0].pair(START), 0.0, -heading, contact_sign)).slope[0]
                 delay[n + 1] = 2.0 * starts.ds[0] / abs(upwards)
         return Origin(sigma, y, delay, arc)
+
+    def told(self, sigma: Array, arc: Array, laps: Array | float) -> Array:
+        """How a place changes as it is told, from how its label does and the arc length to there (`Origin`)."""
+        if not self.law.by_arc_length:
+            changed: Array = sigma + laps * self.lap.reshape(-1, *[1] * (sigma.ndim - 1))
+            return changed
+        changed = sigma + arc
+        changed[self.law.count] += 1.0  # the launch place itself, from the start point
+        return changed
 
     def half(self, leg: int, is_back: bool) -> int:
         """The number of a half of the run with a number.

@@ -16,35 +16,28 @@ from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, log2
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT
-from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
-from gqm_sym.runtime.gradients.programs import Program, force_program, law_program, load_program
-from gqm_sym.runtime.interface import ExactLaw
-from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
+from gqm_sym.runtime.legs.variations.law import LawRows, States
 
 # The nodes of a panel and its end, as shares of it.
 POINTS = np.append(SHARES, 1.0)
 
-# Roundings of doubles over those of double-double arithmetic.
-COARSER = 0.5 * ULP / UNIT
+# From values at the nodes to those at both ends of a panel.
+TO_START, TO_END = (-1.0) ** np.arange(COUNT) @ TO_COEFFICIENTS, TO_COEFFICIENTS.sum(axis=0)
 
-# From values at the nodes to that at the end of a panel.
-TO_END = TO_COEFFICIENTS.sum(axis=0)
+# A panel that begins this near to where the curve is not smooth, as a share of the place, begins there.
+AT_BREAK = 1e-12
 
 
 @entry(types.void(types.float64[:, :, ::1], types.int64[::1], VECTOR, MATRIX), checked=False)
@@ -61,154 +54,6 @@ def fill_sums(series, panels, x, out):  # type: ignore[no-untyped-def]
             for j in range(COUNT - 1, -1, -1):
                 total += terms[row, j] * waves[j]
             out[row, i] = total
-
-
-# The largest error of the force, as a share of it, at which panels still tell rounding from structure.
-MAX_FORCE_ERROR = 1e-11
-
-
-class LawRows(NamedTuple):
-    """The law of motion at places: a column for each.
-
-    Attributes
-    ----------
-    ds, ds_by_place : (n,) arrays
-        ds/dlam and its derivative by the place.
-    ds_by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
-    slope, by_place, by_w : (n,) arrays
-        F = dW/dlam and its derivatives by the place and by W.
-    by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
-    """
-
-    ds: Array
-    ds_by_place: Array
-    ds_by_parameters: Array
-    slope: Array
-    by_place: Array
-    by_w: Array
-    by_parameters: Array
-
-    def part(self, first: int, last: int | None) -> "LawRows":
-        """The law at some of the places."""
-        return LawRows(*(row[..., first:last] for row in self))
-
-
-class States(NamedTuple):
-    """States in which the law is asked for: a number for each.
-
-    Attributes
-    ----------
-    high, low : (n,) arrays
-        The places as two doubles each.
-    w : (n,) array
-        V**2 there.
-    heading, contact_sign : (n,) arrays
-        The signs of dlam/dt and of N.
-    """
-
-    high: Array
-    low: Array
-    w: Array
-    heading: Array
-    contact_sign: Array
-
-
-def one_state(place: Pair, w: float, heading: float, contact_sign: float) -> States:
-    """One state, at a place of two doubles."""
-    return States(*(np.array([number]) for number in (*place, w, heading, contact_sign)))
-
-
-class Law:
-    """The law of a motion with losses, with its derivatives.
-
-    Parameters
-    ----------
-    problem : Problem
-        The launch with its module.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        formulas = problem.formulas
-        if not isinstance(formulas.exact, ExactLaw):
-            raise without_formulas()
-        self.exact, self.count = formulas.exact, len(problem.p)
-        self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
-
-    def rows(self, states: States) -> LawRows:
-        """The law in states."""
-        n = self.count
-        found = self._values(law_program(self.exact, n), states)[:, 0]
-        ds, slope = found[: n + 2], found[n + 2 :]
-        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:])
-
-    def loads(self, states: States) -> Array:
-        """The slope of the contact force per mass along the motion, and its derivatives by the place and by W."""
-        found: Array = self._values(load_program(self.exact, self.count), states)[:, 0]
-        return found
-
-    def _values(self, program: Program, states: States, errors: Array | None = None) -> Array:
-        """The results of a program in states (`orbit.values`), for parameters with bounds on their errors."""
-        signs, found = 2.0 * states.heading + states.contact_sign, np.empty((program.outputs.size, 3, states.w.size))
-        w = np.maximum(states.w, LEAST_V2)  # laws may take its root
-        for heading in (-1.0, 1.0):
-            for contact_sign in (-1.0, 1.0):
-                here = np.flatnonzero(signs == 2.0 * heading + contact_sign)
-                if here.size:
-                    inputs = np.hstack([self.parameters, [[heading, contact_sign], [0.0, 0.0], [0.0, 0.0]]])
-                    if errors is not None:
-                        inputs[2, : self.count] = errors
-                    found[:, :, here] = values(program, inputs, states.high[here], states.low[here], w[here])
-        return found
-
-    def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:
-        """`force_errors` on the panels of each run, first those from its start: the largest of three places of each."""
-        places, signs, counts = [], [], []
-        for run in runs:
-            v, halves = run.record[HEADING], [(run.record[START], run.half_c, run.panels_ahead)]
-            if run.what != ASYMPTOTE:
-                halves.append((run.record[END], 0.0, run.panels_back))
-            counts.append(sum(len(panels) for *_, panels in halves))
-            for sense, (origin, half_c, panels) in zip((v, -v), halves, strict=False):
-                right = panels[:, RIGHT]
-                left = np.append(0.0, right)[:-1]
-                w = np.array([left, 0.5 * (left + right), right])
-                places.append(origin + sense * (w if half_c == inf else w * (w + 2.0 * half_c)))
-                nu = np.where(panels[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
-                signs.append(np.array([np.full_like(nu, v), nu]))
-        (v, nu), at = np.hstack(signs), np.hstack(places)
-        errors = self.force_errors(at.ravel(), np.tile(v, 3), np.tile(nu, 3)).reshape(at.shape)
-        return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
-
-    def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
-        """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place."""
-        return np.nan_to_num(self._forces(places, v, nu)[1], posinf=0.0)
-
-    def _forces(self, places: Array, v: Array, nu: Array) -> tuple[Array, Array]:
-        """The force dW/dlam on a body at rest, and its errors.
-
-        Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
-        """
-        states = States(places, np.zeros_like(places), np.zeros_like(places), v, nu)
-        lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
-        force, slope = self._values(force_program(self.exact, self.count), states, lows)
-        return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
-
-    def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """The force dW/dlam on a body at rest, without friction, and its derivative by the place.
-
-        Places are given as two doubles each.
-        """
-        ones = np.ones_like(high)
-        force, slope = self._values(force_program(self.exact, self.count), States(high, low, 0.0 * ones, ones, ones))
-        return force[0], slope[0]
-
-    def cancels(self, place: float, heading: int) -> bool:
-        """Whether terms of the force on a body at rest cancel so far there that their rounding passes for structure."""
-        both = np.array([-1.0, 1.0])
-        forces, errors = self._forces(np.full(2, place), np.full(2, float(heading)), both)
-        return bool(np.all(errors > MAX_FORCE_ERROR * np.abs(forces)))
 
 
 class Panels:
@@ -292,8 +137,16 @@ class Panels:
         high, low = two_sum.py_func(self.place[k], self.u[k] * self.distances(k, w)[0])
         return high, low + self._low[k]
 
-    def solve(self, rows: LawRows) -> None:
-        """Solve the variational equation, with the law at all nodes."""
+    def solve(self, rows: LawRows, breaks: Array) -> None:
+        """Solve the variational equation.
+
+        Parameters
+        ----------
+        rows : LawRows
+            The law at all nodes.
+        breaks : array
+            The places at which it may jump.
+        """
         n, count = len(rows.by_parameters), len(self.width)
         offset, zero = self.width[:, None] * POINTS, np.zeros_like(rows.ds)
         twice = np.where(self._is_distance, 1.0, 2.0)[:, None]
@@ -304,7 +157,11 @@ class Panels:
         # Sources for each parameter, for sigma, and none for what begins with y = 1.
         sources = np.vstack([rows.by_parameters, rows.by_place, zero]).reshape(n + 2, count, COUNT)
         gained = self._over_distance(sources / factor[:, :COUNT])
-        y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1])[:, :, None])
+        slopes = rows.slope.reshape(count, COUNT)
+        self._breaks, self._slopes = breaks, np.stack([slopes @ TO_START, slopes @ TO_END])
+        panels = np.arange(1, count)
+        jumps = np.append(0.0, self.jumps(panels - 1, panels, 0))
+        y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1], jumps)[:, :, None])
         self.shares, self.ends = y[:, :, :COUNT] / self.nodes.w.reshape(count, COUNT), y[:, :, -1]
         self.shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
         stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, zero]).reshape(n + 2, count, COUNT)
@@ -345,19 +202,36 @@ class Panels:
         return integrals
 
     def _before(self, integrals: Array) -> Array:
-        """What integrals have come to before each panel of its half."""
+        """Return the values of integrals before each panel of their half."""
         before = np.zeros((*integrals.shape[:2], 1))
         for first, stop in pairwise(self.first):
             before[:, first + 1 : stop, 0] = np.cumsum(integrals[:, first : stop - 1, -1], axis=1)
         return before
 
-    def _chained(self, gained: Array, factors: Array) -> Array:
+    def jumps(self, one: NDArray[np.intp], other: NDArray[np.intp], end: int) -> Array:
+        """By how much the force jumps between the ends of some panels and the beginnings (or ends) of others.
+
+        At a given distance from an origin that moves, V**2 changes by as much there, times how far that moves.
+        """
+        if not self._breaks.size:
+            return np.zeros(one.size)
+        places = self.places(one, self.begin[one] + self.width[one])[0]
+        nearest = np.abs(places[:, None] - self._breaks).min(axis=1)
+        at_break = nearest <= AT_BREAK * (np.abs(places) + np.abs(self._breaks).max())
+        return np.where(at_break, self._slopes[end, other] - self._slopes[1, one], 0.0)
+
+    def jump(self, one: int, other: int, end: int) -> float:
+        """As `jumps`, between two panels."""
+        return float(self.jumps(np.array([one]), np.array([other]), end)[0])
+
+    def _chained(self, gained: Array, factors: Array, jumps: Array) -> Array:
         """The values of y with which panels begin: at the origin 0, and 1 for the last of the solutions."""
         start = np.zeros_like(gained)
         for first, stop in pairwise(self.first):
             start[-1, first] = 1.0
             for k in range(first + 1, stop):
                 start[:, k] = factors[k - 1] * (start[:, k - 1] + gained[:, k - 1])
+                start[-2, k] += jumps[k]
         return start
 
 

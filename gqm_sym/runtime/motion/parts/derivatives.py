@@ -1,4 +1,4 @@
-"""How the answers of a motion change with its launch and its parameters, and the spectrum of one that repeats."""
+"""Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from typing import Any
 
@@ -50,7 +50,9 @@ class Derivatives(Positions):
         """
         one_of(quantity, QUANTITIES, where="gradient: quantity")
         if (lam is None) == (quantity == "time_at"):
-            raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+            raise InputError(
+                f"lam: must be given with 'time_at', and with no other quantity, got {short(lam)} with {quantity!r}"
+            )
         if type(order) is not int or order not in (1, 2):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
@@ -175,14 +177,14 @@ class Derivatives(Positions):
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
     def _without_period(self, asked: str) -> SolutionError:
-        """What is raised by motions that do not repeat, by the name of what was asked for."""
+        """Return the error of motions that do not repeat, with the name of the requested quantity."""
         return SolutionError(
             f"{asked}: only a libration or a circulation has one; this motion is of kind {self.kind!r}"
         )
 
     def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+        """Return the error of motions without gradients."""
         return SolutionError(
-            "gradients: only librations, circulations and motions with losses have them yet; "
+            "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
         )

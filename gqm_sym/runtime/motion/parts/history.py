@@ -1,4 +1,4 @@
-"""What happens along a motion: its legs and its events."""
+"""The legs and the events of a motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
 class History(Positions):
-    """A motion of which one asks what happens along it."""
+    """The events and legs of a motion."""
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:
@@ -135,7 +135,7 @@ class History(Positions):
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(timed), self._course.time_scale_error)
+        return crossings(timed, contact_changes(self.problem.formulas, timed), self._course.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""

@@ -1,4 +1,4 @@
-"""Where the body of a motion is at a time: its states, their error, and the time at a place."""
+"""States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
 from math import inf
@@ -15,7 +15,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.riding.loads import felt
@@ -25,12 +25,12 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Traject
 
 
 class Positions(ABC):
-    """A motion of which one asks where the body is.
+    """The places and states of a motion.
 
     Attributes
     ----------
     kind, direction, problem
-        As of `Motion`.
+        As in `Motion`.
     """
 
     kind: MotionKind
@@ -155,16 +155,21 @@ class Positions(ABC):
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
-        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         kind, more = self._in_space(times, reduced, v, v2, force)
+        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         return kind(*found, *(_shaped(array, shape) for array in more))
 
     def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
-        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows."""
+        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows.
+
+        In a frame that turns the contact ``force`` is filled, too.
+        """
         formulas, p = self.problem.formulas, self.problem.functions.p
         if formulas.path_in_space is None:
             return State, np.empty((0, 0))
-        rows = path_in_space_at(formulas.path_in_space.address, p, places, v2)
+        rows = path_in_space(formulas, p, places, v2, v)
+        if formulas.directed:
+            force[:] = length(rows[1:])
         if formulas.rider_loads is None:
             return StateInSpace, rows
         return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])

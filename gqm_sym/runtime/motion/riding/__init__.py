@@ -1,1 +1,1 @@
-"""What the rider of a banked track feels along a motion."""
+"""Loads on a rider of a banked track along a motion, and the cars of a train."""

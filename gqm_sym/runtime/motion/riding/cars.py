@@ -7,7 +7,10 @@ import numpy as np
 from gqm_sym.errors import InputError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.runtime.charts.train import TrackOfTrain
-from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY, rider_loads
+from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space
 
 
 class Cars(NamedTuple):
@@ -43,8 +46,34 @@ class Cars(NamedTuple):
     coupling_force: Any
 
 
-def cars(motion: Any, t: Any) -> Cars:
-    """Return the cars of a train at times.
+class CarsOfRiders(NamedTuple):
+    """The cars of a train on a banked track at given times: what `Cars` has, and what riders feel in each.
+
+    Attributes
+    ----------
+    t, lam, x, y, z, normal_force, normal_x, normal_y, normal_z, coupling_force
+        As of `Cars`.
+    n_vertical, n_lateral, n_longitudinal : array
+        Loads on riders at the middle of each car upwards, to the left and ahead, in units of 9.80665 m/s**2.
+    """
+
+    t: Any
+    lam: Any
+    x: Any
+    y: Any
+    z: Any
+    normal_force: Any
+    normal_x: Any
+    normal_y: Any
+    normal_z: Any
+    coupling_force: Any
+    n_vertical: Any
+    n_lateral: Any
+    n_longitudinal: Any
+
+
+def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
+    """Return the cars of a train at times, on a banked track with what riders feel in each.
 
     Raises
     ------
@@ -54,9 +83,9 @@ def cars(motion: Any, t: Any) -> Cars:
     problem = motion.problem
     formulas, f, track = problem.formulas, problem.functions, problem.formulas.chart
     if not isinstance(track, TrackOfTrain):
-        raise InputError("cars: this body is no train; add Train(length=..., cars=...) to its forces")
+        raise InputError("cars: this body is not a train; add Train(length=..., cars=...) to its forces")
     state, values = motion.state(t), problem.p.values.tolist()
-    length, gravity = (float(number) for number in track.numbers(FLOATS, values))
+    length, gravity, friction = (float(number) for number in track.numbers(FLOATS, values))
     mass, count = values[list(formulas.parameters).index("m")], track.cars
     middle, v2 = np.atleast_1d(state.lam), np.atleast_1d(state.v2)
     shares = np.arange(2 * count + 1) / (2 * count) - 0.5
@@ -67,7 +96,7 @@ def cars(motion: Any, t: Any) -> Cars:
         angle = formulas.charted(problem.p).points(at)[2]
         y, along_x, along_y, along_z = 0.0 * at, -force * np.sin(angle), 0.0 * at, force * np.cos(angle)
     else:
-        y, along_x, along_y, along_z = path_in_space_at(formulas.path_in_space.address, f.p, at, speeds)
+        y, along_x, along_y, along_z = path_in_space(formulas, f.p, at, speeds, np.ones(at.size))
     # Ends and couplings are the even places, middles of cars the odd ones.
     found = [row.reshape(places.shape)[1::2] for row in (at, x, y, z)]
     found += [row.reshape(places.shape)[1::2] / count for row in (force, along_x, along_y, along_z)]
@@ -75,5 +104,26 @@ def cars(motion: Any, t: Any) -> Cars:
     # Gravity on the cars behind a coupling, less what is left for them of the acceleration of all.
     share = shares[2:-2:2].reshape(-1, *np.ones(middle.ndim, dtype=int)) + 0.5
     behind = (heights[1:-1] - heights[0]) - share * (heights[-1] - heights[0])
-    rows = (*found, mass * gravity / length * behind)
-    return Cars(state.t, *(row if np.ndim(state.lam) else row[:, 0] for row in rows))
+    coupling = mass * gravity / length * behind
+    if friction:
+        # Likewise for what rubs on the cars behind, which a train at rest does not tell.
+        rubbing = np.cumsum(friction * np.sign(np.atleast_1d(state.v)) * np.abs(found[4]), axis=0)
+        coupling += rubbing[:-1] - share * rubbing[-1]
+    rows: list[Array] = [*found, coupling]
+    kind: type[Cars] | type[CarsOfRiders] = Cars
+    if formulas.rider_loads is not None:
+        rows, kind = [*rows, *_loads(problem, state, found[0], gravity)], CarsOfRiders
+    return kind(state.t, *(row if np.ndim(state.lam) else row[:, 0] for row in rows))
+
+
+def _loads(problem: Problem, state: Any, places: Array, gravity: float) -> tuple[Array, Array, Array]:
+    """What riders feel upwards, to the left and ahead at places of a train."""
+    lam, v, ahead = (np.atleast_1d(row) for row in (state.lam, state.v, state.n_longitudinal))
+    speeds, direction = (np.broadcast_to(row, places.shape).ravel() for row in (v * v, np.sign(v)))
+    formulas, p, at = problem.formulas, problem.functions.p, places.ravel()
+    upwards, sideways = rider_loads(formulas, p, at, speeds, direction, np.zeros(at.size))[:2]
+    # The acceleration is that of the train; gravity acts along the track where the car is.
+    chart = formulas.charted(problem.p)
+    slopes, slope = chart.points(at)[2].reshape(places.shape), chart.points(lam.ravel())[2].reshape(lam.shape)
+    felt = ahead + (slopes - slope) * gravity / STANDARD_GRAVITY
+    return upwards.reshape(places.shape), sideways.reshape(places.shape), felt

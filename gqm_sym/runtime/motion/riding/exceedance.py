@@ -1,4 +1,4 @@
-"""How long a load on the rider is beyond a level: between the places where it equals that level.
+"""The times for which a load on the rider is beyond a level: between the places where it equals that level.
 
 Along each stretch of a motion the load is a smooth function of the phase angle. It is written as Chebyshev polynomials
 on parts that are halved until they resolve it; all roots of these are known, and one step on the load itself makes each
@@ -78,7 +78,7 @@ class _Part(NamedTuple):
 
 
 def exceedance(motion: Any, load: str, levels: Any, side: str, limits: Any) -> Exceedance:
-    """How long a load is beyond levels; the arguments are those of `Motion.exceedance`."""
+    """Return the times for which a load is beyond levels; the arguments are those of `Motion.exceedance`."""
     quantity, sign = load_of(load, motion.problem), _sign(side)
     asked = _numbers(levels, "levels")
     allowed = None if limits is None else _allowed(asked.reshape(-1), _limits(limits, sign), sign).reshape(asked.shape)

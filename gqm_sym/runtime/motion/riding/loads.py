@@ -12,13 +12,10 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.rider import FIELDS, check_banked, rider_loads
+from gqm_sym.runtime.launch.rider import FIELDS, STANDARD_GRAVITY, check_banked, rider_loads
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.extremes import Extreme, Quantity, extreme
 from gqm_sym.runtime.motion.trajectory import TimedSegment
-
-# What states measure loads in, in m/s**2.
-STANDARD_GRAVITY = 9.80665
 
 
 def load_of(name: str, problem: Problem) -> Quantity:

@@ -1,4 +1,4 @@
-"""How much the rounding of a launch changes V**2 on a segment on which it is measured from one place."""
+"""The effect of the rounding of a launch on V**2 on a segment on which V**2 is measured from one place."""
 
 import numpy as np
 

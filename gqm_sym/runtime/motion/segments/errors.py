@@ -63,7 +63,7 @@ def inversion_error(segment: Segment, phi: Array) -> Array:
 
 
 def _end_errors(segment: Segment) -> tuple[float, float]:
-    """How far the turning points of a segment may be from the exact ones, in units of the curve parameter.
+    """Return bounds on the errors of a segment's turning points, in units of the curve parameter.
 
     V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
     to as many roundings of the width as Q is smaller there than at its largest. Along a chart Q is rounded too.
@@ -74,7 +74,7 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
     f = segment.functions
     if segment.kind == FROM_TURN:
         return error, 0.0
-    # Q at the ends, but for a factor.
+    # Q at the ends, up to a factor.
     ends = np.array([segment.a, segment.b])
     steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
     errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)

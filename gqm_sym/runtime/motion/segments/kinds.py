@@ -7,7 +7,8 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
+# The distance from an equilibrium up to which an approach to it is computed, near the least distance that doubles
+# resolve.
 NEAREST = 1e-300
 
 # Phase angles of such an approach at which panels begin: near its start, panels must be short.
@@ -15,7 +16,7 @@ APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
 
 def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
-    """A segment from ``start`` towards an equilibrium, as near to it as doubles can tell."""
+    """A segment from ``start`` towards an equilibrium, up to the resolution of doubles."""
     stop = log(abs(start - equilibrium) / NEAREST)
     marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
     return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)

@@ -269,7 +269,7 @@ class Segment:
         return self._exact_offsets(place, low)
 
     def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
-        """`offsets` from the ends as doubles know them."""
+        """`offsets` from the ends in doubles."""
         return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     @property

@@ -57,7 +57,7 @@ FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 3, 2, 12
 
 
 class OrbitKind(NamedTuple):
-    """What the orbits of a batch have in common.
+    """The common data of the orbits of a batch.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[n
 
 @Inner
 def kind_of_librations(fns, orbits, monotone):  # type: ignore[no-untyped-def]
-    """What librations have in common: whether all are even, and the fastest way to their time."""
+    """Return the common data of librations: whether all are even, and the fastest method for their time."""
     n, rows = orbits.size, orbits.rows
     mirrored, one_axis = not contains(rows[STATE, :n], NOWHERE), not contains(rows[TRIAL, :n], NOWHERE)
     kind = LIBRATION
@@ -201,7 +201,7 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
     fns : BatchAddresses
         The module's compiled functions for batches.
     invariant_counts : (int, int)
-        How many numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
+        The number of numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
     columns : array
         The launches, as `strided.pointers` gives them.
     monotone : bool

@@ -77,14 +77,14 @@ class Orbits(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a batch needs while it is worked on.
+    """The work space of a batch.
 
     Attributes
     ----------
     param_count : int
         The number of run-time parameters.
     invariant_counts : (int, int)
-        How many numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
+        The number of numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
     chosen, others : int arrays
         Lists of columns.
     work : (13, BATCH) array

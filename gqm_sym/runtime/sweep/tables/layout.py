@@ -1,4 +1,4 @@
-"""What a table of a curve has of each panel: the parts of the potential and of the contact force, for all forces on it.
+"""The data of each panel in the table of a curve: the parts of the potential and of the contact force.
 
 The curve is cut into panels on which they are polynomials to rounding. The potential on a panel is that above its left
 edge, so that it has all its digits however small the panel is. Potential and load are sums of parts, each times a
@@ -79,7 +79,7 @@ class CurveTable(NamedTuple):
     parts : (n, potentials*POTENTIAL_ROW + loads*LOAD_ROW) array
         What they have of the parts of the potential and of the load.
     potentials : int
-        How many parts the potential has.
+        The number of parts of the potential.
     is_exact : bool
         Whether potential and lengths were rounded from double-double arithmetic.
     """

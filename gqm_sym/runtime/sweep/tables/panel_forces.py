@@ -1,7 +1,7 @@
 """The potential and the load of one launch on the panels that it comes to: parts of a table times its factors.
 
 A launch needs few numbers of most panels that it passes, and more of those next to its turning points. They are put
-together when they are first asked for, and kept for launches with the same factors.
+together when they are first needed, and kept for launches with the same factors.
 """
 
 from math import fabs, inf

@@ -145,7 +145,7 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
 
 @Inner
 def are_level(curve, passage):  # type: ignore[no-untyped-def]
-    """Whether the potential is the same at both turning points of a passage, as far as an exact table tells it."""
+    """Whether the potential is the same at both turning points of a passage, if an exact table determines it."""
     if passage.panels < 2 or passage.turns != BOTH or not curve.table.is_exact:
         return True
     rows, count = curve.rows, curve.levels.size

@@ -77,7 +77,7 @@ MAX_PARTS = 4
 
 
 class Source(NamedTuple):
-    """What a table is made from.
+    """The functions from which a table is made.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Source(NamedTuple):
     separated_terms : int
         The address of the function of that name; 0 if potential and load are tabulated as a whole.
     potentials, loads : int
-        How many parts they have.
+        The numbers of their parts.
     mass : int
         Which run-time parameter is the mass of the body.
     """

@@ -62,7 +62,7 @@ def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
 
 @Inner
 def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
-    """What ends a motion in one direction from a place on the table: what it is, the panel, and the place on it.
+    """The end of a motion in one direction from a place on the table: its kind, the panel, and the place on it.
 
     It is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL where the table does not decide it.
     """

@@ -1,4 +1,4 @@
-"""What gradients along charts evaluate: the formulas of a motion over coordinates of the plane, recorded as tapes.
+"""The programs of gradients along charts: the formulas of a motion over coordinates of the plane, recorded as tapes.
 
 A chart has no formula of its coordinates, and so they come with each place: x and z, their derivatives by the parameter
 u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter that shapes
@@ -77,7 +77,7 @@ class ChartSource(NamedTuple):
         return [(k, (z * dx - x * dz) / speed) for k, (x, z) in zip(self.shaping, moves, strict=True)]
 
     def local(self, op: Recorder, lam: TapeNumber) -> Local:
-        """Record the motion at the point that the coordinates tell."""
+        """Record the motion at the point with the given coordinates."""
         n, end = self.variables, self.variables + self.point
         v0, energy = op.values[n - LAUNCH_VARIABLES + 1 : n]
         value, slope, partials = self._at(op, op.places[1:])
@@ -119,7 +119,7 @@ def chart_circulation_program(source: ChartSource) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(source: ChartSource) -> Program:
-    """What states consist of at a point, as `programs.path_program`, with the derivatives at points of the curve.
+    """Return the program of states at a point, as `programs.path_program`, with derivatives at points of the curve.
 
     The coordinates are x and z with their first three derivatives by u, and for each parameter that shapes the curve
     the displacement of x and z with its first two.

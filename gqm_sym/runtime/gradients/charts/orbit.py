@@ -1,55 +1,43 @@
 """A periodic orbit along a chart with its derivatives: Gauss's rules on panels of the phase angle.
 
-The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). Where a
-parameter shapes the curve, the displacements of its points are differences of these polynomials for neighbouring
-values: of some 20 digits, for the polynomials have 31. All else are tangents of formulas (`chart_programs`).
+Displacements of the curve's points come from neighbouring curves (`shaped_pieces`). All else are tangents of formulas
+(`programs`).
 """
 
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.polynomial.chebyshev import cheb2poly, chebvander
-from numpy.polynomial.legendre import legint, legvander
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.literals.numbers import Number, read_number
-from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
 from gqm_sym.runtime.charts.double_double.pieces import (
-    NODES,
     TRUE_CURVE,
-    TruePieces,
     arc_between,
-    fill_points,
     place_at,
-    sample_places,
-    stacked_places,
-    stacked_points,
     unshared,
 )
-from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER, arc_from
+from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 from gqm_sym.runtime.double_double.orbit_time import fill_panel
-from gqm_sym.runtime.gradients.chart_programs import (
-    POINT,
+from gqm_sym.runtime.gradients.charts.programs import (
     ChartSource,
     chart_circulation_program,
     chart_path_program,
     speed_program,
 )
+from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows, SeriesOf, pairs, values
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
+from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
-from gqm_sym.runtime.launch.formulas import true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -61,52 +49,11 @@ MAX_TAIL, MAX_HALVINGS = 1e-14, 40
 # The largest rounding error of an integral, as a share of that of the absolute values.
 MAX_ROUNDING = 1e-16
 
-# The step of a difference quotient of the curve's points in double-double arithmetic, as a share of the parameter: a
-# power of 2, of which the square and the rounding over it are some 1e-18 and 1e-20.
-STEP = 2.0**-29
-
-# Chebyshev coefficients of a displacement below this share of the largest are rounding if so many follow each other.
-MAX_NOISE, TERMS_IN_A_ROW = 1e-15, 3
-
-# Rows of a place: the number of its piece, and u on it as two doubles.
-PLACE = 3
-
 # A place this near to the edge of a piece is there.
 AT_EDGE = 1e-15
 
 # How far from an extreme its second derivative is looked for, as a share of the orbit's width.
 BESIDE = 2.0**-20
-
-# Evaluations of the powers of u that are done together.
-BLOCK = 2048
-
-
-@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
-def fill_places(curve, number, ways, places):  # type: ignore[no-untyped-def]
-    """Fill the places (PLACE rows) at arc lengths, two doubles each, from the left edge of a piece."""
-    curve = unshared(curve)
-    for i in range(ways.shape[1]):
-        piece, at = place_at(curve, number, (ways[0, i], ways[1, i]))
-        places[0, i], places[1, i], places[2, i] = piece, at[0], at[1]
-
-
-@entry(types.void(TRUE_CURVE, MATRIX, MATRIX), checked=False)
-def fill_coordinates(curve, places, rows):  # type: ignore[no-untyped-def]
-    """Fill x, z and their derivatives by u, two doubles each, at places."""
-    curve, u, points = unshared(curve), stacked_places(), stacked_points()
-    for i in range(places.shape[1]):
-        u[0], u[RULE] = places[1, i], places[2, i]
-        fill_points(curve, int(places[0, i]), 1, u, points)
-        for row in range(8):
-            rows[row, i] = points[row * RULE]
-
-
-@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
-def fill_arcs(curve, start, places, arcs):  # type: ignore[no-untyped-def]
-    """Fill the arc lengths, two doubles each, from the left edge of a piece to places."""
-    curve = unshared(curve)
-    for i in range(places.shape[1]):
-        arcs[0, i], arcs[1, i] = arc_from(curve, start, int(places[0, i]), (places[1, i], places[2, i]))
 
 
 @entry(types.void(TRUE_CURVE, INTEGER, MATRIX, types.UniTuple(types.float64, 4), MATRIX, MATRIX), checked=False)
@@ -120,7 +67,7 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
     kind : int
         LIBRATION or CIRCULATION.
     panels : (m, 3) array
-        Where each panel begins, as a phase angle or as a share of the lap, and its width as two doubles.
+        The start of each panel, as a phase angle or as a share of the lap, and its width as two doubles.
     orbit : tuple of float
         The piece and the place on it where the phase begins are the first of ``places`` before; here are the orbit's
         width in arc length, two doubles with a sign, and the piece.
@@ -142,180 +89,14 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
             places[0, to], places[1, to], places[2, to] = piece, at[0], at[1]
 
 
-class PanelSeries:
-    """Functions of a share of the phase by their values at the nodes of panels; the counterpart of `series.Series`.
-
-    Parameters
-    ----------
-    edges : (m+1,) array
-        Where the panels begin and end.
-    samples : (k, m, RULE) array
-        The values of k functions.
-    """
-
-    def __init__(self, edges: Array, samples: Array) -> None:
-        self._edges = edges
-        terms = samples @ _to_legendre()
-        halves = 0.5 * np.diff(edges)[:, None]
-        integrals = np.moveaxis(legint(np.moveaxis(terms, -1, 0), lbnd=-1), 0, -1) * halves
-        totals = np.cumsum(integrals.sum(axis=-1), axis=1)
-        integrals[:, 1:, 0] += totals[:, :-1]
-        self._terms = np.concatenate([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
-
-    def __call__(self, share: Array) -> tuple[Array, Array]:
-        """The values at shares, and the integrals from 0 to there: a row for each function."""
-        panel = np.clip(np.searchsorted(self._edges, share, side="right") - 1, 0, len(self._edges) - 2)
-        left, right = self._edges[panel], self._edges[panel + 1]
-        waves = legvander(np.clip((2.0 * share - left - right) / (right - left), -1.0, 1.0), RULE)
-        parts = [
-            np.einsum("knj,nj->kn", self._terms[:, panel[i : i + BLOCK]], waves[i : i + BLOCK])
-            for i in range(0, max(share.size, 1), BLOCK)
-        ]
-        found, integrals = np.split(np.concatenate(parts, axis=1), 2)
-        return found, integrals
-
-
-def _to_legendre() -> Array:
-    """What takes values at the nodes to Legendre coefficients, from the right."""
-    rule = panel_rule()
-    table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
-    return table
-
-
 def source_along(problem: Problem) -> ChartSource:
-    """What the programs of motions along the chart of a module are recorded from."""
+    """The formulas from which the programs of motions along the chart of a module are recorded."""
     formulas = problem.formulas
     assert isinstance(formulas.exact, ExactPotential)
-    assert formulas.chart is not None
-    shaping, names = formulas.chart.shaped_by, list(formulas.parameters)
-    known = tuple(range(len(names))) if shaping is None else shaping
-    return ChartSource(formulas.exact.effective_potential, formulas.inertia, len(names), names.index("m"), known)
-
-
-class ShapedPieces:
-    """The true pieces of a curve, and those for neighbouring values of the parameters that shape it.
-
-    Parameters
-    ----------
-    problem : Problem
-        The launch with its module.
-    pieces : TruePieces
-        The curve.
-    shaping : tuple of int
-        The parameters.
-    """
-
-    def __init__(self, problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> None:
-        self.pieces, maker, chart = pieces, problem.formulas.chart, problem.formulas.charted(problem.p)
-        assert maker is not None
-        self._smoothed: dict[int, Array] = {}
-        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]
-
-    def _make(self, first: int, last: int) -> None:
-        """Make the pieces of all curves between two numbers."""
-        for side in (self.pieces, *(side for _, *sides in self._beside for side in sides)):
-            side.make(first, last)
-
-    def coordinates(self, places: Array) -> Array:
-        """The points at places with the displacements, two doubles each: the coordinates that programs take."""
-        self._make(int(places[0].min()), int(places[0].max()))
-        rows, curvature = [np.empty((8, places.shape[1]))], np.zeros((2, places.shape[1]))
-        fill_coordinates(self.pieces.curve, places, rows[0])
-        if self._beside:
-            _, _, dx, dz, bend_x, bend_z = _derivatives(self.pieces.curve.terms[:, ::2], places, 3)
-            curvature[0] = (dx * bend_z - dz * bend_x) / (dx * dx + dz * dz) ** 1.5
-        rows.append(curvature)
-        for step, *sides in self._beside:
-            before, after = np.empty((2, *rows[0].shape))
-            fill_coordinates(sides[0].curve, places, before)
-            fill_coordinates(sides[1].curve, places, after)
-            rows.append(_quotient(before[:4], after[:4], step))
-        return np.concatenate(rows)
-
-    def shifts(self, places: Array) -> Array:
-        """How much farther from the start point the points of the curve at places get: a row for each parameter."""
-        found, rows = [], self.coordinates(places)
-        dx, dz = rows[4:8:2]
-        for k, (step, *sides) in enumerate(self._beside):
-            before, after = np.empty((2, 2, places.shape[1]))
-            for side, arcs in zip(sides, (before, after), strict=True):
-                side.make(min(int(places[0].min()), side.begin), max(int(places[0].max()), side.begin))
-                fill_arcs(side.curve, side.begin, places, arcs)
-                arcs -= np.array(side.start_length)[:, None]
-            x, z = rows[2 * POINT + 4 * k : 2 * POINT + 4 * (k + 1) : 2]
-            # Points of equal u are displaced along the curve, too.
-            found.append(_quotient(before, after, step)[0] - (x * dx + z * dz) / np.hypot(dx, dz))
-        return np.array(found).reshape(-1, places.shape[1])
-
-    def path(self, places: Array) -> Array:
-        """The coordinates that `chart_programs.chart_path_program` takes, in doubles."""
-        if places.size:
-            self._make(int(places[0].min()), int(places[0].max()))
-        rows = [_derivatives(self.pieces.curve.terms[:, ::2], places, 4)]
-        if self._beside:
-            count = len(self.pieces.curve.counts)
-            for k in np.unique(places[0].astype(np.int64) % count).tolist():
-                if k not in self._smoothed:
-                    self._smoothed[k] = self._smooth(k)
-            terms = np.zeros((count, 2 * len(self._beside), NODES))
-            for k, found in self._smoothed.items():
-                terms[k] = found
-            rows += [_derivatives(terms[:, 2 * i : 2 * i + 2], places, 3) for i in range(len(self._beside))]
-        return np.concatenate(rows)
-
-    def _smooth(self, k: int) -> Array:
-        """The displacements on a piece as powers of u, for each parameter those of x and of z.
-
-        They are cut where their Chebyshev coefficients are rounding, so that their derivatives are not.
-        """
-        u = sample_places()[0]
-        places = np.array([np.full(u.size, float(k)), u, np.zeros(u.size)])
-        samples = self.coordinates(places)[2 * POINT :: 2]
-        first = samples[:, :1]
-        series = (samples - first) @ chebvander(u, NODES - 1) * (2.0 / NODES)
-        series[:, 0] *= 0.5
-        powers = np.zeros_like(series)
-        for row, terms in zip(powers, series, strict=True):
-            is_large = np.abs(terms) > MAX_NOISE * np.abs(terms).max()
-            used = next((k for k in range(NODES) if not is_large[k : k + TERMS_IN_A_ROW].any()), NODES)
-            row[:used] = cheb2poly(np.append(terms[:used], 0.0))[:used]
-        powers[:, :1] += first
-        return powers
-
-
-def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, TruePieces, TruePieces]:
-    """A step of a parameter, and the curve for values before and after it."""
-    size = abs(p[k].value) or 1.0
-    step = STEP * 2.0 ** np.floor(np.log2(size))
-    sides = []
-    for sign in (-1, 1):
-        value = p[k].fraction
-        moved = Fraction(p[k].value) + Fraction(p[k].low) if value is None else value
-        numbers = list(p)
-        numbers[k] = read_number(moved + sign * Fraction(step), where="p")
-        sides.append(true_pieces_of(maker, tuple(numbers), chart))
-    if None in sides:
-        raise SolutionError(UNDECIDED)
-    return step, *sides
-
-
-def _quotient(before: Array, after: Array, step: float) -> Array:
-    """The difference quotient of rows of two doubles each, over twice the step, which is a power of 2."""
-    high, low = after[::2] - before[::2], after[1::2] - before[1::2]
-    total = high + low
-    out = np.empty_like(before)
-    out[::2], out[1::2] = total / (2.0 * step), ((high - total) + low) / (2.0 * step)
-    return out
-
-
-def _derivatives(terms: Array, places: Array, count: int) -> Array:
-    """Coordinates at places and their derivatives by u, from those of order 0 on, from coefficients in doubles."""
-    chosen, u = terms[places[0].astype(np.int64) % len(terms)], places[1]
-    rows, powers = [], np.vander(u, NODES, increasing=True)
-    for _ in range(count):
-        rows += np.einsum("nrj,nj->rn", chosen, powers).tolist()
-        chosen = np.pad(chosen[:, :, 1:] * np.arange(1, NODES), ((0, 0), (0, 0), (0, 1)))
-    return np.array(rows)
+    names = list(formulas.parameters)
+    return ChartSource(
+        formulas.exact.effective_potential, formulas.inertia, len(names), names.index("m"), shaping_of(formulas)
+    )
 
 
 class ChartOrbitDerivatives(OrbitDerivatives):
@@ -434,7 +215,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             ends = self._end_rows
             wide = pairs((0.0, 0.0, 0.0), (*width, UNIT * width[0]))
             inputs = np.hstack([self._inputs, wide, ends[:, :, 0].T, ends[:, :, 1].T])
-        rule, tail_factors = panel_rule(), _to_legendre()[:, -2:]
+        rule, tail_factors = panel_rule(), to_legendre()[:, -2:]
         pending, done, sizes = np.stack([self._edges[:-1], np.diff(self._edges)], axis=1), [], NOWHERE
         for _ in range(MAX_HALVINGS):
             panels = np.column_stack([pending, np.zeros(len(pending))])
@@ -497,20 +278,9 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         low, high = self.turning_points
         return high - low
 
-    def _places(self, lam: Array) -> Array:
-        """The places (PLACE rows) at arc lengths from the start point."""
-        pieces, places = self._shape.pieces, np.empty((PLACE, lam.size))
-        numbers = [pieces.number_of(float(place)) for place in (lam.min(), lam.max())] if lam.size else [0]
-        pieces.make(min(*numbers, pieces.begin) - 1, max(*numbers, pieces.begin) + 1)
-        (start, low), from_edge = pieces.start_length, np.empty((2, lam.size))
-        from_edge[0] = lam + start
-        from_edge[1] = (lam - (from_edge[0] - start)) + (start - (from_edge[0] - (from_edge[0] - start))) + low
-        fill_places(pieces.curve, pieces.begin, from_edge, places)
-        return places
-
     def at_places(self, lam: Array) -> PathRows:
         """`path_rows` at arc lengths, with derivatives at the points of the curve."""
-        path = self._shape.path(self._places(lam))
+        path = self._shape.path(self._shape.places(lam))
         found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:])[:, 0]
         return PathRows(*found.reshape(6, self.source.parameters + 2, lam.size))
 
@@ -518,7 +288,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         """As `OrbitDerivatives.extreme_rows`, at the points of the curve; the second is a difference quotient."""
         steps = BESIDE * self.width * np.array([[0.0], [-1.0], [1.0]])
         lam = (place + steps).ravel()
-        places = self._places(lam)
+        places = self._shape.places(lam)
         rows = self._values(speed_program(self.source), self._inputs, np.zeros((2, lam.size)), places)[:, 0]
         if not of_speed:
             mass_curvature, load = self.at_places(lam)[3:5]
@@ -534,7 +304,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     def without_shift(self, moved: Array, lam: Array) -> Array:
         """As `OrbitDerivatives.without_shift`."""
         moved = moved.copy()
-        moved[list(self.source.shaping)] -= self._shape.shifts(self._places(lam))[:, 0]
+        moved[list(self.source.shaping)] -= self._shape.shifts(self._shape.places(lam))[:, 0]
         return moved
 
 

@@ -1,0 +1,1 @@
+"""Gradients of periodic motions along curves without formulas."""

@@ -1,0 +1,237 @@
+"""The true pieces of a curve and how its points are displaced by the parameters that shape it.
+
+The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). The
+displacements are differences of these polynomials for neighbouring values of a parameter: of some 20 digits, for the
+polynomials have 31.
+"""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.polynomial.chebyshev import cheb2poly
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.charts.chart import ChartMaker
+from gqm_sym.runtime.charts.double_double.pieces import (
+    NODES,
+    TRUE_CURVE,
+    TruePieces,
+    chebyshev_fit,
+    fill_points,
+    place_at,
+    sample_places,
+    stacked_places,
+    stacked_points,
+    unshared,
+)
+from gqm_sym.runtime.charts.double_double.turning_points import arc_from
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
+from gqm_sym.runtime.double_double.arithmetic import add, multiply
+from gqm_sym.runtime.double_double.nodes import RULE
+from gqm_sym.runtime.gradients.charts.programs import (
+    POINT,
+)
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.launch.formulas import Formulas, true_pieces_of
+from gqm_sym.runtime.launch.problem import Problem
+
+# The step of a difference quotient of the curve's points in double-double arithmetic, as a share of the parameter: a
+# power of 2, of which the square and the rounding over it are some 1e-18 and 1e-20.
+STEP = 2.0**-29
+
+# Chebyshev coefficients of a displacement below this share of the largest are rounding if so many follow each other.
+MAX_NOISE, TERMS_IN_A_ROW = 1e-19, 3
+
+# Rows of a place: the number of its piece, and u on it as two doubles.
+PLACE = 3
+
+
+@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
+def fill_places(curve, number, ways, places):  # type: ignore[no-untyped-def]
+    """Fill the places (PLACE rows) at arc lengths, two doubles each, from the left edge of a piece."""
+    curve = unshared(curve)
+    for i in range(ways.shape[1]):
+        piece, at = place_at(curve, number, (ways[0, i], ways[1, i]))
+        places[0, i], places[1, i], places[2, i] = piece, at[0], at[1]
+
+
+@entry(types.void(TRUE_CURVE, MATRIX, MATRIX), checked=False)
+def fill_coordinates(curve, places, rows):  # type: ignore[no-untyped-def]
+    """Fill x, z and their derivatives by u, two doubles each, at places."""
+    curve, u, points = unshared(curve), stacked_places(), stacked_points()
+    for i in range(places.shape[1]):
+        u[0], u[RULE] = places[1, i], places[2, i]
+        fill_points(curve, int(places[0, i]), 1, u, points)
+        for row in range(8):
+            rows[row, i] = points[row * RULE]
+
+
+@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
+def fill_arcs(curve, start, places, arcs):  # type: ignore[no-untyped-def]
+    """Fill the arc lengths, two doubles each, from the left edge of a piece to places."""
+    curve = unshared(curve)
+    for i in range(places.shape[1]):
+        arcs[0, i], arcs[1, i] = arc_from(curve, start, int(places[0, i]), (places[1, i], places[2, i]))
+
+
+@entry(types.void(MATRIX, types.float64[:, :, ::1], MATRIX), checked=False)
+def fill_series(samples, fit, series):  # type: ignore[no-untyped-def]
+    """Fill the Chebyshev coefficients of functions, from their values at the Chebyshev points as two doubles each."""
+    for row in range(series.shape[0]):
+        for j in range(NODES):
+            high, low = 0.0, 0.0
+            for i in range(NODES):
+                part, part_low = multiply(samples[2 * row, i], samples[2 * row + 1, i], fit[0, j, i], fit[1, j, i])
+                high, low = add(high, low, part, part_low)
+            series[row, j] = high
+
+
+def shaping_of(formulas: Formulas) -> tuple[int, ...]:
+    """The run-time parameters that shape a charted curve, by their place; all of them where that is not known."""
+    assert formulas.chart is not None
+    shaped_by = formulas.chart.shaped_by
+    return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
+
+
+class ShapedPieces:
+    """The true pieces of a curve, and those for neighbouring values of the parameters that shape it.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch with its module.
+    pieces : TruePieces
+        The curve.
+    shaping : tuple of int
+        The parameters.
+    """
+
+    def __init__(self, problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> None:
+        self.pieces, maker, chart = pieces, problem.formulas.chart, problem.formulas.charted(problem.p)
+        assert maker is not None
+        self._smoothed: dict[int, Array] = {}
+        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]
+
+    def _make(self, first: int, last: int) -> None:
+        """Make the pieces of all curves between two numbers."""
+        for side in (self.pieces, *(side for _, *sides in self._beside for side in sides)):
+            side.make(first, last)
+
+    def coordinates(self, places: Array) -> Array:
+        """The points at places with the displacements, two doubles each: the coordinates that programs take."""
+        self._make(int(places[0].min()), int(places[0].max()))
+        rows, curvature = [np.empty((8, places.shape[1]))], np.zeros((2, places.shape[1]))
+        fill_coordinates(self.pieces.curve, places, rows[0])
+        if self._beside:
+            _, _, dx, dz, bend_x, bend_z = _derivatives(self.pieces.curve.terms[:, ::2], places, 3)
+            curvature[0] = (dx * bend_z - dz * bend_x) / (dx * dx + dz * dz) ** 1.5
+        rows.append(curvature)
+        for step, *sides in self._beside:
+            before, after = np.empty((2, *rows[0].shape))
+            fill_coordinates(sides[0].curve, places, before)
+            fill_coordinates(sides[1].curve, places, after)
+            rows.append(_quotient(before[:4], after[:4], step))
+        return np.concatenate(rows)
+
+    def places(self, high: Array, low: Array | float = 0.0) -> Array:
+        """The places (PLACE rows) at arc lengths from the start point."""
+        pieces, places = self.pieces, np.empty((PLACE, high.size))
+        numbers = [pieces.number_of(float(place)) for place in (high.min(), high.max())] if high.size else [0]
+        pieces.make(min(*numbers, pieces.begin) - 1, max(*numbers, pieces.begin) + 1)
+        (start, start_low), from_edge = pieces.start_length, np.empty((2, high.size))
+        from_edge[0] = total = high + start
+        from_edge[1] = (high - (total - start)) + (start - (total - (total - start))) + (start_low + low)
+        fill_places(pieces.curve, pieces.begin, from_edge, places)
+        return places
+
+    def lengthened(self, places: Array) -> Array:
+        """How much longer the way from the start point to points of equal u gets: a row for each parameter."""
+        self._make(int(places[0].min()), int(places[0].max()))
+        found = []
+        for step, *sides in self._beside:
+            before, after = np.empty((2, 2, places.shape[1]))
+            for side, arcs in zip(sides, (before, after), strict=True):
+                side.make(min(int(places[0].min()), side.begin), max(int(places[0].max()), side.begin))
+                fill_arcs(side.curve, side.begin, places, arcs)
+                arcs -= np.array(side.start_length)[:, None]
+            found.append(_quotient(before, after, step)[0])
+        return np.array(found).reshape(-1, places.shape[1])
+
+    def shifts(self, places: Array) -> Array:
+        """How much farther from the start point the points of the curve at places get: a row for each parameter."""
+        rows = self.coordinates(places)[::2]
+        (dx, dz), moved = rows[2:4], rows[POINT:]
+        # Points of equal u are displaced along the curve, too.
+        shifts: Array = self.lengthened(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        return shifts
+
+    def path(self, places: Array, orders: int = 4) -> Array:
+        """The coordinates in doubles, with all derivatives by u below an order; of displacements there are three."""
+        if places.size:
+            self._make(int(places[0].min()), int(places[0].max()))
+        rows = [_derivatives(self.pieces.curve.terms[:, ::2], places, orders)]
+        if self._beside:
+            count = len(self.pieces.curve.counts)
+            for k in np.unique(places[0].astype(np.int64) % count).tolist():
+                if k not in self._smoothed:
+                    self._smoothed[k] = self._smooth(k)
+            terms = np.zeros((count, 2 * len(self._beside), NODES))
+            for k, found in self._smoothed.items():
+                terms[k] = found
+            rows += [_derivatives(terms[:, 2 * i : 2 * i + 2], places, 3) for i in range(len(self._beside))]
+        return np.concatenate(rows)
+
+    def _smooth(self, k: int) -> Array:
+        """The displacements on a piece as powers of u, for each parameter those of x and of z.
+
+        They are cut where their Chebyshev coefficients are rounding, so that their derivatives are not.
+        """
+        places = np.array([np.full(NODES, float(k)), *sample_places()])
+        samples = self.coordinates(places)[2 * POINT :]
+        series = np.empty((len(samples) // 2, NODES))
+        fill_series(samples, chebyshev_fit(), series)
+        powers = np.zeros_like(series)
+        for row, terms in zip(powers, series, strict=True):
+            is_large = np.abs(terms) > MAX_NOISE * np.abs(terms).max()
+            used = next((k for k in range(NODES) if not is_large[k : k + TERMS_IN_A_ROW].any()), NODES)
+            row[:used] = cheb2poly(np.append(terms[:used], 0.0))[:used]
+        return powers
+
+
+def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, TruePieces, TruePieces]:
+    """A step of a parameter, and the curve for values before and after it."""
+    size = abs(p[k].value) or 1.0
+    step = STEP * 2.0 ** np.floor(np.log2(size))
+    sides = []
+    for sign in (-1, 1):
+        value = p[k].fraction
+        moved = Fraction(p[k].value) + Fraction(p[k].low) if value is None else value
+        numbers = list(p)
+        numbers[k] = read_number(moved + sign * Fraction(step), where="p")
+        sides.append(true_pieces_of(maker, tuple(numbers), chart))
+    if None in sides:
+        raise SolutionError(UNDECIDED)
+    return step, *sides
+
+
+def _quotient(before: Array, after: Array, step: float) -> Array:
+    """The difference quotient of rows of two doubles each, over twice the step, which is a power of 2."""
+    high, low = after[::2] - before[::2], after[1::2] - before[1::2]
+    total = high + low
+    out = np.empty_like(before)
+    out[::2], out[1::2] = total / (2.0 * step), ((high - total) + low) / (2.0 * step)
+    return out
+
+
+def _derivatives(terms: Array, places: Array, count: int) -> Array:
+    """Coordinates at places and their derivatives by u, from those of order 0 on, from coefficients in doubles."""
+    chosen, u = terms[places[0].astype(np.int64) % len(terms)], places[1]
+    rows, powers = [], np.vander(u, NODES, increasing=True)
+    for _ in range(count):
+        rows += np.einsum("nrj,nj->rn", chosen, powers).tolist()
+        chosen = np.pad(chosen[:, :, 1:] * np.arange(1, NODES), ((0, 0), (0, 0), (0, 1)))
+    return np.array(rows)

@@ -1,0 +1,65 @@
+"""Second derivatives of half periods and times of laps, recorded as tapes (`programs`)."""
+
+from functools import lru_cache
+from itertools import combinations_with_replacement
+
+from gqm_sym.runtime.double_double.recording import Recorder
+from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, Source, assemble, lap_rate
+
+
+@lru_cache(maxsize=16)
+def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
+    """As `turning_point_program`, and then the second derivatives by the variables in ``rows``, as `pairs_of` them."""
+    op = Recorder(source.variables)
+    here = source.local(op, op.place)
+    step, *moves = [-(part / here.half_slope) for part in (here.half, *here.half_partials)]
+    changes = {i: gradient(op, moves[i], [op.place, *op.values]) for i in rows}
+    seconds = [changes[i][1 + j] + changes[i][0] * moves[j] for i, j in pairs_of(rows)]
+    return assemble(op, [step, *moves, *seconds])
+
+
+def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
+    """The pairs of variables of which there are second derivatives: each with itself and those behind it."""
+    return list(combinations_with_replacement(rows, 2))
+
+
+@lru_cache(maxsize=16)
+def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
+    """The second derivatives of dt/dphi at the same phase angle, as `pairs_of` the variables in ``rows``.
+
+    The inputs are as of `libration_program`, with the second derivatives of each turning point behind its first ones.
+    """
+    n, pairs = source.variables, pairs_of(rows)
+    op = Recorder(n + 2 * (1 + n + len(pairs)))
+    a, b, *ends = op.values[n:]
+    low, high, share = ends[: len(ends) // 2], ends[len(ends) // 2 :], op.place
+    width = b - a
+    lam = a + width * share
+    half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, lam)
+    rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
+    by_launch = [op.number(0)] * LAUNCH_VARIABLES
+    moved = [at_low + (at_high - at_low) * share for at_low, at_high in zip(low, high, strict=True)]
+    wider = [(at_high - at_low) / width for at_low, at_high in zip(low, high, strict=True)]
+    # The changes of half of V**2 and of ds/dlam as a whole, for near the turning points the parts of them are large.
+    faster = [part + half_slope * move for part, move in zip(half_partials, moved, strict=False)]
+    longer = [part + ds_slope * move for part, move in zip([*ds_partials, *by_launch], moved, strict=False)]
+    log_rates = [wider[k] + longer[k] / ds - faster[k] / (2 * half) for k in range(n)]
+    second = {k: [gradient(op, q[k], [lam, *op.values[:n]]) for q in (faster, longer)] for k in rows}
+    outputs = []
+    for k, (i, j) in enumerate(pairs, start=n):
+        by_half, by_ds = (by[1 + j] + by[0] * moved[j] for by in second[i])
+        by_half, by_ds = by_half + half_slope * moved[k], by_ds + ds_slope * moved[k]
+        change = wider[k] - wider[i] * wider[j] + by_ds / ds - longer[i] * longer[j] / (ds * ds)
+        change = change - (by_half - faster[i] * faster[j] / half) / (2 * half)
+        outputs.append(rate * (log_rates[i] * log_rates[j] + change))
+    return assemble(op, outputs)
+
+
+@lru_cache(maxsize=16)
+def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
+    """The second derivatives of dt/dshare at the same share of a lap, as `pairs_of` the variables in ``rows``."""
+    op, *_, rate = lap_rate(source, direction)
+    first = gradient(op, rate, op.values[: source.variables])
+    second = {i: gradient(op, first[i], op.values[: source.variables]) for i in rows}
+    return assemble(op, [second[i][j] for i, j in pairs_of(rows)])

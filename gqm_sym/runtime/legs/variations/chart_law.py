@@ -1,0 +1,96 @@
+"""The law of a motion with losses along a chart, with its derivatives.
+
+The label of a point is its arc length along the curve as it is. With a parameter that shapes the curve, the point moves
+as that of equal u on its piece does (`charts.double_double.pieces`), so that pieces keep their edges, where forces may
+jump.
+"""
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.evaluation import fill_values
+from gqm_sym.runtime.gradients.orbit import PathRows, without_formulas
+from gqm_sym.runtime.interface import ExactChartLaw
+from gqm_sym.runtime.launch.formulas import true_pieces_of
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.legs.variations.law import FormulaLaw, Law, LawRows, States
+from gqm_sym.runtime.legs.variations.programs import (
+    ORDERS,
+    ChartForces,
+    chart_law_program,
+    chart_load_program,
+    chart_path_program,
+)
+
+# Places whose coordinates are found together.
+BLOCK = 4096
+
+
+class ChartLaw(Law):
+    """The law along a charted curve."""
+
+    by_arc_length = True
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        formulas = problem.formulas
+        assert formulas.chart is not None
+        pieces = true_pieces_of(formulas.chart, problem.p, formulas.charted(problem.p))
+        if not isinstance(formulas.exact, ExactChartLaw) or pieces is None:
+            raise without_formulas()
+        self._forces = ChartForces(formulas.exact, self.count, self.mass, shaping_of(formulas))
+        self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
+        self._launch = problem.launch.lam0
+
+    @property
+    def launch_moves(self) -> Array:
+        """As in `Law`: points that shift along the curve leave the place of the launch to others."""
+        moves = np.zeros(self.count + 2)
+        moves[self.count] = 1.0
+        place = self._shape.places(np.array([self._launch.value]), self._launch.low)
+        moves[list(self._forces.shaping)] = -self._shape.lengthened(place)[:, 0]
+        return moves
+
+    @property
+    def ranges(self) -> Array:
+        """As in `Law`: the ends of the curve keep their labels."""
+        return np.zeros((3, self.count))
+
+    def coordinates(self, states: States) -> Array:
+        """As in `Law`."""
+        return self._coordinates(states.high, states.low)
+
+    def _coordinates(self, high: Array, low: Array) -> Array:
+        """The coordinates of places, as two doubles each."""
+        parts = []
+        for start in range(0, max(high.size, 1), BLOCK):
+            some = slice(start, start + BLOCK)
+            parts.append(self._shape.path(self._shape.places(high[some], low[some]), ORDERS))
+        found = np.concatenate(parts, axis=1)
+        return np.stack([found, np.zeros_like(found)], axis=1).reshape(-1, high.size)
+
+    def rows(self, states: States) -> LawRows:
+        """As in `Law`."""
+        found = self.values(chart_law_program(self._forces), states)[:, 0]
+        stretches, slope = found[: self.count], found[self.count :]
+        return LawRows(
+            np.ones_like(states.w), np.zeros_like(states.w), stretches, slope[0], slope[1], slope[2], slope[3:]
+        )
+
+    def loads(self, states: States) -> Array:
+        """As in `Law`."""
+        found: Array = self.values(chart_load_program(self._forces), states)[:, 0]
+        return found
+
+    def path(self, high: Array, low: Array) -> PathRows:
+        """As in `Law`."""
+        program, places = chart_path_program(self._forces), self._coordinates(high, low)
+        found = np.empty((program.outputs.size, 3, high.size))
+        fill_values(program.operands, program.work, self.parameters, places, found)
+        return PathRows(*found[:, 0].reshape(5, self.count + 2, high.size))
+
+
+def law_of(problem: Problem) -> Law:
+    """The law of the motion of a launch."""
+    return FormulaLaw(problem) if problem.formulas.chart is None else ChartLaw(problem)

@@ -1,0 +1,161 @@
+"""The programs of variations: the law of a motion with losses and its derivatives, recorded as tapes."""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.gradients.programs import Program, assemble, load_per_mass
+from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
+
+
+@lru_cache(maxsize=64)
+def law_program(law: ExactLaw, parameters: int) -> Program:
+    """The law of a motion with losses at a place and a V**2, the two coordinates.
+
+    The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
+    place and the parameters, and dW/dlam, where W is V**2, and its derivatives by the place, W and the parameters.
+    """
+    op, ds, slope = _law(law, parameters)
+    (lam, w), p = op.places, op.values[:parameters]
+    return assemble(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
+
+
+@lru_cache(maxsize=64)
+def load_program(law: ExactLaw, parameters: int) -> Program:
+    """The slope of the contact force per mass along a motion with losses, and its derivatives by the place and by W.
+
+    The inputs are those of `law_program`.
+    """
+    op, _, slope = _law(law, parameters)
+    lam, w = op.places
+    load = load_per_mass(op, law, lam, w)
+    by_place, by_w = gradient(op, load, [lam, w])
+    load_slope = by_place + by_w * slope
+    return assemble(op, [load_slope, *gradient(op, load_slope, [lam, w])])
+
+
+def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
+    """A tape with ds/dlam and dW/dlam."""
+    op = Recorder(parameters + 2, coordinates=2)
+    (lam, w), p, signs = op.places, op.values[:parameters], op.values[parameters:]
+    return op, op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
+
+
+@lru_cache(maxsize=64)
+def force_program(law: ExactLaw, parameters: int) -> Program:
+    """dW/dlam at a place and a V**2, and its derivative by the place; the inputs are those of `law_program`."""
+    op, _, slope = _law(law, parameters)
+    return assemble(op, [slope, *gradient(op, slope, [op.place])])
+
+
+@lru_cache(maxsize=64)
+def range_program(domain: Callable[..., Any], parameters: int) -> Program:
+    """Both ends of the parameter's range and its period, each with its derivatives by the run-time parameters.
+
+    Those that do not exist are zero.
+    """
+    op = Recorder(parameters)
+    numbers = [0 if number is None else number for number in domain(op, op.values)]
+    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
+
+
+class ChartForces(NamedTuple):
+    """The formulas from which the programs of motions with losses along charts are recorded.
+
+    Attributes
+    ----------
+    law : ExactChartLaw
+        The formulas of a module.
+    parameters, mass : int
+        The number of run-time parameters, and which of them is the mass.
+    shaping : tuple of int
+        The parameters that shape the curve.
+    """
+
+    law: ExactChartLaw
+    parameters: int
+    mass: int
+    shaping: tuple[int, ...]
+
+
+# Derivatives of the coordinates x and z by u, from order 0 on, that tell a point of a chart, and how many of these tell
+# its curvature; there are as many of each displacement.
+ORDERS, CURVED = 5, 3
+
+
+class _ChartPoint:
+    """A tape with a point of a chart and V**2 there, as `ShapedPieces.path` tells it with `ORDERS`.
+
+    The inputs are the run-time parameters, sgn(ds/dt) and sgn(N).
+    """
+
+    def __init__(self, forces: ChartForces) -> None:
+        coordinates = 2 * ORDERS + 2 * CURVED * len(forces.shaping) + 1
+        op = Recorder(forces.parameters + 2, coordinates)
+        self.op, self._forces, self.w = op, forces, op.places[-1]
+        self.p, signs = op.values[: forces.parameters], op.values[forces.parameters :]
+        x, z, dx, dz, bend_x, bend_z = op.places[: 2 * CURVED]
+        square = dx * dx + dz * dz
+        self._speed = op.sqrt(square)
+        self.curvature = (dx * bend_z - dz * bend_x) / (square * self._speed)
+        point = (x, z, dx / self._speed, dz / self._speed, self.curvature)
+        self.x, self.z = x, z
+        self.load = op.number(forces.law.static_normal_load(op, *point, self.p))
+        self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
+        self.stretches = [op.number(0)] * forces.parameters
+        for k, moved in self._displacements():
+            self.stretches[k] = (dx * moved[2] + dz * moved[3]) / square
+
+    def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
+        """For each parameter that shapes the curve, the displacement with its derivatives by u."""
+        first, count = 2 * ORDERS, 2 * CURVED
+        starts = range(first, first + count * len(self._forces.shaping), count)
+        return [(k, self.op.places[i : i + count]) for k, i in zip(self._forces.shaping, starts, strict=True)]
+
+    def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
+        """The derivatives of a quantity of a point by arc length, by V**2, and by the run-time parameters."""
+        op, count = self.op, 2 * (ORDERS - 1)
+        *by_places, by_w = gradient(op, quantity, [*op.places[:count], self.w])
+        by_parameters = gradient(op, quantity, self.p)
+        along = sum((a * b for a, b in zip(by_places, op.places[2:], strict=False)), op.number(0)) / self._speed
+        for k, moved in self._displacements():
+            for a, b in zip(by_places, moved, strict=False):
+                by_parameters[k] = by_parameters[k] + a * b
+        return along, by_w, by_parameters
+
+
+@lru_cache(maxsize=64)
+def chart_law_program(forces: ChartForces) -> Program:
+    """The law at a point of a chart: how ways there are stretched by each parameter, and dW/dlabel with derivatives.
+
+    These are by the place, by W and by the parameters. Ways are longer by their stretch, and the change of W on them.
+    """
+    at = _ChartPoint(forces)
+    along, by_w, by_parameters = at.partials(at.slope)
+    by_parameters = [part + at.slope * stretch for part, stretch in zip(by_parameters, at.stretches, strict=True)]
+    return assemble(at.op, [*at.stretches, at.slope, along, by_w, *by_parameters])
+
+
+@lru_cache(maxsize=64)
+def chart_load_program(forces: ChartForces) -> Program:
+    """The slope of the contact force per mass along a motion, and its derivatives by the place and by W."""
+    at = _ChartPoint(forces)
+    along, by_w, _ = at.partials(at.curvature * at.w + at.load)
+    load_slope = along + by_w * at.slope
+    return assemble(at.op, [load_slope, *at.partials(load_slope)[:2]])
+
+
+@lru_cache(maxsize=64)
+def chart_path_program(forces: ChartForces) -> Program:
+    """Return the program of states at a point, as `gradients.programs.path_program` without a potential."""
+    at = _ChartPoint(forces)
+    op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
+    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load):
+        if quantity is None:
+            outputs += [op.number(1), *at.stretches, op.number(0)]
+        else:
+            along, _, by_parameters = at.partials(quantity)
+            outputs += [quantity, *by_parameters, along]
+    return assemble(op, outputs)

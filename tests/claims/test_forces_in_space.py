@@ -1,0 +1,229 @@
+"""Frames that turn and tracks that push to one side only, on space curves, beside Newton's law and DOP853."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import gqm_sym as gqm
+from gqm_sym.errors import DeclarationError, LaunchError, SolutionError
+
+Build = Callable[[str, Any, Any], ModuleType]
+Vector = np.ndarray[Any, np.dtype[np.float64]]
+
+# DOP853 at its tightest is right to some 1e-12 over a few seconds.
+INTEGRATED = 3e-11
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """Build a module once."""
+    folder, built = tmp_path_factory.mktemp("forces_in_space"), {}
+
+    def module(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
+        return built[name]
+
+    return module
+
+
+class Newton:
+    """A bead on a curve r(u) in a frame that turns about the z axis, by its forces as vectors."""
+
+    def __init__(self, curve: Callable[[float], tuple[Any, Any, Any]], omega: float = 0.0, mu: float = 0.0) -> None:
+        self.curve, self.omega, self.mu = curve, np.array([0.0, 0.0, omega]), mu
+
+    def forces(self, u: float, rate: float) -> tuple[Vector, Vector, Vector]:
+        """The contact force, the tangent and the applied force, per unit mass."""
+        place, first, second = (np.array(row) for row in self.curve(u))
+        tangent, velocity = first / np.linalg.norm(first), first * rate
+        applied = np.array([0.0, 0.0, -9.81]) - np.cross(self.omega, np.cross(self.omega, place) + 2.0 * velocity)
+        missing = second * rate**2 - applied
+        return missing - tangent * (tangent @ missing), tangent, applied
+
+    def __call__(self, _: float, state: Vector) -> list[float]:
+        """The rates of u, du/dt and the energy lost."""
+        u, rate, _ = state
+        _, first, second = (np.array(row) for row in self.curve(u))
+        contact, tangent, applied = self.forces(u, rate)
+        size, rubbing = float(np.linalg.norm(first)), self.mu * float(np.linalg.norm(contact))
+        along = tangent @ applied - rubbing * np.sign(rate) - tangent @ second * rate**2
+        return [rate, along / size, rubbing * size * abs(rate)]
+
+    def follow(self, lam0: float, v0: float, times: Any, event: Any = None) -> Any:
+        """Integrate from a launch."""
+        size = np.linalg.norm(self.curve(lam0)[1])
+        return solve_ivp(
+            self, (0.0, max(times)), [lam0, v0 / size, 0.0], "DOP853", times, events=event, rtol=1e-13, atol=1e-14
+        )
+
+
+def viviani(u: float) -> tuple[Any, Any, Any]:
+    """Viviani's curve with a radius of 1, and its first two derivatives."""
+    return (
+        (1.0 + np.cos(u), np.sin(u), 2.0 * np.sin(u / 2)),
+        (-np.sin(u), np.cos(u), np.cos(u / 2)),
+        (-np.cos(u), -np.sin(u), -np.sin(u / 2) / 2),
+    )
+
+
+VIVIANI = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter="u")
+
+
+def vectors(found: Any) -> Any:
+    """The contact force as rows of vectors."""
+    return np.stack([found.normal_x, found.normal_y, found.normal_z], axis=1)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+def test_a_frame_that_turns(mu: float, build: Build) -> None:
+    """Places and the contact force with its Coriolis part, on the way there and back; friction feels that part."""
+    frame = gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")
+    force, name = (frame + gqm.CoulombFriction(), "rough_turning") if mu else (frame, "turning")
+    module = build(name, VIVIANI, force)
+    numbers = {"mu": mu} if mu else {}
+    motion, newton = module.solve(-2, 4, t_max=30, **numbers), Newton(viviani, 1.5, mu)
+    turn = motion.legs[0].t_end
+    # DOP853 cannot pass the jump of friction at a turn; without friction it is asked far beyond.
+    times = np.array([0.1, 0.4, 0.7, 0.95]) * (turn if mu else motion.period)
+    truth, state = newton.follow(-2.0, 4.0, times).y, motion.state(times)
+    contact = np.array([newton.forces(*column[:2])[0] for column in truth.T])
+    assert state.lam == pytest.approx(truth[0], abs=INTEGRATED)
+    assert vectors(state) == pytest.approx(contact, abs=10 * INTEGRATED)
+    assert state.normal_force == pytest.approx(np.linalg.norm(contact, axis=1), abs=10 * INTEGRATED)
+    assert motion.state(float(times[2])).normal_force == state.normal_force[2]
+    assert motion.energy(times).lost == pytest.approx(truth[2], abs=INTEGRATED)
+    for sign in (1, -1):
+        path = module.pass1(state.lam, lam0=-2, v0=4, direction=sign, **numbers)
+        same = np.sign(state.v) == sign
+        assert path.normal_force[same] == pytest.approx(state.normal_force[same], rel=1e-12)
+        if not mu:
+            assert np.all(np.abs(path.normal_force[~same] - state.normal_force[~same]) > 0.1)
+
+
+def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> None:
+    """No state is beyond them, and sweeps have the same numbers."""
+    module = build("turning", VIVIANI, gqm.Gravity() + gqm.RotatingFrame(Omega="3/2"))
+    motion = module.solve(-2, 4)
+    force = motion.state(np.linspace(0.0, motion.period, 2001)).normal_force
+    for extreme, told in ((motion.normal_force_max, force.max()), (motion.normal_force_min, force.min())):
+        assert extreme.value == pytest.approx(told, rel=1e-5)
+        assert motion.state(extreme.t).normal_force == pytest.approx(extreme.value, rel=1e-12)
+    assert module.sweep("normal_force_max", lam0=-2, v0=4.0).values == motion.normal_force_max.value
+    with pytest.raises(SolutionError, match="normal_force_max has none yet"):
+        motion.gradient("normal_force_max")
+    with pytest.raises(LaunchError, match="is not known in a frame that turns"):
+        module.solve(-2, 4, contact="above")
+
+
+def test_a_hoop_that_turns_is_the_planar_one(build: Build) -> None:
+    """A hoop in a plane through the axis moves as the planar curve; the track carries the Coriolis force as well."""
+    force = gqm.Gravity() + gqm.RotatingFrame(Omega=2)
+    flat = gqm.derive(gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u"), force)
+    model = gqm.derive(gqm.Curve.space(x="3/5*sin(u)", y="4/5*sin(u)", z="-cos(u)", parameter="u"), force)
+    assert model.speed_squared == flat.speed_squared
+    hoop = build("turning_hoop", model.curve, force).solve("1/2", 1)
+    state = hoop.state(np.linspace(0.0, hoop.period, 7))
+    # In the plane V**2 + (4*sin(u) - ...) balances; across it 2*Omega*V*dx/ds.
+    sideways = 2.0 * 2.0 * state.v * np.cos(state.lam)
+    in_plane = state.v2 + 9.81 * np.cos(state.lam) + 4.0 * np.sin(state.lam) ** 2
+    assert state.normal_force == pytest.approx(np.hypot(in_plane, sideways), rel=4e-15)
+    assert -0.8 * state.normal_x + 0.6 * state.normal_y == pytest.approx(sideways, abs=1e-13)
+
+
+def hill(u: float) -> tuple[Any, Any, Any]:
+    """A hill in a bend, and its derivatives."""
+    return (
+        (10.0 * u, 4.0 * np.sin(u / 2), 3.0 * np.cos(u)),
+        (10.0, 2.0 * np.cos(u / 2), -3.0 * np.sin(u)),
+        (0.0, -np.sin(u / 2), -3.0 * np.cos(u)),
+    )
+
+
+def upright(u: float, roll: float) -> Vector:
+    """The upward direction of riders at a roll angle from the level."""
+    tangent = np.array(hill(u)[1])
+    tangent /= np.linalg.norm(tangent)
+    left = np.cross([0.0, 0.0, 1.0], tangent)
+    left /= np.linalg.norm(left)
+    return np.cross(tangent, left) * np.cos(roll) + left * np.sin(roll)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05])
+def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
+    """Contact is lost where the contact force has no part along the upward direction any more, as DOP853 finds."""
+    curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="3*cos(u)", parameter="u", roll="u/10")
+    rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/20")
+    module = build("rough_groove", curve, rough) if mu else build("groove", curve, gqm.Gravity())
+    newton = Newton(hill, mu=mu)
+
+    def lifts(_: float, state: Vector) -> float:
+        return float(newton.forces(state[0], state[1])[0] @ upright(state[0], state[0] / 10))
+
+    lifts.terminal = True  # type: ignore[attr-defined]
+    truth = newton.follow(-3.0, 30.0, [2.0], lifts)
+    motion = module.solve(-3, 30, contact="above")
+    assert [event.kind for event in motion.events] == ["liftoff"]
+    assert motion.t_end == pytest.approx(truth.t_events[0][0], abs=INTEGRATED)
+    assert motion.events[0].lam == pytest.approx(truth.y_events[0][0][0], abs=INTEGRATED)
+    state = motion.state(motion.t_end)
+    assert state.n_vertical == pytest.approx(0.0, abs=1e-12)
+    # The sides of the groove still push.
+    assert abs(state.n_lateral) > 0.01
+    assert state.normal_force == pytest.approx(9.80665 * abs(state.n_lateral), rel=1e-12)
+    held = module.solve(-3, 30, t_max=2)
+    assert held.events[0].kind == "contact-sign"
+    assert held.events[0].t == pytest.approx(motion.t_end, rel=1e-13)
+    assert module.solve(-3, 5, contact="above", t_max=2).events[-1].kind == "horizon"
+    assert module.sweep("t_end", lam0=-3, v0=[5.0, 30.0], contact="above", t_max=2.0).values == pytest.approx(
+        [2.0, motion.t_end], rel=1e-13
+    )
+    below = module.solve(-3, 30, contact="below")
+    assert (below.t_end, below.events[0].kind) == (0.0, "liftoff")
+
+
+def test_random_space_curves_with_friction(build: Build) -> None:
+    """Places, speeds, contact forces and what friction takes, up to the first turn of launches on twelve curves."""
+    curve = gqm.Curve.space(
+        x="a*cos(u) + b*sin(2*u)", y="c*sin(u) + d*cos(2*u)", z="h*cos(u + e) + k*sin(3*u)", parameter="u"
+    )
+    module = build("random_rough", curve, gqm.Gravity() + gqm.CoulombFriction())
+    rng = np.random.default_rng(21)
+    for _ in range(12):
+        a, c = rng.uniform(1.0, 4.0, 2)
+        b, d, h, k = rng.uniform(-0.8, 0.8, 4)
+        e, mu, lam0, v0 = rng.uniform(0.0, 6.0), rng.uniform(0.01, 0.4), rng.uniform(0.0, 6.0), rng.uniform(2.0, 6.0)
+
+        def place(u: float, o: tuple[float, ...] = (a, b, c, d, h, e, k)) -> tuple[Any, Any, Any]:
+            a, b, c, d, h, e, k = o
+            s, t, q = np.sin, np.cos, u + e
+            return (
+                (a * t(u) + b * s(2 * u), c * s(u) + d * t(2 * u), h * t(q) + k * s(3 * u)),
+                (-a * s(u) + 2 * b * t(2 * u), c * t(u) - 2 * d * s(2 * u), -h * s(q) + 3 * k * t(3 * u)),
+                (-a * t(u) - 4 * b * s(2 * u), -c * s(u) - 4 * d * t(2 * u), -h * t(q) - 9 * k * s(3 * u)),
+            )
+
+        newton = Newton(place, mu=mu)
+        motion = module.solve(lam0, v0, t_max=1.5, a=a, b=b, c=c, d=d, h=h, k=k, e=e, mu=mu)
+        times = np.array([0.2, 0.6, 0.95]) * motion.legs[0].t_end
+        truth, state = newton.follow(lam0, v0, times).y, motion.state(times)
+        contact = np.array([newton.forces(*column[:2])[0] for column in truth.T])
+        assert state.lam == pytest.approx(truth[0], abs=INTEGRATED)
+        size = np.linalg.norm(contact, axis=1)
+        assert vectors(state) == pytest.approx(contact, abs=10 * INTEGRATED * size.max())
+        assert motion.energy(times).lost == pytest.approx(truth[2], abs=INTEGRATED * 10)
+
+
+def test_sides_that_nothing_tells_are_refused(build: Build) -> None:
+    """One error says what to declare."""
+    module = build(
+        "coordinated_hill", gqm.Curve.space(x="u", y="u**2", z="u**3", parameter="u", roll="coordinated"), gqm.Gravity()
+    )
+    with pytest.raises(LaunchError, match="declare the upward direction"):
+        module.solve(0, 1, contact="above")
+    with pytest.raises(DeclarationError, match="rotating_frame: a turning frame is not known of a train"):
+        gqm.derive(VIVIANI, gqm.Gravity() + gqm.RotatingFrame() + gqm.Train(length=1))

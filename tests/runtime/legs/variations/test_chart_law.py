@@ -1,0 +1,115 @@
+"""Derivatives of motions with losses along charts: against the circle as a formula, and closed forms on a rail."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from paths import ROOT
+
+import gqm_sym as gqm
+from gqm_sym.loading import load
+
+# The goal for derivatives through legs, as a share of the largest of an array.
+TOLERANCE = 1e-13
+
+
+@pytest.fixture(scope="module")
+def ring(generated_folder: Path) -> ModuleType:
+    """A rough circle as an implicit curve, in arc length from the bottom."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="3/20", mu_static="1/5")
+    return gqm.build(gqm.derive(curve, force), name="rough_ring", folder=generated_folder)
+
+
+@pytest.fixture(scope="module")
+def rail(generated_folder: Path) -> ModuleType:
+    """A line down, an arc and a line up, with friction: the curvature jumps between them, and so does the force."""
+    pieces = [gqm.line(length="p"), gqm.arc(radius="r", angle="6/5"), gqm.line(length=3)]
+    curve = gqm.Curve.piecewise(pieces, heading="-h", parameters={"p": 2, "r": "3/2", "h": "3/10"})
+    model = gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction(mu="1/2"))
+    return gqm.build(model, name="rough_rail", folder=generated_folder)
+
+
+LAUNCHES = [
+    (1.5, 1.25, 0.5, (0.1, 0.7, 1.9, 3.0)),
+    (0.3, 1.1, 9.0, (0.3, 0.9, 2.0, 2.7)),
+    (-0.4, 1.1, -9.0, (0.3, 0.9, 2.0, 2.7)),
+    (1.0, 1.0, 0.0, (0.3, 0.9, 1.5)),
+]
+
+
+@pytest.mark.parametrize(("arc", "radius", "v0", "times"), LAUNCHES)
+def test_states_on_a_circle(arc: float, radius: float, v0: float, times: tuple[float, ...], ring: ModuleType) -> None:
+    """Sensitivities, ends and turning points are those of the circle as a formula, also over laps."""
+    circle = load(str(ROOT / "generated" / "circle_coulomb.py"), "circle_coulomb")
+    speed = {"v0": abs(v0), "direction": 1 if v0 >= 0.0 else -1}
+    one, other = ring.solve(lam0=arc, R=radius, **speed), circle.solve(lam0=f"{arc!r}/{radius!r}", L=radius, **speed)
+    found, wanted = one.sensitivity(np.array(times)), other.sensitivity(np.array(times))
+
+    def on_circle(name: str, by: Callable[[str], Any]) -> Any:
+        """The derivative at a given arc length of launch, from those at a given angle of it."""
+        if name == "R":
+            return by("L") - arc / radius**2 * by("lam0")
+        return by("lam0") / radius if name == "lam0" else by(name)
+
+    rows = dict(zip(wanted.wrt, range(len(wanted.wrt)), strict=True))
+    for field in ("x", "z", "v", "normal_force", "lam"):
+        for name, row in zip(found.wrt, getattr(found, field), strict=True):
+            truth = on_circle(name, lambda key, f=field: getattr(wanted, "s" if f == "lam" else f)[rows[key]])
+            truth = truth + (field == "lam" and name == "lam0")
+            assert np.abs(row - truth).max() <= TOLERANCE * max(np.abs(truth).max(), 1e-3), (field, name)
+    ends, on_formula = one.gradient("t_end"), other.gradient("t_end")
+    size = max(map(abs, on_formula.values()))
+    for name, value in ends.items():
+        assert abs(value - on_circle(name, on_formula.__getitem__)) <= TOLERANCE * size, name
+    turns, of_formula = one.gradient("turning_points", "v0")["v0"], other.gradient("turning_points", "v0")["v0"]
+    assert np.abs(np.array(turns) - radius * np.array(of_formula)).max() <= TOLERANCE * 10.0
+
+
+def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> tuple[Any, Any, Any]:
+    """The turn on the line up, the place of rest on the arc, and the contact force where the arc begins.
+
+    On each piece dW/ds = -2 g sin(theta) - 2 v mu (g cos(theta) + W/radius), with the closed form of the arc.
+    """
+    w = v0**2 + 2 * g * (mp.sin(h) - mu * mp.cos(h)) * (p - lam0)
+    force = g * mp.cos(h) + w / r
+
+    def potential(theta: Any, v: int) -> Any:
+        """A solution on the arc, so that W less it is an exponential of -2 v mu theta."""
+        k = 2 * v * mu
+        return 2 * g * r * ((1 - k * v * mu) * mp.cos(theta) - (k + v * mu) * mp.sin(theta)) / (1 + k * k)
+
+    begin, end = -h, mpf(6) / 5 - h
+    w = potential(end, 1) + (w - potential(begin, 1)) * mp.exp(-2 * mu * (end - begin))
+    up = w / (2 * g * (mp.sin(end) + mu * mp.cos(end)))
+    w = 2 * g * (mp.sin(end) - mu * mp.cos(end)) * up
+
+    def left(theta: Any) -> Any:
+        """W on the way back."""
+        return potential(theta, -1) + (w - potential(end, -1)) * mp.exp(2 * mu * (theta - end))
+
+    rest = mp.findroot(left, (-mpf(1) / 5, end / 2), solver="anderson")
+    return p + r * (end - begin) + up, p + r * (rest - begin), force
+
+
+def test_jumps_of_the_force(rail: ModuleType) -> None:
+    """Turning points, the place of rest and the largest force, by launch, force and shape of the rail."""
+    launch = {"lam0": "1/2", "v0": "9", "p": "2", "r": "3/2", "h": "3/10", "g": "981/100", "mu": "1/2"}
+    motion = rail.solve(**launch)
+    turns, rest, force = (motion.gradient(q) for q in ("turning_points", "rest_position", "normal_force_max"))
+    with mp.workdps(40):
+        exact = {name: mpf(text.split("/")[0]) / mpf((text + "/1").split("/")[1]) for name, text in launch.items()}
+        values = along_rail(**exact)
+        assert motion.turning_points[0] == pytest.approx(float(values[0]), rel=1e-14)
+        for name in launch:
+            slopes = [
+                float(mp.diff(lambda x, k=k, n=name: along_rail(**{**exact, n: x})[k], exact[name], h=mpf(10) ** -15))
+                for k in range(3)
+            ]
+            found = (turns[name][0], rest[name], force[name])
+            for value, slope in zip(found, slopes, strict=True):
+                assert abs(value - slope) <= TOLERANCE * max(1.0, abs(slope)), name
