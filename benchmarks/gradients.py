@@ -4,6 +4,7 @@ import importlib
 from math import cos, sin
 from typing import Any
 
+import gradient_peers
 import numpy as np
 from legs import MU, SPEED, START
 from measure import Row, apart
@@ -84,6 +85,7 @@ def late_states() -> list[Row]:
             who = "DOP853 on the variational equations, tolerance 1e-13"
             repeats = 5 if t < 10 else 1
             rows.append(Row(work, who, lambda t=t: by_variational_equation(t), error, repeats=repeats, unit="of scale"))
+        rows += gradient_peers.after(work, t, error)
     return rows
 
 
@@ -133,7 +135,7 @@ def half_period() -> list[Row]:
 
         slope = jax.jit(jax.jacfwd(rule))
         rows.append(Row(work, f"JAX's `jacfwd` of {NODES} nodes of Legendre's form", lambda: float(slope(1.2)), error))
-    return rows
+    return [*rows, *gradient_peers.half_period(work, error)]
 
 
 def through_legs() -> list[Row]:
@@ -161,6 +163,7 @@ def through_legs() -> list[Row]:
     return [
         Row(work, "`solve(...).gradient`", ours, error, line=1e-13),
         Row(work, "central differences of `turning_points`", differences, error),
+        *gradient_peers.through_legs(work, error),
     ]
 
 

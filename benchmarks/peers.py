@@ -10,7 +10,7 @@ import numpy as np
 from measure import Row, repeated
 from numpy.typing import NDArray
 
-PEERS = ("heyoka", "quadax")
+PEERS = ("heyoka", "quadax", "jax", "diffrax")
 # Intervals of the trapezoidal rule in heyoka's compiled function: as many as the widest swing needs.
 NODES = 32
 # quadax takes 0.1 ms an orbit.

@@ -47,7 +47,9 @@ def _split_names(app: Any, what: str, name: str, obj: Any, options: Any, lines: 
 
 
 def _link_notebooks(app: Any, page: str, source: list[str]) -> None:
-    """Let links to notebooks, which are files of the repository, lead to their pages on the site."""
+    """Let links between pages and notebooks, which are files of the repository, lead to their pages on the site."""
+    if page.startswith("made/"):
+        source[0] = source[0].replace("](../docs/", "](../")
     source[0] = re.sub(r"\]\(\.\./((?:\.\./)*)notebooks/(\w+)\.ipynb\)", r"](\1made/\2.ipynb)", source[0])
 
 

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym import design, figures, jax
+    from gqm_sym import design, figures, jax, torch
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line, transition
     from gqm_sym.derivation import Model, derive
@@ -62,6 +62,7 @@ _HOMES = {
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
     "read_track": "gqm_sym.specfile",
+    "torch": "gqm_sym.torch",
     "transition": "gqm_sym.declare",
     "uncertainty": "gqm_sym.fitting.uncertainty",
 }
@@ -95,6 +96,7 @@ __all__ = [
     "read_spec",
     "read_sweep",
     "read_track",
+    "torch",
     "transition",
     "uncertainty",
 ]

@@ -22,7 +22,7 @@ _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 # Of a name with fewer letters than this, one of two letters may be wrong.
 MIN_LENGTH = 4
-# The most things in order that an argument may have: what has no end is no list of them.
+# The largest number of items in an argument, so that endless iterators are refused.
 MAX_ITEMS = 2_000_000
 # No longer path is the name of a file.
 MAX_PATH = 4096
@@ -108,6 +108,23 @@ def not_given(name: str) -> str:
     return f"{name}: has no default and was not given; pass {name}=..."
 
 
+def launch_arguments(
+    called: str, defaults: Mapping[str, Any], lam0: Any, v0: Any, parameters: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return launch and parameters by name, for a function of a module with these defaults.
+
+    Raises
+    ------
+    ArgumentError
+        If a name is no parameter, or if a parameter without default was not given.
+    """
+    if unknown := sorted(set(parameters) - set(defaults)):
+        raise ArgumentError(unknown_argument(called, unknown[0], ("lam0", "v0", *defaults)))
+    if unset := [name for name, value in defaults.items() if value is None and name not in parameters]:
+        raise ArgumentError(not_given(unset[0]))
+    return {"lam0": lam0, "v0": v0, **parameters}
+
+
 def short(value: object) -> str:
     """A value as a message shows it: on one line, and not too long."""
     text = " ".join(repr(value).split())
@@ -152,7 +169,7 @@ def compiled_model(module: Any, *, where: str) -> Any:
 
 
 def names(given: Any, *, where: str) -> tuple[str, ...]:
-    """Return names, of which one may stand alone."""
+    """Return names; a single name may be given without a list."""
     what = "names, as in ('a', 'b')"
     listed = (given,) if isinstance(given, str) else several(given, where=where, what=what)
     for name in listed:
@@ -170,7 +187,7 @@ def file_path(given: Any, *, where: str) -> Path:
 
 
 def one_line(given: Any, *, where: str) -> str:
-    """Return a text for people."""
+    """Return a text that describes the object."""
     if not isinstance(given, str):
         raise DeclarationError(f"{where}: must be text, got {short(given)}")
     return given

@@ -70,7 +70,7 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
 
 
 @contextmanager
-def apart() -> Iterator[None]:
+def outside_budgets() -> Iterator[None]:
     """Let the block's time count for no stage around it: what it does is bounded by its size."""
     around, begin = _CURRENT.get(), thread_time()
     token = _CURRENT.set(None)

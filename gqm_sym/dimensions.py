@@ -33,7 +33,7 @@ class Formulas:
     Attributes
     ----------
     equal
-        Pairs of a formula and its dimension; None where only its parts tell anything.
+        Pairs of a formula and its dimension; None where only its parts determine anything.
     variables
         Dimensions of symbols that are no parameters, None where one is to be found.
     """

@@ -297,7 +297,7 @@ def _check_bits(operands: list[sp.Expr], *, times: int = 1, most: int = _MAX_MEL
 
 
 def _proper(value: sp.Expr) -> sp.Expr:
-    """Refuse what is complex, infinite or undefined, and what SymPy would choke on later."""
+    """Refuse what is complex, infinite or undefined, and what SymPy would fail on later."""
     for node in sp.preorder_traversal(value):
         if node in _IMPROPER:
             raise ValueError("not a finite real number")

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.arguments import not_given, unknown_argument
-from gqm_sym.errors import InputError
+from gqm_sym.arguments import launch_arguments
 from gqm_sym.optional import require
 
 __all__ = ["half_period", "period"]
@@ -94,11 +93,7 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
         return value
 
     def function(lam0: Any, v0: Any = 0.0, **parameters: Any) -> Any:
-        if unknown := sorted(set(parameters) - set(module.PARAMETERS)):
-            raise InputError(unknown_argument(f"jax.{quantity}", unknown[0], ("lam0", "v0", *module.PARAMETERS)))
-        if unset := [name for name, value in module.PARAMETERS.items() if value is None and name not in parameters]:
-            raise InputError(not_given(unset[0]))
-        given = {"lam0": lam0, "v0": v0, **parameters}
+        given = launch_arguments(f"jax.{quantity}", module.PARAMETERS, lam0, v0, parameters)
         return differentiable(tuple(given))(*(jnp.asarray(value, dtype=float) for value in given.values()))
 
     return function

@@ -25,7 +25,7 @@ def load(path: str | os.PathLike[str], name: str) -> ModuleType:
     location = Path(path).resolve()
     spec = importlib.util.spec_from_file_location(name, location, loader=_Source(name, str(location)))
     if spec is None or spec.loader is None or not location.is_file():
-        raise InputError(f"{path}: is no generated module; run gqm-gen to write it")
+        raise InputError(f"{path}: is not a generated module; run gqm-gen to write it")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -19,19 +19,19 @@ FOLDER = Path(__file__).parent.parent / "docs" / "families"
 # What to know beyond the formulas: conventions, where the paper's Table 3 errs (ERRATA), what is known in closed form.
 REMARKS = {
     "cartesian_graph": (
-        "The parameter is x itself, so a vertical tangent needs another declaration (parametric, polar or implicit).",
+        "The parameter is x, so a curve with a vertical tangent needs another form: parametric, polar or implicit.",
         "sqrt(1 + phi'**2) stays in ds and in the time of flight: it is not only in the curvature.",
     ),
     "circle": (
-        "The angle is measured from the downward vertical and grows counter-clockwise: theta = 0 hangs at rest.",
-        "kappa > 0 means that the curve is run through counter-clockwise.",
-        "The pendulum's period is 4*sqrt(L/g)*K(sin(theta_max/2)), K the complete elliptic integral.",
+        "The angle is measured from the lowest point and increases counter-clockwise.",
+        "kappa > 0 means that the curve is traversed counter-clockwise.",
+        "The period of the pendulum is 4*sqrt(L/g)*K(sin(theta_max/2)), with the complete elliptic integral K(k).",
     ),
     "ellipse": ("theta is the eccentric angle, not the polar one; theta = -pi/2 is the lowest point.",),
     "parabola": ("The half period is an elliptic integral of the second kind.",),
     "log_spiral": (
         "The pole r = 0 lies at theta = -oo where b > 0, though at a finite arc length.",
-        "ds/dtheta is proportional to r: the turning angle grows with theta.",
+        "ds/dtheta is proportional to r, and the turning angle increases with theta.",
     ),
     "catenary": ("z = c at the lowest point, so heights are measured from the directrix.",),
     "cycloid": (
@@ -48,18 +48,19 @@ REMARKS = {
         "At theta = 0 it passes through the tip of the cone, with a tangent along the x axis and upwards.",
     ),
     "torus_knot": (
-        "p and q are whole numbers from 1 to 12 that are fixed when the curve is declared; with p = 2 and q = 3, which "
-        "they are if nothing is said, it is the trefoil.",
-        "Where p and q have a common divisor it is passed several times in 2*pi, and its period is shorter.",
+        "p and q are whole numbers from 1 to 12 that are fixed when the curve is declared. By default p = 2 and q = 3, "
+        "which is the trefoil.",
+        "If p and q have a common divisor, the curve is traversed several times in 2*pi, and its period is shorter.",
     ),
-    "viviani": ("Half of its period is a loop: it meets itself at the point (2*a, 0, 0).",),
+    "viviani": (
+        "The curve is a figure of eight that crosses itself at (2*a, 0, 0); each half of the period is one loop.",
+    ),
     "implicit": (
-        "The parameter is arc length from the point `start`; it grows along (-F_z, F_x)/|grad F| where tangent=1, "
-        "along the opposite where tangent=-1.",
+        "The parameter is arc length from the point `start`. It increases along (-F_z, F_x)/|grad F| with tangent=1, "
+        "and in the opposite direction with tangent=-1.",
         "The paper's +G/|grad F|**3, G = F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2, is the curvature for tangent=1; "
         "for tangent=-1 it is the negative.",
-        "x(s), z(s), alpha(s) and kappa(s) are no closed forms: the module traces them when it knows its parameters, "
-        "accurate to rounding.",
+        "x(s), z(s), alpha(s) and kappa(s) are not closed forms: the module traces the curve at run time, to rounding.",
         "A closed curve is recognised and closed on itself; where grad F = 0 (a node, a cusp) a motion ends.",
         "Without a domain an open curve is followed over 2000 pieces, or 10**9 times the length of the first, "
         "each way.",

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from gqm_sym import budgets
-from gqm_sym.budgets import apart, budget, spend
+from gqm_sym.budgets import budget, outside_budgets, spend
 from gqm_sym.errors import BudgetError
 
 
@@ -73,7 +73,7 @@ def _take(seconds: float) -> None:
 def _stages() -> None:
     with budget("outer", 0.05, "-"):
         with budget("inner", 0.05, "-"):
-            with apart():
+            with outside_budgets():
                 _take(0.1)
             spend()
         spend()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym import design, errors, figures, jax, runtime
+from gqm_sym import design, errors, figures, jax, runtime, torch
 from gqm_sym.declare import families
 from gqm_sym.runtime import Event, Leg, Motion, Sweep
 
@@ -46,6 +46,7 @@ def public() -> set[str]:
     names = {*gqm.__all__, *runtime.__all__} - {"compiler"}
     names |= {f"families.{name}" for name in families.names()} | {f"figures.{name}" for name in figures.__all__}
     names |= {f"design.{name}" for name in design.__all__} | {f"jax.{name}" for name in jax.__all__}
+    names |= {f"torch.{name}" for name in torch.__all__}
     for owner in CLASSES:
         names |= set(members(owner))
     return names - {f"{owner.__name__}.{name}" for owner in (Event,) for name in ("t", "lam", "x", "z")}

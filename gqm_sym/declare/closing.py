@@ -41,12 +41,12 @@ def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
         values = {symbol: value * share for symbol, value in tried_values(dict.fromkeys(unset)).items()}
         gap = _gap(point, lam, period, values)
         if gap is not None:
-            return _least(point, lam, period, values) if gap <= SHARE else None
+            return _least_share(point, lam, period, values) if gap <= SHARE else None
     return None
 
 
-def _least(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr | None:
-    """The least share of a period that is one; None of what does not move at all."""
+def _least_share(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr | None:
+    """The least fraction of a period after which a curve is where it was; None if the curve does not move."""
     for prime in PRIMES:
         for _ in range(MOST_TIMES):
             gap = _gap(point, lam, period / prime, values)
@@ -114,7 +114,7 @@ def _not_negative(form: sp.Expr) -> bool:
 
 
 def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> float | None:
-    """By how much of its size a curve is elsewhere after a period, at the worst; None where it has no numbers."""
+    """How far a curve is from where it was a period before, at most, as a share of its size; None without numbers."""
     length = float(period.xreplace(dict(values)))
     functions = [sp.lambdify(lam, form.xreplace(dict(values)), "math") for form in point]
 

@@ -10,7 +10,7 @@ from gqm_sym.arguments import checked, unknown_argument
 from gqm_sym.declare.banking import OF_PIECES, read_banking
 from gqm_sym.declare.declaration import Declaration, Source, declare, parameter_symbol
 from gqm_sym.declare.ends import read_ends
-from gqm_sym.declare.measures import told
+from gqm_sym.declare.measures import description
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import Parameters
@@ -96,7 +96,7 @@ class Curve(Declaration):
 
     def __str__(self) -> str:
         """Describe the curve in a few lines: its form, its range and the units of its parameters."""
-        return told(self)
+        return description(self)
 
     def plot(self, lam: Any = None, *, axes: Any = None, **parameters: Any) -> Any:
         """Draw the curve with Matplotlib, with its start and an arrow along increasing λ.

@@ -19,7 +19,7 @@ def read_ends(domain: Iterable[Source | None] | None, kind: str, unit: str | Non
     Raises
     ------
     DeclarationError
-        If it is no pair.
+        If it is not a pair.
     """
     if domain is None:
         return (None, None)

@@ -56,8 +56,8 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
     Raises
     ------
     DeclarationError
-        If F has neither x nor z, the start is no pair, or holds coordinates, the tangent is neither 1 nor -1, or a name
-        means two things.
+        If F has neither x nor z, the start is not a pair or contains coordinates, the tangent is neither 1 nor -1, or a
+        name has two meanings.
     """
     if parameter in COORDINATES:
         raise DeclarationError(

@@ -22,7 +22,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def radius(self) -> sp.Expr | None:
-        """Of a polar curve."""
+        """The radius of a polar curve; None for any other."""
 
     @property
     def parameter(self) -> sp.Symbol:
@@ -30,7 +30,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def period(self) -> sp.Expr | None:
-        """Of a closed curve."""
+        """The period of a closed curve's parameter; None for any other."""
 
     @property
     def title(self) -> str:
@@ -42,7 +42,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def banking(self) -> Banking | None:
-        """Of a space curve, how it is banked."""
+        """How a space curve is banked; None for any other."""
 
 
 PER_LENGTH = dimension(metre=-1)
@@ -115,7 +115,7 @@ def units_of(curve: DeclaredCurve) -> dict[str, str]:
     return {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
 
 
-def told(curve: DeclaredCurve) -> str:
+def description(curve: DeclaredCurve) -> str:
     """Describe a curve in a few lines."""
     units = units_of(curve)
     lines = [f"{curve.title or 'Curve'}: {_what(curve)}", *(f"  {name} = {form}" for name, form in _forms(curve))]

@@ -28,7 +28,7 @@ RESTLESS = 0.5
 # if it changes loads by this many g where a body is as fast as after a fall from one side of the track to the other.
 FELT = 0.1
 
-# So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
+# So many turns in a row, to alternating sides and by more than this, are a zigzag through which no smooth track passes:
 # the lengths of the spline between such points never settle.
 ZIGZAGS, ZIGZAG = 5, pi / 9
 

@@ -101,7 +101,7 @@ def _read(value: Any, count: int) -> tuple[str, float]:
     if isinstance(value, str | Decimal):
         text = str(value).strip()
         if not _DECIMAL.fullmatch(text):
-            raise DeclarationError(f"sampled: row {count}: {text[:40]!r} is no decimal number")
+            raise DeclarationError(f"sampled: row {count}: {text[:40]!r} is not a decimal number")
     elif isinstance(value, bool):
         raise DeclarationError(f"sampled: row {count}: {value} is no number")
     else:

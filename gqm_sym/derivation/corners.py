@@ -167,7 +167,7 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
     first = [differentiate(form, lam) for form in curve.point]
     forms = [form.xreplace(values) for form in (*first, *(differentiate(form, lam) for form in first))]
     size = 1 + abs(at)
-    sides = [_seen(forms, lam, at + way * step * size) for way in (-1, 1) for step in (NEAR, NEARER)]
+    sides = [_tangent_and_curvature(forms, lam, at + way * step * size) for way in (-1, 1) for step in (NEAR, NEARER)]
     if None in sides:
         return
     (_, left_far), (left, left_near), (_, right_far), (right, right_near) = (side for side in sides if side)
@@ -204,7 +204,7 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
         )
 
 
-def _seen(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, Vector] | None:
+def _tangent_and_curvature(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, Vector] | None:
     """The unit tangent and the curvature by each pair of coordinates; None where they are not real numbers."""
     values = [form.xreplace({lam: place}).evalf(DIGITS) for form in forms]
     if not all(value.is_real and value.is_finite for value in values):

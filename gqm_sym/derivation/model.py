@@ -38,8 +38,8 @@ def _read_v2(given: Any) -> sp.Expr:
 class Model:
     """Closed forms in the parameter λ, the launch (``lam0``, ``v0``) and run-time parameters.
 
-    Sections and equations: geometry MATHS, section 1; forces and the contact force MATHS, section 2 (paper, eq. 15);
-    turning points MATHS, section 3; time MATHS, section 4 (paper, eq. 17).
+    The geometry is that of MATHS, section 1. Forces and the contact force are in section 2 (paper, eq. 15), turning
+    points in section 3, and the time in section 4 (paper, eq. 17).
 
     Attributes
     ----------
@@ -371,7 +371,7 @@ class Model:
 
 
 def units_of(curve: Curve, kernel: Kernel) -> dict[str, str]:
-    """SI units of the curve's parameter and of the run-time parameters, as far as the formulas tell them."""
+    """Return the SI units of λ and of the run-time parameters, as far as the formulas determine them."""
     found = found_dimensions(curve_formulas(curve) + kernel_formulas(kernel), COMMON)
     units = {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
     own = parameter_dimension(curve)

@@ -32,7 +32,7 @@ from gqm_sym.derivation.forces.rider import rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
-from gqm_sym.derivation.geometry.offset_curve import beside
+from gqm_sym.derivation.geometry.offset_curve import offset_curve
 from gqm_sym.derivation.model import Model, units_of
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.symmetric_orbits import symmetric_orbits
@@ -117,7 +117,7 @@ def derive(
         heading = None
     may_be_positive = tuple(name for name in values if is_positive(values[name]))
     track = geometry(curve, may_be_positive=may_be_positive, heading=heading)
-    x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
+    x, z, shape = offset_curve(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
     y = without_poles(curve.y)
     body = forces((x, y, z), kernel, shape, lam)
     law = of_train(body, kernel, lam) if kernel.cars else body
@@ -128,7 +128,7 @@ def derive(
     if not kernel.conservative:
         loss = _losses(curve, kernel, (x, y, z), law, shape, upright or ())
         speed = dissipative_speed(kernel, law, shape, loss, curve)
-    pressure = shape.kappa * speed.held + law.static_normal_load
+    pressure = shape.kappa * speed.in_other_forms + law.static_normal_load
     dxds, dyds, dzds = shape.tangent
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
@@ -170,10 +170,12 @@ def derive(
         speed_squared=speed.squared,
         speed_squared_form=speed.form,
         normal_force=MASS * pressure,
-        side_force=sp.S.Zero if law.loads else 2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
+        side_force=sp.S.Zero
+        if law.loads
+        else 2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.in_other_forms) * shape.dxds,
         tangential_acceleration=acceleration,
-        time_integrand=shape.ds / sp.sqrt(speed.held),
-        regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
+        time_integrand=shape.ds / sp.sqrt(speed.in_other_forms),
+        regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.in_other_forms),
         turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
         liftoff_equation=None if law.loads else sp.Eq(pressure, 0, evaluate=False),
         liftoff_speed_squared=None if law.loads else _liftoff_speed(speed, shape.kappa, law.static_normal_load),
@@ -186,7 +188,7 @@ def derive(
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
     )
     if law.loads:
-        model = replace(model, normal_force=model.normal_force_at(speed.held))
+        model = replace(model, normal_force=model.normal_force_at(speed.in_other_forms))
     for label, form in model.closed_forms():
         check_real(form, where=label)
     if not curve.charted:

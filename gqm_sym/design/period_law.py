@@ -96,7 +96,7 @@ def from_period(
     Raises
     ------
     DeclarationError
-        If no track has this period: at the bottom, or up to the height that was asked for.
+        If no track has this period, at the bottom or up to the given height.
 
     Notes
     -----

@@ -10,6 +10,7 @@ from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import DIRECTION
+from gqm_sym.sympy_charts import chart_x, chart_z
 
 FORWARDS = {DIRECTION: sympy.S.One}
 """Contact forces that depend on the sign of ds/dt are those of motions forwards where functions are not told it."""
@@ -55,6 +56,18 @@ class Lowering:
         fixed = [call for call in ordered(calls) if {s.name for s in call.free_symbols} <= known]
         outermost = [call for call in fixed if not any(call != other and other.has(call) for other in fixed)]
         return {call: Symbol(f"_p{count}", real=True) for count, call in enumerate(outermost)}
+
+    @property
+    def coordinates(self) -> tuple[Symbol, Symbol]:
+        """The symbols of x and z in formulas of the plane."""
+        return self.names.symbol("x"), self.names.symbol("z")
+
+    def in_plane(self, form: Expr) -> Expr:
+        """A form of a charted curve by the coordinates of the body's path, as far as it depends on these."""
+        model, (x, z), radius = self.model, self.coordinates, self.model.force.radius
+        of_curve = {chart_x(self.place): x + radius * model.dzds, chart_z(self.place): z - radius * model.dxds}
+        found = form.xreplace(of_curve)
+        return sympy.expand(found) if radius and self.place in found.free_symbols else found
 
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
         """Yield the function that evaluates them, if there are any."""
@@ -121,7 +134,7 @@ class Lowering:
         Parameters
         ----------
         name, doc
-            The function's name, and what its docstring says.
+            The function's name, and the text of its docstring.
         arguments
             Between the number of places and the run-time parameters: the name of an array that has one element for
             each place, or the symbol of a single number.

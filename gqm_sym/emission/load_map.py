@@ -20,7 +20,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
     force = model.normal_force_at(v2).xreplace(FORWARDS)
-    grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
+    grown, outputs = with_named_exponentials((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
     return (
         lowering.function(
             "load_map",
@@ -33,7 +33,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     )
 
 
-def rising(
+def with_named_exponentials(
     forms: tuple[Expr, ...], symbol: Callable[[str], Symbol]
 ) -> tuple[list[tuple[Symbol, Expr]], tuple[Expr, ...]]:
     """Give names to exponentials whose reciprocals occur as well; return them and the forms that use them.

@@ -15,7 +15,6 @@ from gqm_sym.emission.printer import check_emittable
 from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
-from gqm_sym.sympy_charts import chart_x, chart_z
 
 FLAGS = ("friction", "kinked", "linear")
 """What a module says of a force law that is not conservative."""
@@ -236,9 +235,9 @@ class _ModelLowering(Lowering):
         """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""
         if self.model.curve.in_space:  # known in doubles only
             return ()
-        x, z = self.names.symbol("x"), self.names.symbol("z")
-        potential = self.model.effective_potential.xreplace({chart_x(self.place): x, chart_z(self.place): z})
-        if self.place in potential.free_symbols or self.model.ds != 1:
+        x, z = self.coordinates
+        potential = self.in_plane(self.model.effective_potential)
+        if self.place in potential.free_symbols:
             return ()
         outputs = (potential, differentiate(potential, x), differentiate(potential, z))
         doc = "U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."

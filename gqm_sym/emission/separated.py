@@ -6,7 +6,6 @@ from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, SeparatedIR
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import chart_x, chart_z
 
 # Terms of the potential and of the load together that are worth a table each.
 MAX_TERMS = 12
@@ -74,9 +73,8 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
 
 
 def _parts_in_plane(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR | None:
-    """The potential's parts by coordinates; None where they depend on more than those, or lam is no arc length."""
-    x, z = lowering.names.symbol("x"), lowering.names.symbol("z")
-    plane = tuple(part.xreplace({chart_x(lowering.place): x, chart_z(lowering.place): z}) for part in parts)
-    if lowering.model.ds != 1 or any(lowering.place in part.free_symbols for part in plane):
+    """The potential's parts by coordinates; None where they depend on more than those."""
+    plane = tuple(map(lowering.in_plane, parts))
+    if any(lowering.place in part.free_symbols for part in plane):
         return None
-    return lowering.exact_function("parts", "Parts of U, by coordinates.", plane, (x, z))
+    return lowering.exact_function("parts", "Parts of U, by coordinates.", plane, lowering.coordinates)

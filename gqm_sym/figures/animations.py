@@ -45,7 +45,7 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
     """
     from matplotlib.animation import FuncAnimation
 
-    end = horizon(motion) if duration is None else float(duration)
+    end = min(horizon(motion), motion.t_end) if duration is None else float(duration)
     if not end > 0.0:
         raise InputError(f"animate: duration: must be positive, got {duration!r}")
     if Path(path).suffix.lower() not in ANIMATED:

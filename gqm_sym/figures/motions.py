@@ -96,7 +96,7 @@ def _track_in_space(motion: "Motion", path: "State") -> "Figure":
 def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
     """Draw the places of states on axes of three dimensions, in the colours of values there, white where these are 0.
 
-    A bar beside the axes tells the values by their ``label``.
+    A colour bar beside the axes shows the values under their ``label``.
     """
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 

@@ -90,7 +90,7 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
     Raises
     ------
     InputError
-        If the body is no train, no roll was declared, or the limits are none.
+        If the body is not a train, no roll was declared, or the limits are not pairs of numbers.
     """
     check_banked(motion.problem.formulas, "seats")
     levels = _levels({} if limits is None else limits)
@@ -111,7 +111,7 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
 
 def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
     """Yield the first, the middle and the last car of a train, each with the least and the largest of its loads."""
-    cars = motion.cars(np.linspace(0.0, horizon(motion), SEAT_TIMES))
+    cars = motion.cars(np.linspace(0.0, min(horizon(motion), motion.t_end), SEAT_TIMES))
     loads = [getattr(cars, f"n_{load}") for load in LOADS]
     for seat, car in _seats(cars.lam.shape[0]):
         yield seat, *(end(felt[car]) for felt in loads for end in (np.min, np.max))

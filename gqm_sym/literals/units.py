@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from gqm_sym.budgets import apart
+from gqm_sym.budgets import outside_budgets
 from gqm_sym.errors import ExpressionError, InputError, NumberError
 from gqm_sym.literals import rationals
 from gqm_sym.literals.grammar import parse
@@ -151,7 +151,7 @@ def _power(symbol: str, power: int) -> str:
 
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    with apart():  # loading takes longer than a file may, once a process
+    with outside_budgets():  # loading takes longer than a file may, once a process
         from pint import UnitRegistry
 
         return UnitRegistry(non_int_type=Fraction)

@@ -87,7 +87,14 @@ def warm(files: tuple[str, ...] = (), processes: int = 0, progress: Callable[[in
     -------
     int
         The number of files.
+
+    Raises
+    ------
+    InputError
+        If a file is not a generated module, before anything is compiled.
     """
+    for file in files:
+        load(file, Path(file).stem)
     jobs = [*((compile_room, name) for name in rooms()), *((compile_module, file) for file in files)]
     with ProcessPoolExecutor(
         processes or os.cpu_count() or 1,

@@ -62,8 +62,8 @@ class Choice:
 class Criterion:
     """The function to be minimised.
 
-    For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: but for a constant an
-    unbiased estimate of how far the spline is from the true places of the points. (To ask for a residual of n s**2, the
+    For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: up to a constant an unbiased
+    estimate of the distance of the spline from the true places of the points. (To ask for a residual of n s**2, the
     discrepancy principle, fails where there are many points, as s is never known well enough for it.) Without one it is
     generalised cross-validation: how far splines through all points but one are from that one. The largest likelihood
     was tried as well; it lets so much noise through that loads are two to four times as wrong.
@@ -112,7 +112,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
         try:
             smoother = Smoother(u, points, basis, float(weights[-1]))
             fits = [smoother.fit(float(weight)) for weight in weights]
-        except np.linalg.LinAlgError:  # knots closer than doubles can tell apart
+        except np.linalg.LinAlgError:  # knots closer than doubles resolve
             break
         better = False
         for deviation in deviations:

@@ -121,7 +121,7 @@ def smooth(
     _check_turns(track, report, rows)
     smoothed = middle + track.at(places)
     if len(angles):
-        smoothed = np.column_stack([smoothed, _turned(track, np.asarray(angles, dtype=np.float64), places)])
+        smoothed = np.column_stack([smoothed, _roll_angles(track, np.asarray(angles, dtype=np.float64), places)])
     return smoothed, replace(report, points=points, places=middle + nearest)
 
 
@@ -139,7 +139,7 @@ def _across(along: Array, off: Array) -> Array:
     return _length(np.cross(along, off))
 
 
-def _turned(track: _Track, angles: Array, places: Array) -> Array:
+def _roll_angles(track: _Track, angles: Array, places: Array) -> Array:
     """Roll angles at places of a track, which were measured at its points."""
     choice, u, rate = track.choice, track.u, 0.0
     basis = choice.smoother.basis
@@ -212,7 +212,7 @@ def _speed(spline: Any, u: Array) -> Array:
 
 
 def _places(track: _Track, closed: bool) -> Array:
-    """Where the track is taken from its spline: at the points' places, or as often as its width asks for."""
+    """The places at which the track is sampled from its spline: at the points, or as often as its width requires."""
     choice, basis = track.choice, track.choice.smoother.basis
     low, high = track.u[0], track.u[-1]
     if closed:

@@ -33,7 +33,7 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     """
     pure = PurePath(name)
     if pure.is_absolute() or ".." in pure.parts or "\\" in name or ":" in name or "\0" in name:
-        raise InputError(f"{name!r}: must be a path from the YAML file's folder on, inside it, without '..'")
+        raise InputError(f"{name!r}: must be a path inside the YAML file's folder, without '..'")
     try:
         path = (folder / name).resolve(strict=True)
     except FileNotFoundError:

@@ -13,7 +13,7 @@ import sympy as sp
 from pydantic import BaseModel, ValidationError
 
 from gqm_sym.arguments import file_path, nearest
-from gqm_sym.budgets import apart, budget, spend
+from gqm_sym.budgets import budget, outside_budgets, spend
 from gqm_sym.declare import Curve
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.kernels import KERNELS, Kernel
@@ -158,7 +158,7 @@ class _Reader:
             row, given = CURVES[kind], _arguments(getattr(section, kind))
             if not row.reads_files:
                 return row.declare(given)
-            with apart():  # such files have limits of their own
+            with outside_budgets():  # such files have limits of their own
                 return row.declare(given, Path(self.mistakes.path).parent)
         except InputError as error:
             self.mistakes.add(*locate(self.tree, str(error), ("curve", kind)))

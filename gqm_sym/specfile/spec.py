@@ -83,7 +83,7 @@ class Spec:
         if self.launch is None:
             mistakes.add(
                 self.tree.mark,
-                "launch is missing, and to solve needs one",
+                "launch is missing, which is needed to solve",
                 "add it, as in launch: {lam0: 0.5, v0: 0}",
             )
         for name, value in model.defaults:

@@ -28,7 +28,7 @@ def expected_units(
     Parameters
     ----------
     data
-        The file, as far as it is right.
+        The valid part of the file.
     curve, kernel
         What it declares, None where that is wrong.
     given

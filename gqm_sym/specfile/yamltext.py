@@ -90,7 +90,7 @@ def _mark_in(text: str, index: int) -> Mark:
 
 
 def _check_text(text: str, mistakes: Mistakes) -> None:
-    """Refuse characters and lines that the scanner would stumble over."""
+    """Refuse characters and lines that the scanner cannot read."""
     if found := _NOT_YAML.search(text):
         mark = _mark_in(text, found.start())
         what = f"the character {found.group()!r} is not allowed in YAML"

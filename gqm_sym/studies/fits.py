@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
-from gqm_sym.budgets import apart
+from gqm_sym.budgets import outside_budgets
 from gqm_sym.derivation import Model
 from gqm_sym.emission import emit
 from gqm_sym.errors import InputError
@@ -115,7 +115,7 @@ class FitPlan:
     Attributes
     ----------
     title : str
-        One line for people.
+        One line of text for readers.
     data : dict
         The measurements, as `gqm_sym.fit` takes them, in SI.
     free, fixed : dict
@@ -193,7 +193,7 @@ class _FitReader(StudyReader[FitPlan]):
         file = self.validated(FitFile, model_at)
         if file is None:
             return None
-        with apart():  # curve files, derivations, emissions and tables have budgets of their own
+        with outside_budgets():  # curve files, derivations, emissions and tables have budgets of their own
             found = self.curve(file.curve)
             if found is None:
                 return None
@@ -213,7 +213,7 @@ class _FitReader(StudyReader[FitPlan]):
             self._check(data, model)
         if self.mistakes:
             return None
-        with apart():
+        with outside_budgets():
             module = emit(model, name=spec.name)
         return FitPlan(
             title=file.title, data=data, free=free, fixed=fixed, units=self.units, name=spec.name, module=module

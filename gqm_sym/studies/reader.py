@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from gqm_sym.arguments import file_path, nearest
-from gqm_sym.budgets import apart, budget
+from gqm_sym.budgets import budget, outside_budgets
 from gqm_sym.derivation import Model
 from gqm_sym.emission import emit
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
@@ -91,7 +91,7 @@ class StudyReader(ABC, Generic[P]):
 
     @abstractmethod
     def read(self) -> P | None:
-        """Return what the file asks for; None if it cannot be told."""
+        """Return the content of the file; None if it cannot be told."""
 
     def validated(self, schema: type[S], model_at: Callable[[tuple[str, ...]], Any]) -> S | None:
         """Return the file in the shape of its schema."""
@@ -196,7 +196,7 @@ class _SweepReader(StudyReader[Plan]):
         file = self.validated(SweepFile, model_at)
         if file is None:
             return None
-        with apart():  # curve files, derivations and emissions have budgets of their own
+        with outside_budgets():  # curve files, derivations and emissions have budgets of their own
             found = self.curve(file.curve)
             if found is None:
                 return None
@@ -208,7 +208,7 @@ class _SweepReader(StudyReader[Plan]):
         if self.mistakes:
             return None
         notes = {name: note.unit for name, note in spec.notes.items() if note.unit}
-        with apart():
+        with outside_budgets():
             module = emit(model, name=spec.name)
         solved_singly = model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed)
         return Plan(

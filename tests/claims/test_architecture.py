@@ -31,7 +31,7 @@ LAYERS = (
     {"parameters"},
     {"expressions"},
     {"fitting"},
-    {"figures", "export", "jax"},
+    {"figures", "export", "jax", "torch"},
     {"runtime", "runtime.vocabulary"},
     {"runtime.model"},
     {"runtime.sweep"},
@@ -80,6 +80,7 @@ TESTED_THROUGH = {
     "arithmetic/offsets.py": "claims/test_degenerate.py",
     "charts/arc_length.py": "runtime/charts/test_rail.py",
     "charts/continuation.py": "runtime/charts/test_tracing_ends.py",
+    "charts/double_double/offset_path.py": "claims/test_rolling.py",
     "charts/double_double/parts.py": "runtime/sweep/tables/test_times.py",
     "charts/double_double/pieces.py": "runtime/charts/double_double/test_passage.py",
     "charts/double_double/potential.py": "runtime/charts/double_double/test_passage.py",
@@ -175,6 +176,7 @@ TESTED_THROUGH = {
     "sweep/batch/turning_points.py": "runtime/sweep/batch/test_batches.py",
     "sweep/cluster.py": "studies/test_studies.py",
     "sweep/columns.py": "runtime/sweep/test_sweep.py",
+    "sweep/exact_orbits.py": "runtime/sweep/test_separatrices.py",
     "sweep/gradients.py": "runtime/gradients/test_sweep.py",
     "sweep/groups.py": "runtime/sweep/tables/test_times.py",
     "sweep/orbit.py": "runtime/sweep/test_sweep.py",
@@ -206,12 +208,13 @@ ONLY_IN = {
     "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
-    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing", "jax"},
+    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing", "jax", "torch"},
     "pint": {"literals"},
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},
     "scipy": {"runtime", "smoothing", "fitting", "design"},
+    "torch": {"torch"},
     "sympy": {
         "cli",
         "report",
@@ -231,7 +234,7 @@ ONLY_IN = {
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
 ONLY_INSIDE_FUNCTIONS = {
-    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "xarray"),
+    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "torch", "xarray"),
 }
 
 

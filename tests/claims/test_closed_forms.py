@@ -13,7 +13,7 @@ from textbook import Textbook
 import generated.circle_coulomb
 import generated.circle_drag
 import gqm_sym as gqm
-from gqm_sym.derivation.forces.particular_solution import particular
+from gqm_sym.derivation.forces.particular_solution import particular_solution
 
 DIGITS = 30
 # Of mpmath's quadrature, of the largest W on the way.
@@ -319,7 +319,7 @@ X, A, K = sp.symbols("x a k", real=True)
 )
 def test_particular_solutions(source: sp.Expr, decay: sp.Expr, solution: sp.Expr | None) -> None:
     """U' + Q U = P where U is a sum of products of functions in P and Q, and None elsewhere."""
-    found = particular(source, decay, X)
+    found = particular_solution(source, decay, X)
     assert (found is None) == (solution is None)
     if solution is not None:
         assert sp.simplify(found - solution) == 0

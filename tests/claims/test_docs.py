@@ -49,6 +49,14 @@ def test_the_pages_are_some() -> None:
     assert names >= {"README.md", "index.md", "start.md", "curves.md", "forces.md", "motions.md", "figures.md"}
 
 
+def test_every_notebook_is_in_the_index() -> None:
+    """The site lists it, and README links to it."""
+    index, readme = ((ROOT / name).read_text(encoding="utf-8") for name in ("docs/index.md", "README.md"))
+    for notebook in (ROOT / "notebooks").glob("*.ipynb"):
+        assert f"made/{notebook.stem}" in index
+        assert f"notebooks/{notebook.name}" in readme
+
+
 def test_the_example_file_is_right(tmp_path: Path) -> None:
     """The curve file of the how-to solves, and the mistake shown is what is said of it."""
     page = (DOCS / "howto" / "files.md").read_text(encoding="utf-8")

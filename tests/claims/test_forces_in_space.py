@@ -189,18 +189,18 @@ def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
 def test_random_space_curves_with_friction(build: Build) -> None:
     """Places, speeds, contact forces and what friction takes, up to the first turn of launches on twelve curves."""
     curve = gqm.Curve.space(
-        x="a*cos(u) + b*sin(2*u)", y="c*sin(u) + d*cos(2*u)", z="h*cos(u + e) + k*sin(3*u)", parameter="u"
+        x="a*cos(u) + b*sin(2*u)", y="c*sin(u) + d*cos(2*u)", z="h*cos(u + f) + k*sin(3*u)", parameter="u"
     )
     module = build("random_rough", curve, gqm.Gravity() + gqm.CoulombFriction())
     rng = np.random.default_rng(21)
     for _ in range(12):
         a, c = rng.uniform(1.0, 4.0, 2)
         b, d, h, k = rng.uniform(-0.8, 0.8, 4)
-        e, mu, lam0, v0 = rng.uniform(0.0, 6.0), rng.uniform(0.01, 0.4), rng.uniform(0.0, 6.0), rng.uniform(2.0, 6.0)
+        f, mu, lam0, v0 = rng.uniform(0.0, 6.0), rng.uniform(0.01, 0.4), rng.uniform(0.0, 6.0), rng.uniform(2.0, 6.0)
 
-        def place(u: float, o: tuple[float, ...] = (a, b, c, d, h, e, k)) -> tuple[Any, Any, Any]:
-            a, b, c, d, h, e, k = o
-            s, t, q = np.sin, np.cos, u + e
+        def place(u: float, o: tuple[float, ...] = (a, b, c, d, h, f, k)) -> tuple[Any, Any, Any]:
+            a, b, c, d, h, f, k = o
+            s, t, q = np.sin, np.cos, u + f
             return (
                 (a * t(u) + b * s(2 * u), c * s(u) + d * t(2 * u), h * t(q) + k * s(3 * u)),
                 (-a * s(u) + 2 * b * t(2 * u), c * t(u) - 2 * d * s(2 * u), -h * s(q) + 3 * k * t(3 * u)),
@@ -208,7 +208,7 @@ def test_random_space_curves_with_friction(build: Build) -> None:
             )
 
         newton = Newton(place, mu=mu)
-        motion = module.solve(lam0, v0, t_max=1.5, a=a, b=b, c=c, d=d, h=h, k=k, e=e, mu=mu)
+        motion = module.solve(lam0, v0, t_max=1.5, a=a, b=b, c=c, d=d, h=h, k=k, f=f, mu=mu)
         times = np.array([0.2, 0.6, 0.95]) * motion.legs[0].t_end
         truth, state = newton.follow(lam0, v0, times).y, motion.state(times)
         contact = np.array([newton.forces(*column[:2])[0] for column in truth.T])

@@ -161,5 +161,5 @@ def test_a_chart_has_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_points_are_decimal_numbers() -> None:
     """Digits of other scripts are no numbers from Python either: the text goes into the module as it is."""
-    with pytest.raises(DeclarationError, match="row 1: '\u0661' is no decimal number"):
+    with pytest.raises(DeclarationError, match="row 1: '\u0661' is not a decimal number"):
         gqm.Curve.sampled([("\u0661", "2"), ("2", "3")], kind="linear")

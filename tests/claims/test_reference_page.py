@@ -9,7 +9,7 @@ import pytest
 from paths import ROOT
 
 import gqm_sym as gqm
-from gqm_sym import design, figures, jax, runtime, studies
+from gqm_sym import design, figures, jax, runtime, studies, torch
 from gqm_sym.declare import families
 from gqm_sym.declare.banking import Banking
 from gqm_sym.derivation.forces.rider import Rider
@@ -34,7 +34,7 @@ OF_DICT = set(dir(dict))
 def exported() -> dict[str, Any]:
     """Return every exported function and class by its full name."""
     found = {f"gqm_sym.{name}": getattr(gqm, name) for name in gqm.__all__}
-    for room in (design, figures, jax):
+    for room in (design, figures, jax, torch):
         found |= {f"{room.__name__}.{name}": getattr(room, name) for name in room.__all__}
     found |= {f"gqm_sym.runtime.{name}": getattr(runtime, name) for name in runtime.__all__ if name not in INNER}
     found |= {f"{one.__module__}.{one.__qualname__}": one for one in RETURNED}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
@@ -25,6 +26,31 @@ def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
     assert end.t == pytest.approx(TIMES[to], rel=2e-10)
     assert end.t <= TIMES[to] + 5e-11
     assert (motion.state(np.linspace(0.01, end.t, 100)).normal_force > 0.0).all()
+
+
+# When a body with mu = 0.3 gets on the textbook's curve to the same places.
+TEXTBOOK = {("1", "-1"): 0.6805584516, ("1", "-0.6"): 0.7434743316}
+
+
+def test_the_curve_of_textbooks(tmp_path: Path) -> None:
+    """It leaves the contact force of the curve itself out: the body is slow, and does not even get to (1, -0.45)."""
+    x, z = "R*(q - sin(q) + 3/10*(1 - cos(q)))", "-R*(1 - cos(q) + 3/10*(q + sin(q)))"
+    curve = gqm.Curve.parametric(x=x, z=z, parameter="q", domain=(0, "9/2"), parameters={"R": 1})
+    model = gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction(mu="3/10"))
+    track = gqm.build(model, name="textbook", folder=tmp_path)
+
+    def ends(to: tuple[str, str]) -> tuple[float, float]:
+        """The parameter at a place, and the size of the curve."""
+        across, down = lambda q: q - sin(q) + 0.3 * (1 - cos(q)), lambda q: 1 - cos(q) + 0.3 * (q + sin(q))
+        end = brentq(lambda q: float(to[1]) * across(q) + down(q), 1, 4.5)
+        return end, 1.0 / across(end)
+
+    for to, true in TEXTBOOK.items():
+        end, size = ends(to)
+        assert track.solve(0, 0, R=size).time_at(end) == pytest.approx(true, rel=1e-9)
+    _, size = ends(("1", "-0.45"))
+    motion = track.solve(0, 0, R=size)
+    assert motion.state(motion.legs[0].t_end).x == pytest.approx(0.9587808959, rel=1e-9)
 
 
 def test_without_friction(tmp_path: Path) -> None:

@@ -3,6 +3,9 @@
 import ast
 from pathlib import Path
 
+import pytest
+
+from gqm_sym.errors import InputError
 from gqm_sym.runtime import warm
 from gqm_sym.runtime.compiled.stamps import FOLDER
 
@@ -28,3 +31,9 @@ def test_every_entry_point_is_found() -> None:
 def test_a_room_is_compiled() -> None:
     """The entry points of a small file; a second time they come from the cache."""
     assert warm.compile_room("arithmetic.doubledouble") == "arithmetic.doubledouble"
+
+
+def test_a_wrong_file_is_refused_at_once(tmp_path: Path) -> None:
+    """Before minutes are spent on the rest."""
+    with pytest.raises(InputError, match="is not a generated module"):
+        warm.warm((str(tmp_path / "none.py"),))

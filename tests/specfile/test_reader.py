@@ -530,7 +530,7 @@ def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> Non
 UNSOLVABLE = {
     "no launch": (
         edited(("launch: {lam0: 1/2, v0: 0}", "")),
-        ["a.yaml:1:1: launch is missing, and to solve needs one; add it, as in launch: {lam0: 0.5, v0: 0}"],
+        ["a.yaml:1:1: launch is missing, which is needed to solve; add it, as in launch: {lam0: 0.5, v0: 0}"],
     ),
     "no value": (
         edited(("{h: 3}", "{h: null}")),

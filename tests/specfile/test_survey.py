@@ -132,5 +132,5 @@ def test_what_is_no_track(tmp_path: Path, name: str, text: str, message: str) ->
 def test_errors_of_points_name_their_row(tmp_path: Path) -> None:
     """Rows are counted in the file."""
     (tmp_path / "named.csv").write_text("roll,z,x,y\n" + TABLE.replace("0.75, 2.25, 3,", "high, 2.25, 3,"))
-    with pytest.raises(GQMError, match=r"'named.csv', row 5: 'high' is no decimal number"):
+    with pytest.raises(GQMError, match=r"'named.csv', row 5: 'high' is not a decimal number"):
         gqm.read_spec(spec(tmp_path, "named.csv"))

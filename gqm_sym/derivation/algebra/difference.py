@@ -119,7 +119,7 @@ class Differences:
 
 
 def _halves(product: Expr, parameter: Symbol) -> tuple[Expr, Expr]:
-    """A product as two factors, what does not depend on the parameter going first and alone."""
+    """Split a product into two factors, of which the first is what does not depend on the parameter."""
     fixed, moving = product.as_independent(parameter, as_Add=False)
     if fixed != 1:
         return fixed, moving

@@ -2,7 +2,7 @@
 
 The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
 adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
-would. At a cusp κ is infinite and σ zero: in P and Q stands dΘ/dλ = σ κ, which is neither.
+would. At a cusp κ is infinite and σ zero: P and Q contain dΘ/dλ = σ κ, which is neither.
 """
 
 from dataclasses import dataclass

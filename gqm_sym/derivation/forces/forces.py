@@ -50,7 +50,7 @@ class Forces:
     coriolis: tuple[sp.Expr, ...] = ()
 
 
-def pulls(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
+def potential_gradient(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
     """The derivatives of the potential by x, y and z along a curve, and the potential itself."""
     # The force before the coordinates are put in: the curve's own symbols may be called x or z.
     axes = (X, Y, Z)
@@ -78,13 +78,13 @@ def is_planar(heading: Heading, place: Place, kernel: Kernel) -> bool:
     The Coriolis force does: `Forces` leaves it out of a planar curve's contact force, but not out of a vector.
     """
     cosine, sine = heading
-    pull_x, pull_y, *_ = pulls(place, kernel)
+    pull_x, pull_y, *_ = potential_gradient(place, kernel)
     return bool(sp.expand(without_waves(cosine * pull_y - sine * pull_x)) == 0)
 
 
 def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> Forces:
     """Put the coordinates x, y and z of a curve in its parameter into the force law."""
-    written = pulls(place, kernel)
+    written = potential_gradient(place, kernel)
     forms = [without_waves(form) for form in written]
     pull_x, pull_y, pull_z, potential = forms
     if shape.heading is None:

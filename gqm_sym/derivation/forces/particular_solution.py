@@ -35,7 +35,9 @@ FieldElement: TypeAlias = Any
 """A quotient of polynomials, as SymPy has it, without type information."""
 
 
-def particular(source: sp.Expr, decay: sp.Expr, variable: sp.Symbol, signs: Sequence[sp.Symbol] = ()) -> sp.Expr | None:
+def particular_solution(
+    source: sp.Expr, decay: sp.Expr, variable: sp.Symbol, signs: Sequence[sp.Symbol] = ()
+) -> sp.Expr | None:
     """Return a solution of W' + decay*W = source, or None if none of the kind looked for was found.
 
     Parameters

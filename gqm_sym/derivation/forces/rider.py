@@ -52,7 +52,7 @@ class Rider:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Seat:
-    """The force on a rider per unit mass, upwards and to the left, and where upwards is."""
+    """The force on a rider per unit mass, upwards and to the left, and which direction is upwards."""
 
     vertical: sp.Expr
     lateral: sp.Expr
@@ -96,8 +96,7 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
 def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, sp.Expr] | None:
     """Curvature and static load along the rider's upward direction, so that N/m has the component κ W + n₀ along it.
 
-    None in a vertical plane, where N has a sign of its own; where that direction depends on the motion; and in a frame
-    that turns.
+    None in a vertical plane, where N has a sign; where that direction depends on the motion; and in a frame that turns.
     """
     if shape.heading is not None or law.coriolis or (banking.angle is None and banking.speed is None):
         return None

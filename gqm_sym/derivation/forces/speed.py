@@ -1,7 +1,7 @@
 """V² along a motion: W(λ) = U(λ) + (v0² - U(lam0)) e^(-q), with q = ∫ Q dλ and U any solution of W' + Q W = P.
 
-U is an antiderivative of P where Q = 0, and else looked for among elementary functions (`particular`). Where none is
-found, W is written as the quadrature that it is, and where the law is not linear in W, as an unknown function.
+U is an antiderivative of P where Q = 0, and else looked for among elementary functions (`particular_solution`). Where
+none is found, W is written as the quadrature that it is, and where the law is not linear in W, as an unknown function.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.rewrite import tidy
 from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TURN, Dissipation
 from gqm_sym.derivation.forces.forces import Forces
-from gqm_sym.derivation.forces.particular_solution import particular
+from gqm_sym.derivation.forces.particular_solution import particular_solution
 from gqm_sym.derivation.geometry.geometry import Geometry
 from gqm_sym.derivation.reality import tried_places
 from gqm_sym.expressions import is_real_at
@@ -53,7 +53,7 @@ class SpeedField:
     gain: sp.Expr | None = None
 
     @property
-    def held(self) -> sp.Expr:
+    def in_other_forms(self) -> sp.Expr:
         """Return W for use in other forms: W itself if it is closed, otherwise its symbol."""
         return self.squared if self.form == CLOSED else W
 
@@ -93,7 +93,7 @@ def dissipative_speed(
     }
     drive, decay = (_Sum(form, table, shape.ds, lam) for form in (loss.drive, loss.decay))
     spent = decay.antiderivative()
-    ground = drive.antiderivative() if not decay.rate else particular(drive.rate, decay.rate, lam, _SIGNS)
+    ground = drive.antiderivative() if not decay.rate else particular_solution(drive.rate, decay.rate, lam, _SIGNS)
     # One sign on a leg, which ends where κ changes sign; it may begin where κ is zero.
     signed = {side: sp.Abs(shape.kappa) / shape.kappa if shape.kappa else sp.S.Zero}
     if spent is not None and ground is not None:
@@ -138,7 +138,7 @@ class _Sum:
 
     def antiderivative(self) -> sp.Expr | None:
         """Return an antiderivative by λ, or None if no elementary one was found."""
-        found = particular(self.unknown, sp.S.Zero, self.lam, _SIGNS)
+        found = particular_solution(self.unknown, sp.S.Zero, self.lam, _SIGNS)
         return None if found is None else self.known + found
 
 

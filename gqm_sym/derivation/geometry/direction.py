@@ -27,7 +27,7 @@ from gqm_sym.derivation.algebra.rewrite import (
     without_waves,
 )
 from gqm_sym.derivation.algebra.signs import Signs
-from gqm_sym.derivation.geometry.turning_angle import turned
+from gqm_sym.derivation.geometry.turning_angle import in_turning_frames
 from gqm_sym.errors import DeclarationError
 
 
@@ -55,8 +55,8 @@ class Direction:
 class Root:
     """The length of the parts of a direction over a weight, as factors.
 
-    ``square`` is what stands under the root if that is one piece, else None. ``weight`` is what the parts were divided
-    by: a denominator of r' that then is no part of H.
+    ``square`` is the expression under the root if that is one factor, otherwise None. ``weight`` is what the parts were
+    divided by: a denominator of r' that then is no part of H.
     """
 
     powers: list[Power]
@@ -147,7 +147,7 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
         sums.append(_sum_of_squares(algebra, [algebra.normal(half) for half in halves], one) / 2)
     else:
         # So may components in a frame that turns about the z axis: the one with the fewest terms is written out.
-        frames = [(along, across, parts[2]) for _, along, across in turned(algebra, parts[0], parts[1])]
+        frames = [(along, across, parts[2]) for _, along, across in in_turning_frames(algebra, parts[0], parts[1])]
         frame = min(frames, key=lambda frame: sum(map(len, frame)), default=parts)
         if sum(map(len, frame)) < sum(map(len, parts)):
             sums.append(without_waves(_sum_of_squares(algebra, frame, one)))

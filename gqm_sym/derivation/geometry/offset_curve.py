@@ -8,7 +8,7 @@ from gqm_sym.derivation.algebra.rewrite import tidy
 from gqm_sym.derivation.geometry.geometry import Geometry
 
 
-def beside(x: sp.Expr, z: sp.Expr, shape: Geometry, radius: sp.Expr) -> tuple[sp.Expr, sp.Expr, Geometry]:
+def offset_curve(x: sp.Expr, z: sp.Expr, shape: Geometry, radius: sp.Expr) -> tuple[sp.Expr, sp.Expr, Geometry]:
     """Return the curve at a distance to the left of another, in the same parameter (MATHS, section 2).
 
     Its tangent is that of the track, its arc ``1 - kappa*radius`` times as long: where that is not positive, the body

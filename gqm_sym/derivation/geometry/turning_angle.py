@@ -24,14 +24,16 @@ def tangent_angle(algebra: Algebra, parts: tuple[Polynomial, ...], weight: Polyn
     for part, other, text, sign in ((first, second, u, 1), (second, first, v, -1)):
         if signs.nonzero(text) and signs.sign(text) is not None:
             return sign * sp.atan(product(spell_ratio(algebra, other, part)))
-    for turn, along, across in turned(algebra, first, second):
+    for turn, along, across in in_turning_frames(algebra, first, second):
         for part, other, sign in ((along, across, 1), (across, along, -1)):
             if _is_definite(algebra, signs, part):
                 return turn + sign * sp.atan(product(spell_ratio(algebra, other, part)))
     return sp.atan2(v, u)
 
 
-def turned(algebra: Algebra, first: Polynomial, second: Polynomial) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
+def in_turning_frames(
+    algebra: Algebra, first: Polynomial, second: Polynomial
+) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
     """Yield (u, v) as seen in frames that turn with multiples of an angle of the curve's own."""
     parts = (first, second)
     used = [pair for pair in algebra.pairs if any(pair.degree(monomial) for part in parts for monomial in part)]

@@ -61,11 +61,11 @@ class SymmetricOrbits:
         As functions of OFFSET and LAUNCH: half the orbit's width; by how much U2 grows with the square in which it is
         written, that of a sine or of the distance; and the square of the sine at the turning point, which is above 1
         where the body passes over the barrier (0 for other squares). Where the second is positive, U2 grows all the way
-        from the axis to the turning point. None where U2 has a third or higher power of that square, or is no
+        from the axis to the turning point. None where U2 has a third or higher power of that square, or is not a
         polynomial.
     agm_arguments
         Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None
-        where it is no complete elliptic integral of the first kind.
+        where it is not a complete elliptic integral of the first kind.
     """
 
     time_integrand: sp.Expr

@@ -34,8 +34,8 @@ class Symmetry:
 def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
     """Return where the effective potential and ds are even; None where no such place was found.
 
-    Tried are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines, 0, and
-    what the two highest powers of a polynomial ask for.
+    The candidates are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines,
+    0, and the centre that follows from the two highest powers of a polynomial.
     """
     forms = (potential, ds)
     if any(_is_longer(form, MAX_LENGTH) for form in forms):

@@ -48,7 +48,6 @@ FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
 EDGES, LENGTHS, ARCS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
 SECTIONS = 19
-_EMPTY = np.empty(0)
 _STATE = types.UniTuple(types.float64, 10)
 
 
@@ -78,9 +77,10 @@ class Phases(NamedTuple):
 
 def record(sections: Mapping[int, Array | NDArray[np.int64]]) -> Array:
     """Return a record of some sections; the others are empty."""
-    parts = [sections[k].reshape(-1) if k in sections else _EMPTY for k in range(SECTIONS)]
-    marks = np.array([*accumulate(map(len, parts), initial=SECTIONS + 1)])
-    return np.concatenate([part if part.dtype == np.float64 else part.view(np.float64) for part in (marks, *parts)])
+    sizes = [sections[k].size if k in sections else 0 for k in range(SECTIONS)]
+    marks = np.array([*accumulate(sizes, initial=SECTIONS + 1)])
+    parts = (marks, *(sections[k].reshape(-1) for k in sorted(sections)))
+    return np.concatenate([part if part.dtype.kind == "f" else part.view(np.float64) for part in parts])
 
 
 @Inner

@@ -14,6 +14,7 @@ from gqm_sym.budgets import budget
 from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.types import Array
@@ -280,6 +281,11 @@ class Formulas:
         """The chart of a charted curve."""
         assert self.chart is not None
         return chart_with(self.chart, tuple(p.values.tolist()))
+
+    def offset(self, p: Sequence[Number]) -> Pair:
+        """How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0."""
+        radius = dict(zip(self.parameters, p, strict=True)).get(self.rolling_radius)
+        return ZERO if radius is None else (radius.value, radius.low)
 
     def domain(self, p: ParameterValues) -> Domain:
         """The range of the curve parameter."""

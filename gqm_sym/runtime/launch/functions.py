@@ -49,8 +49,10 @@ class BoundFunctions(NamedTuple):
 
     def between(self, places: Array, a: float, b: float) -> Array:
         """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""
+        if not places.size:
+            return places
         low, high = min(a, b), max(a, b)
-        if self.period and places.size:
+        if self.period:
             laps = np.arange(np.floor((low - places[-1]) / self.period), np.ceil((high - places[0]) / self.period) + 1)
             places = (places[None, :] + laps[:, None] * self.period).ravel()
         return places[(places > low) & (places < high)]

@@ -95,12 +95,13 @@ class Problem:
     @property
     def true_pieces(self) -> TruePieces | None:
         """A charted curve in double-double arithmetic; None where there is no such thing."""
-        if self.functions.exact is None or self.formulas.chart is None:
+        maker, p = self.formulas.chart, self.p
+        if maker is None or not isinstance(self.formulas.exact, ExactPotential):
             return None
-        if self.p.true_pieces is None:
-            chart = self.formulas.charted(self.p)
-            self.p.true_pieces = true_pieces_of(self.formulas.chart, self.p, chart) or False
-        return self.p.true_pieces or None
+        if p.true_pieces is None:
+            chart = self.formulas.charted(p)
+            p.true_pieces = (maker.is_exact(chart) and true_pieces_of(maker, p, chart)) or False
+        return p.true_pieces or None
 
     @property
     def arc_origin(self) -> float:
@@ -137,12 +138,16 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
 
 
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
-    """The problem of one launch in extended precision; None if the curve is known in doubles only."""
+    """The problem of one launch in extended precision.
+
+    It is None if the curve is known in doubles only, and for the path of a body beside a charted curve: of that
+    double-double arithmetic has the most digits.
+    """
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
         return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0, partial(tape_of, formulas, p))
-    if isinstance(exact, ExactPotential) and maker is not None:
+    if isinstance(exact, ExactPotential) and maker is not None and not formulas.rolling_radius:
         chart = formulas.charted(p)
         if maker.is_exact(chart):
             along = partial(ChartTrack, maker, chart, exact.effective_potential, launch.point, launch.lam0)

@@ -90,7 +90,8 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         place, at = _read_place(formulas, p, lam0, point)
     if type(direction) is not int or direction not in (1, -1):
         direction = _read_direction(direction)
-    check_contact(formulas, contact)
+    if type(contact) is not str or contact != "bilateral":
+        check_contact(formulas, contact)
     speed = read_number(v0, where="v0", unit="m/s")
     if speed.value < 0.0:
         raise LaunchError(
@@ -133,12 +134,14 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
     """
     if not (isinstance(contact, str) and contact in CONTACTS):
         raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {short(contact)}")
-    if ONLY_SIGN[contact] and isinstance(formulas.chart, TrackOfTrain):
+    if not ONLY_SIGN[contact]:
+        return
+    if isinstance(formulas.chart, TrackOfTrain):
         raise LaunchError(
             f"contact: {contact!r} is for one body; a train is held from all sides, which is 'bilateral', and "
             "`Motion.cars` tells the contact force of each car"
         )
-    if ONLY_SIGN[contact] and not formulas.sided:
+    if not formulas.sided:
         raise LaunchError(
             f"contact: {contact!r} needs to know which side of this space curve the body is on: declare the upward "
             "direction by Curve.space(..., roll=...), as an angle (0 is level) or for a speed; without it the body is "

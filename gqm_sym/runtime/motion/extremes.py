@@ -144,7 +144,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     if motion.kind == "rest" or motion.t_end == 0.0:  # it stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
-    trajectory, end = course(motion)
+    trajectory, end = whole_trajectory(motion)
     best: Extreme | None = None
     for timed in trajectory.segments:
         if timed.t_start[0] >= end and best is not None:
@@ -160,7 +160,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     return best
 
 
-def course(motion: Any) -> tuple[Trajectory, float]:
+def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
     """The trajectory of one period, or from launch to the end, and the time in s at which that is over.
 
     Raises
@@ -174,7 +174,7 @@ def course(motion: Any) -> tuple[Trajectory, float]:
             "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
         )
     end = min(motion.t_end, motion.period) if repeats else motion.t_end
-    return motion._course if repeats else motion._trajectory(end), end
+    return motion._listed_trajectory if repeats else motion._trajectory(end), end
 
 
 def _on_segment(

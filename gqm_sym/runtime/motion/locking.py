@@ -1,36 +1,18 @@
 """One answer at a time: a motion computes answers on request and keeps them, and many threads may request them."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import wraps
-from threading import RLock
-from typing import Concatenate, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class Lock:
-    """A lock that the thread which holds it may take again; a copy of it, or what is read from its pickle, is new."""
-
-    __slots__ = ("_lock",)
-
-    def __init__(self) -> None:
-        self._lock = RLock()
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-
-    def __exit__(self, *_: object) -> None:
-        self._lock.release()
-
-    def __reduce__(self) -> tuple[type["Lock"], tuple[()]]:
-        return Lock, ()
-
-
 class HasLock(Protocol):
-    """An object with a lock ``_lock``."""
+    """An object whose lock ``_lock`` may be taken again by the thread that holds it."""
 
-    _lock: Lock
+    _lock: AbstractContextManager[Any]
 
 
 L = TypeVar("L", bound=HasLock)

@@ -66,7 +66,7 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
-        if self.problem.true_pieces is None or self.problem.tape is None:
+        if self.problem.true_pieces is None or self.problem.tape is None or self.problem.formulas.rolling_radius:
             raise without_formulas()
         passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
         if passage is None:
@@ -187,15 +187,14 @@ class PeriodicMotion(PeriodicTimes):
         return self._sampler if end_time <= self._sampler.max_time else None
 
     def _constants_of_states(self, times: Times) -> tuple[float, ...]:
-        trajectory = self._trajectory_of(times)
-        return trajectory.lap_length, self.problem.arc_origin, trajectory.segments[0].s_a, *self._time_drift(times)
+        return self._lap_length(times), self.problem.arc_origin, self._launch_on(times)[1], *self._time_drift(times)
 
     @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
-        lap, within = self._course.lap, self._one_period()
+        lap, within = self._listed_trajectory.lap, self._one_period()
         if not within:
             return Rows([])
         first, last = int(np.floor(start / period)), int(np.floor(min(stop, self.t_end) / period))
@@ -226,7 +225,7 @@ class PeriodicMotion(PeriodicTimes):
         return lam
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
-        lap = self._course.lap
+        lap = self._listed_trajectory.lap
         if not lap:
             return super()._first_passages(self._at_end(lam, low), low)
         count = np.floor((lam - self.problem.lam0) / lap)

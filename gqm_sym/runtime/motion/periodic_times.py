@@ -87,7 +87,7 @@ class PeriodicTimes(Motion):
         segment = self._segment_in_doubles
         if self.kind != "libration" or segment.ends != (None, None):
             return segment
-        ends = timing.true_turning_points(self.problem, segment, self._offsets)
+        ends = timing.true_turning_points(self.problem, segment, self._offsets, self._orbit_by_rule)
         if ends is None:
             return segment
         (a, a_low), (b, b_low), lam0, (behind, ahead) = *ends, self.problem.launch.lam0, self._offsets
@@ -102,6 +102,7 @@ class PeriodicTimes(Motion):
             return segment
         known = segment.known_duration is not None
         orbit = timing.orbit_of(self.problem, self.kind, self.direction, self._offsets) if known else None
+        self._orbit_by_rule = orbit if self._orbit_by_rule is not None else None
         return with_turning_points(segment, a, b, None if orbit is None else orbit.duration.high)
 
     @property
@@ -133,13 +134,24 @@ class PeriodicTimes(Motion):
         return self._has_multiprecision or self._orbit is not None
 
     @cached_property
+    def _orbit_by_rule(self) -> Orbit | None:
+        """The orbit of a launch from a turning point, or of a circulation, by the trapezoidal rule alone.
+
+        It is None where that rule has not converged in doubles, and along charts.
+        """
+        is_smooth = self._segment_in_doubles.known_duration is not None and self.problem.formulas.chart is None
+        if not is_smooth or (self.kind == "libration" and self.problem.w0 > 0.0):
+            return None
+        return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets)
+
+    @cached_property
     def _orbit(self) -> Orbit | None:
         """Duration and turning points in double-double arithmetic; None where that does not suffice."""
         launch = self.problem, self.kind, self.direction, self._offsets
         is_charted = self.problem.formulas.chart is not None
         # No panels are needed where the trapezoidal rule has converged in doubles.
         if is_charted or self._segment_in_doubles.known_duration is not None:
-            orbit = timing.orbit_of(*launch)
+            orbit = self._orbit_by_rule or timing.orbit_of(*launch)
             if is_charted or orbit is not None:
                 return orbit
         return timing.orbit_of(*launch, timing.times_along(self._segment, is_thrown=False))
@@ -151,8 +163,10 @@ class PeriodicTimes(Motion):
 
     @cached_property
     def _in_double_double(self) -> Times | None:
-        launch = self.problem, self.kind, self.direction
-        times = timing.in_double_double(*launch, self._segment, self._offsets) if self._is_exact else None
+        if not self._is_exact:
+            return None
+        segment, launch = self._segment, (self.problem, self.kind, self.direction)
+        times = timing.in_double_double(*launch, segment, self._offsets, self._orbit_by_rule)
         return None if times is None else Times(times, self._repeated(times), (-inf, times.max_time))
 
     @cached_property
@@ -217,7 +231,7 @@ class PeriodicTimes(Motion):
         return self._trajectory_of(self._times_until(end_time))
 
     @property
-    def _course(self) -> Trajectory:
+    def _listed_trajectory(self) -> Trajectory:
         return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
     def _repeated(self, times: timing.Timing) -> Repeated:
@@ -235,17 +249,31 @@ class PeriodicTimes(Motion):
         if times.trajectory is None:
             (segment, period, lap, time_scale_error), duration = times.repeated, times.timing.duration
             if self.kind == "libration":
-                phi, phase_time = segment.phase_angle_of(*times.timing.offsets), times.timing.phase_time
                 segments = libration(
-                    segment, direction=self.direction, duration=duration, phase_time=phase_time, phi=phi
+                    segment, self.direction, duration, times.timing.phase_time, *self._launch_on(times)
                 )
-                length = 0.0
             else:
-                segments, length = (circulation(segment, duration),), self.direction * segment.length
+                segments = (circulation(segment, duration),)
             times.trajectory = Trajectory(
-                segments=segments, period=period, lap=lap, lap_length=length, time_scale_error=time_scale_error
+                segments=segments,
+                period=period,
+                lap=lap,
+                lap_length=self._lap_length(times),
+                time_scale_error=time_scale_error,
             )
         return times.trajectory
+
+    def _lap_length(self, times: Times) -> float:
+        """The growth of the arc length in m in one lap; 0 for a libration."""
+        return 0.0 if self.kind == "libration" else self.direction * times.repeated.segment.length
+
+    def _launch_on(self, times: Times) -> tuple[float, float]:
+        """The phase angle of the launch on the segment, and the arc length in m from there to its end ``a``."""
+        if self.kind == "circulation":
+            return 0.0, 0.0
+        segment = times.repeated.segment
+        phi = segment.phase_angle_of(*times.timing.offsets)
+        return phi, -float(segment.lengths(np.array([phi]))[0])
 
     def _time_error(self, t: Array) -> Array:
         at_launch, drift = self._time_drift(self._times_until(float(np.abs(t).max()) if t.size else 0.0))

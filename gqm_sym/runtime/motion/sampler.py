@@ -1,6 +1,7 @@
 """Places and states of a periodic motion at many times, with one call of compiled code."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
+from gqm_sym.runtime.inversion.table import TERMS
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.segments import errors
 from gqm_sym.runtime.motion.timing import Timing
 from gqm_sym.runtime.motion.trajectory import Repeated
@@ -23,6 +25,9 @@ MIN_PLACES_PER_THREAD, MIN_STATES_PER_THREAD = 2**16, 2**12
 
 # The most periods after which compiled code reduces times exactly; later ones are reduced one by one.
 MAX_PERIODS = 2.0**50
+
+# The powers of -1, which are those at the start of an interval of the table.
+ALTERNATING = (-1.0) ** np.arange(TERMS)
 
 # The number of fields of a state other than the time.
 STATE_ROWS = 9
@@ -65,7 +70,7 @@ class Sampler:
         span: Pair,
         direction: int,
         of_states: Callable[[], tuple[float, ...]],
-        lock: Lock,
+        lock: AbstractContextManager[Any],
     ) -> None:
         segment, period, lap, time_scale_error = repeated
         self.min_time, self.max_time = span[0], min(MAX_PERIODS * period[0], span[1])
@@ -114,10 +119,10 @@ class Sampler:
             self._tabulate()
             segment, panels, problem = self._segment, self._segment.panels, self._problem
             intervals = segment.table[3]
-            owners = np.clip(np.searchsorted(segment.edges, intervals[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
+            owners = np.searchsorted(segment.edges[1:-1], intervals[:, 0], side="right")
             # The part of the error that changes within an interval of the table is largest at one of its ends, where
             # the powers are those of -1 and 1.
-            starts, stops = intervals @ (-1.0) ** np.arange(intervals.shape[1]), intervals.sum(axis=1)
+            starts, stops = intervals @ ALTERNATING, intervals.sum(axis=1)
             both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
             middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {

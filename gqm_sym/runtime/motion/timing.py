@@ -91,15 +91,18 @@ def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float
     sense = direction if kind == "circulation" else 0
     ways = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
     low, high = sorted(launch.lam0.value + way for way in ways)
-    return pass_along(pieces, formulas, (launch.lam0, launch.v0, launch.point), (low, high), sense)
+    given, offset = (launch.lam0, launch.v0, launch.point), problem.formulas.offset(problem.p)
+    return pass_along(pieces, formulas, given, (low, high), sense, offset)
 
 
 def times_along(segment: Segment, *, is_thrown: bool) -> Array:
     """Room for the times at the launch and, where the trapezoidal rule would not do, at the edges of the panels.
 
-    It is for `double_double.orbit_time.fill_times`.
+    It is for `double_double.orbit_time.fill_times`; a launch from a turning point needs none.
     """
     edges = segment.edges[1:] if len(segment.edges) - 1 > MAX_SMOOTH_PANELS else NOWHERE
+    if not is_thrown and not edges.size:
+        return NO_TIMES
     times = np.zeros((3, 1 + len(edges)))
     times[0, 0], times[0, 1:] = 1.0 if is_thrown else 0.0, edges
     return times
@@ -126,17 +129,22 @@ def orbit_of(
     return time_orbit(problem.tape, launch, sense, offsets, times)
 
 
-def true_turning_points(problem: Problem, segment: Segment, offsets: tuple[float, float]) -> tuple[Pair, Pair] | None:
+def true_turning_points(
+    problem: Problem, segment: Segment, offsets: tuple[float, float], orbit: Orbit | None
+) -> tuple[Pair, Pair] | None:
     """The lower and the upper turning point of a libration as two doubles each; None where no more is known of them.
 
     They come from double-double arithmetic, and for a curve of formulas from extended precision where that is too
-    little. ``offsets`` are their distances from the launch, as doubles know them.
+    little. ``offsets`` are their distances from the launch, as doubles know them, and ``orbit`` what `orbit_of` has
+    found from these, if it has been asked.
     """
     low = high = Bounded(nan, nan, nan)
     if problem.formulas.chart is not None:
         passage = passage_of(problem, "libration", 0, offsets)
         if passage is not None:
             low, high = passage.turning_points
+    elif orbit is not None:
+        low, high = orbit.low, orbit.high
     elif problem.tape is not None:
         low, high = find_turning_points(problem.tape, (problem.launch.lam0, problem.launch.v0), offsets)
     largest, error = MAX_TURN_ERROR * (high.high - low.high), max(low.error, high.error)
@@ -151,9 +159,17 @@ def true_turning_points(problem: Problem, segment: Segment, offsets: tuple[float
 
 
 def in_double_double(
-    problem: Problem, kind: str, direction: int, segment: Segment, offsets: tuple[float, float]
+    problem: Problem,
+    kind: str,
+    direction: int,
+    segment: Segment,
+    offsets: tuple[float, float],
+    known: Orbit | None = None,
 ) -> Timing | None:
-    """The times from double-double arithmetic; None where that does not suffice."""
+    """The times from double-double arithmetic; None where that does not suffice.
+
+    ``known`` is what `orbit_of` has found without panels, if it has been asked.
+    """
     is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
     is_thrown, lam0 = kind == "libration" and problem.w0 > 0.0, problem.launch.lam0
     if problem.formulas.chart is not None:
@@ -166,10 +182,10 @@ def in_double_double(
         found, phase_time, offsets = rows[:-1, :2].T, rows[-1, :2].tolist(), passage.offsets
     else:
         times = times_along(segment, is_thrown=is_thrown)
-        orbit = orbit_of(problem, kind, direction, offsets, times)
+        orbit = known if known is not None and not times.size else orbit_of(problem, kind, direction, offsets, times)
         if orbit is None:
             return None
-        a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:-1], times[1:, 0].tolist()
+        a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:-1], times[1:, :1].ravel().tolist()
         offsets = (lam0.value - a.high) + (lam0.low - a.low), (b.high - lam0.value) + (b.low - lam0.low)
     duration = orbit.duration[:2]
     edge_times = None

@@ -124,12 +124,12 @@ class Trajectory:
 
 
 def libration(
-    segment: Segment, *, direction: int, duration: Pair, phase_time: Pair, phi: float
+    segment: Segment, direction: int, duration: Pair, phase_time: Pair, phi: float, s_a: float
 ) -> tuple[TimedSegment, ...]:
     """One period between two turning points, from the launch.
 
     ``duration`` is the half period, and ``phase_time`` the time from the end ``a`` to the launch place, whose phase
-    angle is ``phi``.
+    angle is ``phi``; ``s_a`` is the arc length from there to the end ``a``.
     """
     a, b, launch = (ZERO, 0.0), (duration, segment.stop), (phase_time, phi)
     first, second = (a, b) if direction > 0 else (b, a)
@@ -138,7 +138,6 @@ def libration(
         (-direction, second, first, "turn"),
         (direction, first, launch, "horizon"),
     ]
-    s_a = -float(segment.lengths(np.array([phi]))[0])
     segments: list[TimedSegment] = []
     t = ZERO
     for sense, (start, phi_start), (stop, phi_stop), end in runs:

@@ -90,7 +90,8 @@ def groups_of(
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         table = NO_TABLE
         if not formulas.dissipation:
-            made_from = _source(formulas), _exact_parts(formulas), len(formulas.parameters)
+            radius = dict(zip(formulas.parameters, values, strict=False)).get(formulas.rolling_radius, 0.0)
+            made_from = _source(formulas), _exact_parts(formulas), radius, len(formulas.parameters)
             table = tabulated(formulas.chart, *made_from, values)
         some, theirs = columns, factors
         if chosen is not None:
@@ -196,6 +197,7 @@ def tabulated(
     maker: ChartMaker,
     source: Source,
     exact_parts: Callable[..., Any] | None,
+    radius: float,
     parameters: int,
     values: tuple[float, ...],
 ) -> CurveTable:
@@ -205,7 +207,7 @@ def tabulated(
         p = tuple(read_number(value, where="p") for value in values)
         try:
             pieces = true_pieces_of(maker, p[:parameters], chart)
-            true = pieces and parts_along(pieces, exact_parts, source.potentials, p)
+            true = pieces and parts_along(pieces, exact_parts, source.potentials, p, (radius, 0.0))
         except GQMError:
             true = None  # then the table has the digits of the chart
     p_and_chart = np.concatenate([values, chart.block])

@@ -227,7 +227,7 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
     [
         ([*LINE[:4], (4.0, math.nan), *LINE[5:]], {}, "row 5: nan is not finite"),
         ([*LINE[:4], (4.0, "1e999"), *LINE[5:]], {}, "row 5: '1e999' is not finite"),
-        ([*LINE[:4], (4.0, "0x10"), *LINE[5:]], {}, "row 5: '0x10' is no decimal number"),
+        ([*LINE[:4], (4.0, "0x10"), *LINE[5:]], {}, "row 5: '0x10' is not a decimal number"),
         ([*LINE[:4], (4.0, None), *LINE[5:]], {}, "row 5: None is no number"),
         ([*LINE[:4], (4.0, True), *LINE[5:]], {}, "row 5: True is no number"),
         ([*LINE[:4], (4.0, 1.6, 0.0), *LINE[5:]], {}, "row 5: must be two numbers, x and z, got"),
@@ -296,7 +296,7 @@ def test_options_of_a_file(tmp_path: Path) -> None:
     ("points", "data", "message"),
     [
         ("track.csv", None, "'track.csv': there is no such file in this folder"),
-        ("track.csv", "x,z\n1,2\n2,oops", "'track.csv', row 3: 'oops' is no decimal number"),
+        ("track.csv", "x,z\n1,2\n2,oops", "'track.csv', row 3: 'oops' is not a decimal number"),
         ("track.csv", f"x,z\n{ROWS}\n11,12.1", "'track.csv', row 14: repeats row 13"),
         ("track.csv", "1,2\n1,2,3", "'track.csv', row 2: must be two numbers"),
         ("track.csv", "1,2\n\n2,3", "'track.csv', row 2: must be two numbers"),
@@ -309,8 +309,8 @@ def test_options_of_a_file(tmp_path: Path) -> None:
         ("track.csv", "1,2\n" + "9" * 300, "'track.csv', row 2: is longer than 200 characters"),
         ("track.csv", b"1,2\n\xff\xfe", "'track.csv', row 2: is not UTF-8 text"),
         ("track.csv", "1,2\n" * 500_001, "'track.csv': has 500001 rows; 500000 is the most"),
-        ("../track.csv", ROWS, "'../track.csv': must be a path from the YAML file's folder on"),
-        ("/etc/passwd", ROWS, "'/etc/passwd': must be a path from the YAML file's folder on"),
+        ("../track.csv", ROWS, "'../track.csv': must be a path inside the YAML file's folder"),
+        ("/etc/passwd", ROWS, "'/etc/passwd': must be a path inside the YAML file's folder"),
         ("inside", None, "'inside': is no plain file|'inside': cannot be read"),
         ("{file: track.csv, kind: round}", ROWS, "curve.points.kind: must be 'spline' or 'linear', got 'round'"),
         ("{kind: linear}", ROWS, "curve.points: file is missing; add file: track.csv"),

@@ -50,7 +50,10 @@ def test_reference_numbers(circle: ModuleType, cubic: ModuleType) -> None:
     assert is_near(found["L"], mpf("0.55077064690312602386531582457741"))
     assert is_near(found["g"], mpf("-0.05614379683008420222888030831574"))
     assert found["m"] == found["v0"] == 0.0
-    found = cubic.solve(lam0="-4/5", c="3/10", g="9.81").gradient("half_period", ("lam0", "c"))
+    assert is_near(swing.action, mpf("13.1207806398375596652152789818"))
+    well = cubic.solve(lam0="-4/5", c="3/10", g="9.81")
+    assert is_near(well.half_period, mpf("1.0066169126272207248125717181"))
+    found = well.gradient("half_period", ("lam0", "c"))
     assert is_near(found["lam0"], mpf("-0.52876998558330915424438815736"))
     assert is_near(found["c"], mpf("-0.04626839794834119119859582002"), size=0.2)
 

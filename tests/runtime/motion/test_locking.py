@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym.runtime.motion.locking import Lock
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -85,9 +84,9 @@ def test_six_threads_are_told_what_one_is(name: str, module_named: ModuleOf) -> 
                 assert given == expected
 
 
-def test_a_lock_is_copied_as_a_new_one() -> None:
-    """A copy can be taken while the lock itself is held, as a motion's copy must be."""
-    lock = Lock()
-    with lock, ThreadPoolExecutor(1) as pool:
-        for other in (copy.deepcopy(lock), pickle.loads(pickle.dumps(lock))):
-            assert pool.submit(other.__enter__).result(60.0) is None
+def test_a_motion_is_copied_while_it_answers(module_named: ModuleOf) -> None:
+    """A copy can be taken while a motion's lock is held, and has a lock of its own."""
+    motion = module_named("pendulum").solve(1, L=1)
+    with motion._lock, ThreadPoolExecutor(1) as pool:
+        for other in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
+            assert pool.submit(other._lock.__enter__).result(60.0)

@@ -7,12 +7,12 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import plus
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, plus
+from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
     TrueCurve,
     TruePieces,
-    fill_points,
     place_at,
     stacked_places,
     stacked_points,
@@ -68,7 +68,7 @@ def fill_values(parts, number, n, u, values):  # type: ignore[no-untyped-def]
     """Fill the values of the functions at n places on a piece, two doubles each."""
     address, operations, ends, _ = parts.tape
     points = stacked_points()
-    fill_points(parts.curve, number, n, u, points)
+    fill_path(parts.curve, number, n, u, points)
     fill_registers(parts.tape, parts.work, n, points, 0.0)
     call_interpreter(address, operations, ends[0], ends[1], parts.work, n)
     for row in range(parts.values.size):
@@ -127,8 +127,13 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     return half
 
 
-def parts_along(pieces: TruePieces, function: Callable[..., Any], count: int, p: Sequence[Number]) -> TrueParts | None:
-    """Return the first functions that ``function(op, x, z, p)`` gives, along a curve; None where they are too long."""
+def parts_along(
+    pieces: TruePieces, function: Callable[..., Any], count: int, p: Sequence[Number], offset: Pair = ZERO
+) -> TrueParts | None:
+    """Return the first functions that ``function(op, x, z, p)`` gives, along a curve; None where they are too long.
+
+    ``offset`` is how far to the left of the curve the body's path lies (`TrueCurve`), on which x and z are.
+    """
     found = bind(record_values_in_plane(function, len(p), count), p)
     if found is None:
         return None
@@ -141,4 +146,5 @@ def parts_along(pieces: TruePieces, function: Callable[..., Any], count: int, p:
     before = plus(tuple(origins[pieces.begin].tolist()), pieces.start_length)
     for row in origins:
         row[:] = plus(tuple(row.tolist()), (-before[0], -before[1]))
-    return TrueParts(pieces.curve, origins, (address, operations, ends, registers), work, parameters, values)
+    curve = pieces.curve._replace(offset=offset)
+    return TrueParts(curve, origins, (address, operations, ends, registers), work, parameters, values)

@@ -7,7 +7,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, TruePieces, arc_between, place_at, unshared
 from gqm_sym.runtime.charts.double_double.potential import Path
 from gqm_sym.runtime.charts.double_double.times import time_on_piece
@@ -116,11 +116,15 @@ class ChartPassage:
         What `locate` has found; it is an attribute, too.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
+    offset : pair of float
+        How far to the left of the curve the body's path lies (`TrueCurve`).
     """
 
-    def __init__(self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int) -> None:
+    def __init__(
+        self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int, offset: Pair = ZERO
+    ) -> None:
         self._pieces, self.found, self._direction = pieces, found, direction
-        self._given = pieces.curve, *formulas.operands, found
+        self._given = pieces.curve._replace(offset=offset), *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
         """The times to stops, with errors (`fill_passage`)."""
@@ -191,6 +195,7 @@ def pass_along(
     launch: tuple[Number, Number, tuple[Number, Number] | None],
     ends: tuple[float, float],
     direction: int,
+    offset: Pair = ZERO,
 ) -> ChartPassage | None:
     """Return an orbit along a chart; None where double-double arithmetic does not suffice.
 
@@ -206,6 +211,8 @@ def pass_along(
         The turning points of a libration, or the ends of a lap, as doubles know them.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
+    offset : pair of float
+        How far to the left of the curve the body's path lies.
     """
     lam0, v0, point = launch
     begin, count = pieces.begin, len(pieces.curve.counts)
@@ -218,7 +225,7 @@ def pass_along(
     given = *length, v0.value, v0.low, float(point is not None), x.value, x.low, z.value, z.low
     found = np.full((ROWS, COLUMNS), nan)
     found[LAUNCH, 3] = pieces.doubt + UNIT * max(abs(x.value), abs(z.value))
-    passage = ChartPassage(pieces, formulas, found, direction)
+    passage = ChartPassage(pieces, formulas, found, direction, offset)
     curve, tape, work, p, _ = passage._given
     locate(curve, tape, work, p, given, (*ends, float(direction != 0)), begin, found)
     if direction == 0:

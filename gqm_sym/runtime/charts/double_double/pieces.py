@@ -24,7 +24,14 @@ from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add, fast_sum, multiply, sine_and_cosine, square_root
+from gqm_sym.runtime.double_double.arithmetic import (
+    UNIT,
+    add,
+    fast_sum,
+    multiply,
+    sine_and_cosine,
+    square_root,
+)
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 
 # Chebyshev points of the first kind at which a piece is sampled.
@@ -42,10 +49,11 @@ MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
-X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW = range(0, 8 * RULE, RULE)
+# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each; and of
+# `offset_path.fill_path` the length of the path over that of the curve.
+X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
 
-stacked_points, stacked_places = on_stack(8 * RULE), on_stack(2 * RULE)
+stacked_points, stacked_places = on_stack(9 * RULE), on_stack(2 * RULE)
 
 
 class TrueCurve(NamedTuple):
@@ -69,6 +77,8 @@ class TrueCurve(NamedTuple):
         The nodes and weights of a Gauss-Legendre rule (`nodes.legendre_rule`).
     tails : (2, RULE) array
         Factors that take weighted values at its nodes to the last two Legendre coefficients.
+    offset : (float, float)
+        How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0.
     """
 
     terms: Any
@@ -79,10 +89,15 @@ class TrueCurve(NamedTuple):
     period: Any
     rule: Any
     tails: Any
+    offset: Any = (0.0, 0.0)
 
 
 TRUE_CURVE = types.NamedTuple(
-    (types.float64[:, :, ::1], types.int64[:, ::1], MATRIX, MATRIX, VECTOR, REAL, MATRIX, MATRIX), TrueCurve
+    (
+        *(types.float64[:, :, ::1], types.int64[:, ::1], MATRIX, MATRIX, VECTOR, REAL, MATRIX, MATRIX),
+        types.UniTuple(REAL, 2),
+    ),
+    TrueCurve,
 )
 
 
@@ -105,6 +120,7 @@ def unshared(curve):  # type: ignore[no-untyped-def]
         curve.period,
         uncounted(curve.rule),
         uncounted(curve.tails),
+        curve.offset,
     )
 
 

@@ -1,18 +1,19 @@
 """The effective potential along a chart in double-double arithmetic, with its derivative."""
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import Any, NamedTuple
 
+from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
     DX_LOW,
     DZ,
     DZ_LOW,
+    SHARE,
     X_LOW,
     Z_LOW,
     X,
     Z,
-    fill_points,
     piece_of,
     stacked_places,
     stacked_points,
@@ -48,19 +49,22 @@ def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def
 
 @Inner
 def energy_at(path, number, at):  # type: ignore[no-untyped-def]
-    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length."""
+    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length.
+
+    The potential is that of the body's path, arc length that of the curve.
+    """
     curve, tape, work, _ = path
     address, operations, parts, registers = tape
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = at
-    fill_points(curve, number, 1, u, points)
-    fill_registers(tape, work, 1, points, curve.errors[piece_of(curve, number), 0])
+    error, _ = fill_path(curve, number, 1, u, points)
+    fill_registers(tape, work, 1, points, error)
     call_interpreter(address, operations, parts[0], parts[2], work, 1)
     value, by_x, by_z = registers[2], registers[3], registers[4]
     s, s_low = multiply(work[by_x], work[by_x + LOW], points[DX], points[DX_LOW])
     t, t_low = multiply(work[by_z], work[by_z + LOW], points[DZ], points[DZ_LOW])
     slope = add(s, s_low, t, t_low)
-    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
+    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ]) / fabs(points[SHARE])
     return (work[value], work[value + LOW], work[value + ERROR]), slope, speed
 
 

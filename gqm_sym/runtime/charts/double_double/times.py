@@ -10,13 +10,12 @@ from math import fabs, nan, sqrt
 
 import numpy as np
 
+from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
     DX_LOW,
     DZ,
     DZ_LOW,
-    fill_points,
-    piece_of,
     stacked_places,
     stacked_points,
 )
@@ -74,11 +73,10 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     u, points, factors, sums = stacked_places(), stacked_points(), stacked_places(), stacked_sums()
     width = add(right[0], right[1], -left[0], -left[1])
     fill_places(curve, left, width, spread, u, factors)
-    fill_points(curve, number, RULE, u, points)
-    k = piece_of(curve, number)
-    fill_registers(tape, work, RULE, points, curve.errors[k, 0])
+    error, rate_error = fill_path(curve, number, RULE, u, points)
+    fill_registers(tape, work, RULE, points, error)
     call_interpreter(address, operations, parts[0], parts[1], work, RULE)
-    potential, rate_error = work[registers[2] : registers[2] + ROW], curve.errors[k, 1]
+    potential = work[registers[2] : registers[2] + ROW]
     from_turn, q, shift, rate = spread[0] != 0.0 and left[0] == 0.0, 1.0, level[3], 0.0
     for i in range(RULE):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])

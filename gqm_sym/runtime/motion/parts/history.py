@@ -40,18 +40,18 @@ class History(Positions):
             extends them.
         """
         legs = []
-        course = self._course
+        trajectory = self._listed_trajectory
         for timed in self._history():
-            corners = corner_crossings(timed, timed.segment.functions.corners, course.time_scale_error)
+            corners = corner_crossings(timed, timed.segment.functions.corners, trajectory.time_scale_error)
             last = "corner" if corners and corners[-1][1] == timed.phi_stop else timed.end
             corners = corners[:-1] if last != timed.end else corners
             marks = [(timed.t_start, timed.phi_start), *corners, (timed.t_stop, timed.phi_stop)]
-            lam = self._places_at(timed, marks) + timed.laps * course.lap
+            lam = self._places_at(timed, marks) + timed.laps * trajectory.lap
             for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
                 end = last if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
-                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * course.lap, t_end=inf)
+                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * trajectory.lap, t_end=inf)
         return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
@@ -76,7 +76,7 @@ class History(Positions):
     def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
         """The events on timed segments from launch, and the horizon if it is not later than a time in s."""
         found: list[Event] = []
-        time_scale_error = self._course.time_scale_error
+        time_scale_error = self._listed_trajectory.time_scale_error
         for timed in segments:
             found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
             found_here += [
@@ -135,19 +135,19 @@ class History(Positions):
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(self.problem.formulas, timed), self._course.time_scale_error)
+        return crossings(timed, contact_changes(self.problem.formulas, timed), self._listed_trajectory.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""
         f, lam = self.problem.functions, timed.segment.b
         x, z = path_and_force_at(f.addresses, f.p, np.array([lam]), np.zeros(1))[:2, 0]
-        return Event("asymptote", inf, lam + timed.laps * self._course.lap, float(x), float(z))
+        return Event("asymptote", inf, lam + timed.laps * self._listed_trajectory.lap, float(x), float(z))
 
     def _event(self, kind: str, when: Pair, timed: TimedSegment, phi: float) -> Event:
         f = self.problem.functions
         lam = self._places_at(timed, [(when, phi)])
         x, z = path_and_force_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
-        return Event(kind, when[0], float(lam[0]) + timed.laps * self._course.lap, float(x), float(z))
+        return Event(kind, when[0], float(lam[0]) + timed.laps * self._listed_trajectory.lap, float(x), float(z))
 
 
 def merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:

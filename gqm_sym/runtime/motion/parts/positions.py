@@ -1,7 +1,9 @@
 """States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from math import inf
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -17,8 +19,8 @@ from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
 from gqm_sym.runtime.motion.events import Leg, passages
-from gqm_sym.runtime.motion.locking import Lock, locked
-from gqm_sym.runtime.motion.riding.loads import felt
+from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.riding.loads import loads_on_rider
 from gqm_sym.runtime.motion.segments import errors
 from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
@@ -40,7 +42,7 @@ class Positions(ABC):
         self.problem = problem
         self.kind = kind
         self.direction = direction
-        self._lock = Lock()
+        self._lock: AbstractContextManager[Any] = RLock()
         horizon = problem.launch.t_max
         self._horizon = inf if horizon is None else horizon.value
 
@@ -51,7 +53,7 @@ class Positions(ABC):
         """The trajectory, computed for times up to ``end_time`` from launch at least."""
 
     @property
-    def _course(self) -> Trajectory:
+    def _listed_trajectory(self) -> Trajectory:
         """The trajectory that legs, events and passages are read off: of a motion that repeats, one period."""
         return self._trajectory(0.0)
 
@@ -95,7 +97,7 @@ class Positions(ABC):
 
     def _history(self) -> tuple[TimedSegment, ...]:
         """The timed segments that `legs` and `events` list."""
-        return self._course.segments
+        return self._listed_trajectory.segments
 
     # -- positions ----------------------------------------------------------------------------
 
@@ -172,7 +174,9 @@ class Positions(ABC):
             force[:] = length(rows[1:])
         if formulas.rider_loads is None:
             return StateInSpace, rows
-        return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])
+        return StateOfRider, np.concatenate(
+            [rows, loads_on_rider(self.problem, places, v, v2, force, self._resting(times))]
+        )
 
     def _resting(self, times: Array) -> NDArray[np.bool_]:
         """Whether the body is at rest for good at times from launch."""
@@ -334,7 +338,7 @@ class Positions(ABC):
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times at which the body passes a place, the first time on each segment."""
-        trajectory = self._course
+        trajectory = self._listed_trajectory
         return passages(trajectory.segments, trajectory, lam, low)
 
 

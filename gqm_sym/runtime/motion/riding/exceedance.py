@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.extremes import Quantity, course, phases, time_of
+from gqm_sym.runtime.motion.extremes import Quantity, phases, time_of, whole_trajectory
 from gqm_sym.runtime.motion.riding.loads import load_of
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -142,7 +142,7 @@ def _spans(motion: Any, quantity: Quantity, levels: Array, sign: int) -> list[tu
     if motion.kind == "rest" or motion.t_end == 0.0:
         here = quantity.of_state(motion.state(0.0))
         return [([(0.0, motion.t_end)] if sign * (here - level) > 0.0 else [], None) for level in levels.tolist()]
-    trajectory, end = course(motion)
+    trajectory, end = whole_trajectory(motion)
     period = end if motion.kind in ("libration", "circulation") else None
     spans: list[list[Span]] = [[] for _ in levels]
     for timed in trajectory.segments:

@@ -44,7 +44,9 @@ def load_extreme(name: str, sign: int) -> Any:
     return property(found, doc=f"The {'largest' if sign > 0 else 'least'} {name} load on a rider; as `v_max`.")
 
 
-def felt(problem: Problem, lam: Array, v: Array, v2: Array, force: Array, resting: NDArray[np.bool_]) -> Array:
+def loads_on_rider(
+    problem: Problem, lam: Array, v: Array, v2: Array, force: Array, resting: NDArray[np.bool_]
+) -> Array:
     """Rows of `FIELDS` at places and velocities.
 
     Where the body is ``resting`` for good, its track carries all of its weight: nothing changes, and what holds it is

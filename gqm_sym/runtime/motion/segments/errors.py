@@ -77,7 +77,8 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
     # Q at the ends, up to a factor.
     ends = np.array([segment.a, segment.b])
     steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
-    errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
+    least, steepness = float(steepness.min()), steepness.tolist()
+    errors = [error * (least / steep if steep > 0.0 else 1.0) for steep in steepness]
     if f.exact is None:
         # Slopes of a chart that no formulas improve are known to a rounding of the largest. The path of a centre
         # has roundings of the curve, which are larger by 1/ds.
@@ -86,12 +87,14 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
         shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
         roundings = max(CHART_ROUNDINGS, CENTRE_ROUNDINGS / shortest) if shortest > 0.0 else inf
         rounding = roundings * ULP * abs(segment.width) * largest
-        errors = errors + np.divide(rounding, steepness, out=np.zeros(2), where=steepness > 0.0)
+        errors = [
+            own + (rounding / steep if steep > 0.0 else 0.0) for own, steep in zip(errors, steepness, strict=True)
+        ]
     elif f.exact.edges.size:
         size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
         of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size)
     at_a, at_b = (
-        of_chart if known is not None or _is_launch_from_rest(segment, place) else float(own) + of_chart
+        of_chart if known is not None or _is_launch_from_rest(segment, place) else own + of_chart
         for place, known, own in zip((segment.a, segment.b), segment.ends, errors, strict=True)
     )
     return at_a, at_b

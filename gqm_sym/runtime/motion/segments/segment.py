@@ -195,6 +195,8 @@ class Segment:
     def _initial_edges(self) -> Array:
         """The first and the last phase angle, and those at which panels must begin, to the rounding of their places."""
         places = [*self.functions.between(self.functions.breaks, self.a, self.b).tolist(), *self.panel_breaks]
+        if not places:
+            return np.array([0.0, self.stop])
         inside = self._phase_angles([self._offsets_in_doubles(place) for place in places])
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
