@@ -32,6 +32,8 @@ from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 
 # Edges nearer to each other than this share of the track are one: they differ by rounding.
 SAME_EDGE = 1e-13
+# How much wider a piece may be than the next one.
+MAX_RATIO = 16.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,7 @@ class TrackOfTrain:
             raise ParameterError(
                 f"train: length: {length!r} m is not shorter than the track, which is {whole!r} m long"
             )
-        edges = _edges(track, track.edges, length)
+        edges = _graded(_edges(track, track.edges, length), track.period > 0.0)
         block = _mean_height(track, edges, length)
         joints = _merged(np.concatenate([edges, _inside(track.edges, edges)]), whole)
         kinks = np.concatenate([_edges(track, track.breaks, length)[1:-1], _inside(track.breaks, edges)])
@@ -131,6 +133,24 @@ def _edges(track: Chart, places: Array, length: float) -> Array:
     else:
         low, high = track.low + 0.5 * length, track.high - 0.5 * length
     return _merged(np.concatenate([[low, high], _inside(ends, np.array([low, high]))]), high - low)
+
+
+def _graded(edges: Array, is_closed: bool) -> Array:
+    """Return edges with more between them, so that no piece is much wider than the next one.
+
+    A piece has the digits that its width needs, and a body that turns just behind an edge has not run farther than
+    over the narrow piece before it.
+    """
+    while True:
+        widths = np.diff(edges)
+        around = np.concatenate([widths[-1:], widths, widths[:1]]) if is_closed else np.pad(widths, 1, mode="edge")
+        before, after = around[:-2], around[2:]
+        begins, ends = widths > MAX_RATIO * before, widths > MAX_RATIO * after
+        if not (begins.any() or ends.any()):
+            return edges
+        share = 0.5 * MAX_RATIO
+        cuts = [edges[:-1][begins] + share * before[begins], edges[1:][ends] - share * after[ends]]
+        edges = np.sort(np.concatenate([edges, *cuts]))
 
 
 @entry(types.Tuple((MATRIX, MATRIX))(VECTOR, VECTOR, REAL))
