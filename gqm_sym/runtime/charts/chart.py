@@ -40,6 +40,10 @@ _POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, r
 # Coefficients after the last one above this share of the largest value are rounding noise, and are set to zero.
 MAX_NOISE_RATIO = 2e-16
 
+# By how many units in the last place of their sizes the rows of a chart may be off, and the factor by which they are
+# changed where it is found out what that does.
+ROW_ROUNDINGS, MAGNIFIED = 3.0, 2.0**20
+
 # How far from a corner, in units in the last place, a place is the corner: places of points are rounded.
 CORNER_ROUNDINGS = 4.0
 
@@ -103,6 +107,9 @@ class Chart:
         part's own parameter; empty if the track has no parts.
     joints : array
         The arc length at the edges of all charts in the block, where it holds more than those of the curve.
+    from_points : bool
+        Whether its slopes are those of a spline through points, which have the rounding of the points divided by their
+        distance.
     """
 
     block: Array
@@ -114,6 +121,7 @@ class Chart:
     corners: Array = field(default_factory=lambda: np.empty(0))
     origins: Array = field(default_factory=lambda: np.empty((0, 3)))
     joints: Array = field(default_factory=lambda: np.empty(0))
+    from_points: bool = False
 
     @property
     def range(self) -> tuple[float, float, float]:
@@ -148,6 +156,32 @@ class Chart:
         before, after = self.points(np.append(self.corners - off, self.corners + off))[2].reshape(2, -1)
         signs: Array = np.sign(after - before)
         return signs
+
+    def rounded(self) -> Array:
+        """Return copies of the block, in each of which one row of one chart is changed, or its places.
+
+        The change is `MAGNIFIED` times what rounding may make of it. On a closed chart whole laps are subtracted from
+        places.
+        """
+        blocks, begin = [], 0
+        while begin < self.block.size:
+            count, first = int(self.block[begin + 1]), begin + EDGES + 3 * int(self.block[begin + 1]) + 2
+            records = self.block[first : first + count * RECORD].reshape(count, RECORD)
+            sizes = np.abs(records[:, 6:]).reshape(count, ROWS, TERMS).sum(axis=2)
+            # Coordinates are summed along the curve, and have the rounding of the largest of them.
+            sizes[:, :2] = (sizes[:, :2] + np.abs(records[:, 2:6:2])).max(axis=0)
+            sizes[:, 2] = np.maximum(sizes[:, 2], 1.0)
+            if self.from_points:
+                slopes = sizes[:, :2].max(axis=1) * records[:, 1]
+                sizes[:, 2] += slopes
+                sizes[:, 3] += slopes * records[:, 1]
+            changes = [(6 + row * TERMS, ROW_ROUNDINGS * sizes[:, row]) for row in range(ROWS)]
+            for column, change in (*changes, (0, self.period)) if self.period else changes:
+                block = self.block.copy()
+                block[first + column : first + count * RECORD : RECORD] += MAGNIFIED * ULP * change
+                blocks.append(block)
+            begin += int(self.block[begin])
+        return np.array(blocks)
 
     def nearest(self, x: float, z: float) -> tuple[float, float]:
         """Return the arc length of the point of the curve nearest to (x, z), and the distance to it."""

@@ -23,6 +23,9 @@ from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 # Steps of Newton's method.
 MAX_STEPS = 60
 
+# Bits of a difference quotient beyond those that it loses.
+EXTRA_BITS = 24
+
 # A part of a segment is integrated separately unless only this many of the working digits resolve it.
 MIN_PART_DIGITS = 10
 
@@ -69,8 +72,10 @@ class ChartTrack:
         What made the curve's chart, and the chart.
     potential
         ``f(op, x, z, p)``: the effective potential and its derivatives by x and z.
-    point, lam0
-        The launch by its coordinates, if it was given so, and by arc length from the start point.
+    offset : Number or None
+        How far to the left of the curve the body's path lies, on which x and z are; None if it is the curve.
+    launch : (Number, (Number, Number) or None)
+        The launch by arc length from the start point, and by its coordinates if it was given so.
     context, values
         An mpmath context, and the run-time parameters in it.
     """
@@ -80,12 +85,14 @@ class ChartTrack:
         maker: ChartMaker,
         chart: Chart,
         potential: Callable[..., Any],
-        point: tuple[Number, Number] | None,
-        lam0: Number,
+        offset: Number | None,
+        launch: tuple[Number, tuple[Number, Number] | None],
         context: Any,
         values: tuple[Any, ...],
     ) -> None:
         curve: TrueCurve = maker.true_curve(context, values, chart)
+        lam0, point = launch
+        self._offset = context.mpf(0) if offset is None else offset.at(context)
         self._context, self._values, self._chart, self._curve = context, values, chart, curve
         self._potential = potential
         self._near = lam0.value
@@ -111,18 +118,17 @@ class ChartTrack:
 
     def effective_potential(self, lam: Any) -> Any:
         """U, so that V**2 + 2*U is constant."""
-        spot = self.point(lam)
-        return self._potential(self._context, spot.x, spot.z, self._values)[0]
+        return self._potential(self._context, *self._beside(self.point(lam)), self._values)[0]
 
     def effective_potential_slope(self, lam: Any) -> Any:
         """Its derivative."""
         spot = self.point(lam)
-        _, by_x, by_z = self._potential(self._context, spot.x, spot.z, self._values)
-        return (by_x * spot.tx + by_z * spot.tz) * spot.ds
+        _, by_x, by_z = self._potential(self._context, *self._beside(spot), self._values)
+        return (by_x * spot.tx + by_z * spot.tz) * self.ds(lam)
 
     def ds(self, lam: Any) -> Any:
-        """Return ds/dlam, which is close to 1."""
-        return self.point(lam).ds
+        """Return ds/dlam of the body's path, which is close to 1 on the curve itself."""
+        return self.point(lam).ds - self._offset * self._turning_rate(lam) if self._offset else self.point(lam).ds
 
     def period(self) -> Any:
         """Return the period of lam on a closed curve."""
@@ -179,8 +185,25 @@ class ChartTrack:
         for k, (left, right) in enumerate(pairwise(edges)):
             inside = 0 < k < len(edges) - 2
             whole = self._curve.length(self._piece((left + right) / 2)) if inside else None
-            total += gauss(context, self.ds, (left, right), context.dps)[0] if whole is None else whole
+            total += gauss(context, self._length_rate, (left, right), context.dps)[0] if whole is None else whole
         return total
+
+    def _length_rate(self, lam: Any) -> Any:
+        """Return the derivative of arc length by lam, which is close to 1."""
+        return self.point(lam).ds
+
+    def _beside(self, spot: CurvePoint) -> tuple[Any, Any]:
+        """Return the coordinates of the body's path beside a point of the curve."""
+        return spot.x - self._offset * spot.tz, spot.z + self._offset * spot.tx
+
+    def _turning_rate(self, lam: Any) -> Any:
+        """Return the derivative of the tangent's angle by lam, from the tangents on both sides of a place."""
+        context, k = self._context, self._piece(lam)
+        c, precision = lam - self._lap(lam) + self._shifts[k], context.prec
+        with context.workprec(precision + precision // 2 + EXTRA_BITS):
+            step = context.ldexp(1 / context.mpf(self._record(k)[1]), -precision // 2)
+            before, after = self._on(k, c - step), self._on(k, c + step)
+            return (before.tx * after.tz - before.tz * after.tx) / (2 * step)
 
     # -- places -------------------------------------------------------------------------------
 
@@ -197,7 +220,7 @@ class ChartTrack:
             return wanted
         lam, length = wanted, self.arc(self._context.mpf(0), wanted)
         for _ in range(3):  # the first error is rounding, and each step squares it
-            nearer = lam + (wanted - length) / self.ds(lam)
+            nearer = lam + (wanted - length) / self._length_rate(lam)
             length += self.arc(lam, nearer)
             lam = nearer
         return lam

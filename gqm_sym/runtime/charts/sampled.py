@@ -5,7 +5,7 @@ points: the lengths of the chords at first, then those of the spline found befor
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from math import sqrt
 from typing import Any
@@ -265,13 +265,14 @@ def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
         np.concatenate([found.at_nodes[ROLL * k : ROLL * (k + 1)], found.at_nodes[behind + k :][:1]]).swapaxes(0, 1)
         for k in range(3)
     ]
-    return assemble_in_space(
+    chart = assemble_in_space(
         edges,
         anchors.T,
         derivatives,
         period=edges[-1] if closed else 0.0,
         breaks=edges[:-1] if closed else edges[1:-1],
     )
+    return replace(chart, from_points=True)
 
 
 def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
@@ -292,7 +293,7 @@ def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
 def _assembled(
     pieces: Pieces, parts: Indices, edges: Array, turn: float, closed: bool, breaks: object, corners: object
 ) -> Chart:
-    return assemble(
+    chart = assemble(
         edges,
         PieceData(pieces.anchors, pieces.angles, pieces.curvatures),
         period=edges[-1] if closed else 0.0,
@@ -301,6 +302,7 @@ def _assembled(
         corners=corners,
         origins=np.column_stack([parts, pieces.places]),
     )
+    return replace(chart, from_points=True)
 
 
 def _interpolated(points: Array, knots: Array, closed: bool) -> Any:

@@ -334,13 +334,8 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
     return max(error, of_launch)
 
 
-@entry(
-    types.Tuple((BOUNDED, BOUNDED, BOUNDED, LEVEL_AND_INTERVAL))(
-        TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, MATRIX
-    ),
-    checked=False,
-)
-def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
+@Inner
+def find_orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
     """Return the duration and the turning points of an orbit, NaN where they are not found.
 
     Parameters
@@ -367,10 +362,7 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
     orbit : (level, start, width)
         What `fill_times` needs of the orbit.
     """
-    work, p, nodes = uncounted(work), uncounted(p), uncounted(nodes)
     address, operations, parts, registers = tape
-    operations = uncounted(operations)
-    tape = (address, operations, parts, registers)
     fill_parameters(tape, p, work)
     _, place, _, _, _, period = registers
     if direction == 0:
@@ -394,6 +386,19 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
     duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
     low_error, high_error = errors[0] + UNIT * fabs(start[0]), errors[1] + UNIT * fabs(end[0])
     return duration, (start[0], start[1], low_error), (end[0], end[1], high_error), (level, start, width)
+
+
+@entry(
+    types.Tuple((BOUNDED, BOUNDED, BOUNDED, LEVEL_AND_INTERVAL))(
+        TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, MATRIX
+    ),
+    checked=False,
+)
+def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
+    """Return what `find_orbit_time` returns."""
+    address, operations, parts, registers = tape
+    tape = (address, uncounted(operations), parts, registers)
+    return find_orbit_time(tape, uncounted(work), uncounted(p), launch, offsets, direction, uncounted(nodes))
 
 
 class Orbit(NamedTuple):

@@ -284,8 +284,12 @@ class Formulas:
 
     def offset(self, p: Sequence[Number]) -> Pair:
         """How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0."""
-        radius = dict(zip(self.parameters, p, strict=True)).get(self.rolling_radius)
+        radius = self.radius(p)
         return ZERO if radius is None else (radius.value, radius.low)
+
+    def radius(self, p: Sequence[Number]) -> Number | None:
+        """The radius of a rolling body; None where the curve itself is the path."""
+        return dict(zip(self.parameters, p, strict=True)).get(self.rolling_radius)
 
     def domain(self, p: ParameterValues) -> Domain:
         """The range of the curve parameter."""

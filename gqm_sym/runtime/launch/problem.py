@@ -138,18 +138,15 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
 
 
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
-    """The problem of one launch in extended precision.
-
-    It is None if the curve is known in doubles only, and for the path of a body beside a charted curve: of that
-    double-double arithmetic has the most digits.
-    """
+    """The problem of one launch in extended precision; None if the curve is known in doubles only."""
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
         return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0, partial(tape_of, formulas, p))
-    if isinstance(exact, ExactPotential) and maker is not None and not formulas.rolling_radius:
+    if isinstance(exact, ExactPotential) and maker is not None:
         chart = formulas.charted(p)
         if maker.is_exact(chart):
-            along = partial(ChartTrack, maker, chart, exact.effective_potential, launch.point, launch.lam0)
+            given = formulas.radius(p), (launch.lam0, launch.point)
+            along = partial(ChartTrack, maker, chart, exact.effective_potential, *given)
             return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0, lambda: None)
     return None

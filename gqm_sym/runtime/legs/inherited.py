@@ -9,8 +9,10 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactLaw
+from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import RESTS
 from gqm_sym.runtime.legs.driver import Driver
+from gqm_sym.runtime.legs.frames.local_frame import Frame, error_of_chart
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_record import INHERITED, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run
@@ -18,10 +20,20 @@ from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIMIT, TURN
 from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
+NO_CHARTS: Array = np.empty((0, 0))
+
 
 def _known(errors: tuple[float, float, float]) -> Errors:
     """Bounds of errors, which are infinite where they come out as no numbers."""
     return Errors(*(inf if isnan(error) else error for error in errors))
+
+
+def _changed_charts(problem: Problem) -> Array:
+    """The run-time parameters with charts that are changed by what they may be off by, as rows."""
+    if problem.formulas.chart is None:
+        return NO_CHARTS
+    charts = problem.formulas.charted(problem.p).rounded()
+    return np.hstack([np.broadcast_to(problem.p.values, (len(charts), problem.p.values.size)), charts])
 
 
 class InheritedErrors:
@@ -40,6 +52,8 @@ class InheritedErrors:
         self._errors = [self._at_launch()]
         # For each panel of runs how large the terms of the force are that may cancel.
         self._terms: list[Array] = []
+        self._charts = _changed_charts(driver.problem)
+        self._frame: tuple[Frame, float, float] | None = None
 
     def before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
         """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
@@ -48,7 +62,7 @@ class InheritedErrors:
         run, (before, after) = self._runs[timed.leg], self._errors[timed.leg : timed.leg + 2]
         if timed.segment.v2 is not None:  # the approach to an equilibrium
             return after.place, np.full_like(phi, after.time)
-        of_frame = 0.0 if run.frame is None else run.frame.error
+        of_frame = 0.0 if run.frame is None else self._errors_of(run.frame)[0]
         swing = 2.0 * self._driver.last_swing if timed.leg == len(self._runs) - 1 else 0.0
         if swing and run.what != ASYMPTOTE:
             # So small a V**2 may have no error in the range of doubles, but the body stays where it is.
@@ -77,17 +91,23 @@ class InheritedErrors:
         frame, turns = run.frame, run.what in (TURN, RESTS)
         share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
         if frame is None:
-            problem = driver.problem
-            p, lap = problem.functions.p, problem.period if problem.functions.chart.size else 0.0
-            return _known(carry(driver.dissipation, p, turns, before, share, lap, terms, run.record))
+            p = driver.problem.functions.p
+            return _known(carry(driver.dissipation, p, turns, before, share, terms, self._charts, run.record))
+        of_place, of_force = self._errors_of(frame)
         if leg == 0 or self._runs[leg - 1].frame is None:
-            before = before._replace(place=before.place + frame.error)
+            before = before._replace(place=before.place + of_place)
         frame.move(run.record, -1)
-        share += 0.0 if frame.is_stable else driver.force_error
-        after = _known(carry(frame.dissipation, frame.p, turns, before, share, 0.0, terms, run.record))
+        share += of_force + (0.0 if frame.is_stable else driver.force_error)
+        after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, NO_CHARTS, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
-        return after._replace(place=after.place + frame.error) if run.what == LIMIT else after
+        return after._replace(place=after.place + of_place) if run.what == LIMIT else after
+
+    def _errors_of(self, frame: Frame) -> tuple[float, float]:
+        """The error of the place of a frame's equilibrium, and what the chart makes of the force there, as a share."""
+        if self._frame is None or self._frame[0] is not frame:
+            self._frame = (frame, *error_of_chart(frame, self._driver.dissipation, self._charts))
+        return self._frame[1:]
 
     def _terms_of(self, leg: int) -> Array:
         """For each panel of a leg how large the terms of the force are that may cancel; 0 where that is not known."""

@@ -7,7 +7,8 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). A law that is
+from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). Along a chart
+it follows from the forces on charts that are changed by what their rows may be off by (`Chart.rounded`). A law that is
 not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
 followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
 """
@@ -20,10 +21,11 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.charts.chart import MAGNIFIED
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
-from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.leg_reading import march_of
 from gqm_sym.runtime.legs.leg_record import (
@@ -88,7 +90,7 @@ def _slopes() -> Array:
 to_slopes = multiply(_slopes().T)
 
 # A buffer for places, V**2 there, and the rows of the speed equation.
-other_way_buffer = on_stack(7 * WIDE)
+sample_buffer = on_stack(7 * WIDE)
 
 
 class Errors(NamedTuple):
@@ -145,20 +147,31 @@ class Half(NamedTuple):
 
 
 @Inner
-def size_of_terms(forces, panel, least, work):  # type: ignore[no-untyped-def]
-    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`), which is at least ``least``."""
-    rows, v, nu, size = other_way_buffer(), -float(forces.direction), float(panel.contact_sign), 0.0
+def size_of_terms(forces, panel, least, charts, work):  # type: ignore[no-untyped-def]
+    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`), which is at least ``least``.
+
+    What a chart may be off by (``charts``, as of `carry`) counts as terms of which that is the rounding.
+    """
+    rows, v, nu, size = sample_buffer(), float(forces.direction), float(panel.contact_sign), 0.0
     for j in range(WIDE):
         rows[j], rows[WIDE + j] = work[ARC_RATE + j], max(work[W + j], LEAST_V2)
-    call_speed_equation(forces.speed_equation, WIDE, rows, (0, WIDE, 2 * WIDE), v, nu, forces.params)
+    call_speed_equation(forces.speed_equation, WIDE, rows, (0, WIDE, 2 * WIDE), -v, nu, forces.params)
     for j in range(COUNT):
         terms = max(least, max(fabs(work[P + j]), fabs(rows[3 * WIDE + j])))
         size = max(size, terms * (1.0 + work[EXPM1_Q + j]))
+    unit = MAGNIFIED * ULP * (V2_ROUNDINGS if forces.linear else NONLINEAR_V2_ROUNDINGS)
+    for k in range(charts.shape[0]):
+        call_speed_equation(forces.speed_equation, WIDE, rows, (0, WIDE, 2 * WIDE), v, nu, charts[k])
+        most = 0.0
+        for j in range(COUNT):
+            change = (rows[3 * WIDE + j] - work[P + j]) - (rows[4 * WIDE + j] - work[Q + j]) * work[W + j]
+            most = max(most, fabs(change) * (1.0 + work[EXPM1_Q + j]))
+        size += most / unit
     return size
 
 
 @Inner
-def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: ignore[no-untyped-def]
+def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: ignore[no-untyped-def]
     """Solve the panels of a half of the leg once more, and sum up how errors grow on them.
 
     Parameters
@@ -171,12 +184,12 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         Errors of the place where they begin, of V**2 there, and relative ones of gains and losses. INHERITED of each
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
-    terms : array
-        As in `carry`.
+    sizes : (array, array)
+        ``terms`` and ``charts``, as in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
-    (begin, count), left, u = panels, 0.0, float(march.direction)
+    (begin, count), left, u, (terms, charts) = panels, 0.0, float(march.direction), sizes
     by_place, by_v2, damping, gained, rounded, slope, rate = 0.0, 0.0, 1.0, v2, 0.0, 0.0, 0.0
     least, most = inf, -inf
     for k in range(count):
@@ -187,7 +200,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
             return Half(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf, v2)
-        size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], work)
+        size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], charts, work)
         fill_rates(march, panel, work)
         if k == 0:
             slope = u * (work[P] - work[Q] * work[W])
@@ -237,10 +250,10 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
 
 @entry(
     types.UniTuple(REAL, 3)(
-        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, REAL, VECTOR, VECTOR
+        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, MATRIX, VECTOR
     )
 )
-def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ignore[no-untyped-def]
+def carry(dissipation, p, turns, before, share, terms, charts, record):  # type: ignore[no-untyped-def]
     """The errors at the end of a leg, which are those with which the next one begins.
 
     Parameters
@@ -254,10 +267,10 @@ def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ig
     before : Errors
     share : float
         The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
-    lap : float
-        The period of a closed chart, which is read at places less whole laps; 0 of other curves.
     terms : array
         For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
+    charts : array
+        Rows of run-time parameters, each with another chart (`Chart.rounded`); none for a curve with formulas.
     record : array
         The record of the leg (`leg_record`). INHERITED is filled in: for panels from the end it is that of an error of
         1 of the place of the end.
@@ -270,16 +283,16 @@ def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ig
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
-    errors = (before.place, before.v2, share)
-    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, terms, record)
-    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]), lap)
+    errors, sizes = (before.place, before.v2, share), (terms, uncounted(charts))
+    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, sizes, record)
+    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
         moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2
         of_v2 = first.damping * (before.v2 + fabs(first.slope) * before.place)
         return rounding, of_v2 + share * first.gained, before.time + moved + own
     backward = March((record[END], record[END_LOW]), -v, 1.0, 0.0)
-    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), terms, record)
+    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), sizes, record)
     damping = first.damping / second.damping
     off = (share * (first.gained + second.gained) + fabs(first.v2 - second.v2)) / second.damping
     start_slope, rate = first.slope, first.rate

@@ -59,6 +59,7 @@ from gqm_sym.runtime.sweep.quantities import (
     PERIOD,
     SINGLE,
     SPAN_KNOWN,
+    SPANS,
     TURNING_POINTS,
     UNDECIDED,
 )
@@ -70,6 +71,9 @@ from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
 from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_slacks, find_passage, passage_of
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
+
+# What only motions have that repeat themselves.
+PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
 
 
 class GivenCurve(NamedTuple):
@@ -264,14 +268,15 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
 
 @Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
-    """Fill the row ``out`` with a quantity of an orbit; returns the status.
+    """Fill the row ``out`` with a quantity of an orbit; returns the status, SPAN_KNOWN of SPANS.
 
     ``asked`` is the quantity, the place of ARRIVAL_TIME, and side and last time as `GivenCurve` has them.
     """
     (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
-    tabulated = quantity != TURNING_POINTS or side != 0
+    by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
+    tabulated = not by_ends or side != 0
     tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, slacks)
-    if orbit.leaves != 0 and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
+    if orbit.leaves != 0 and needs_period:
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
         place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 and tabulated else nan
@@ -279,7 +284,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
             least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
             if orbit.leaves != 0 or not side * least > 0.0:
                 return UNDECIDED
-        if place == place and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
+        if place == place and needs_period:
             return NOT_PERIODIC
         if quantity != END_TIME and place == place:
             return UNDECIDED
@@ -290,6 +295,11 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
             return ANSWERED if t_max < inf else NOT_PERIODIC
         if quantity == END_TIME:
             quantity, target, limit = ARRIVAL_TIME, place, t_max
+    if quantity == SPANS:
+        out[0], out[1] = orbit.low, orbit.high
+        if orbit.circulates:
+            out[0], out[1] = orbit.low + orbit.high, nan
+        return SPAN_KNOWN
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if quantity == TURNING_POINTS:
@@ -318,11 +328,11 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     monotone : bool
         Whether V**2 is monotone between neighbouring axes of symmetry.
     quantity : int
-        One of HALF_PERIOD to MAX_FORCE.
+        One of HALF_PERIOD to END_TIME.
     spans : (n, 2) array
         For each launch of status SPAN_KNOWN what batches answered to SPANS.
     answers : Answers
-        Filled in: both turning points, or one number in the first column.
+        Filled in: both turning points or spans, or one number in the first column.
     given : GivenCurve
         What all launches share.
     """

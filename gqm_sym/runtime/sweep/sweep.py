@@ -27,6 +27,7 @@ from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.columns import as_doubles, broadcast_shape, check_launches, columns_of
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
+from gqm_sym.runtime.sweep.exact_orbits import answer_exactly
 from gqm_sym.runtime.sweep.groups import Group, groups_of, rests_on_corner
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
@@ -45,8 +46,8 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
-# Quantities that are times, which are found in parts where V**2 all but vanishes.
-IN_PARTS = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.ARRIVAL_TIME, quantities.END_TIME)
+# Quantities that are found from a tape of the formulas where doubles do not suffice.
+FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME)
 
 
 def sweep(
@@ -179,10 +180,15 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
         given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE)
-        scalar.answer_one_by_one(formulas.functions.addresses(), *launches, code, spans, found, given)
-        if code in IN_PARTS and (found.status == quantities.UNDECIDED).any():
-            given = given._replace(exact=_recorded(formulas, asked.lows))
-            scalar.answer_one_by_one(formulas.functions.addresses(), *launches, code, spans, found, given)
+        one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
+        exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
+        if code in ANSWERED_BY_BATCHES and exact.work.size:
+            spans = np.empty((found.status.size, 2))
+            one_by_one(quantities.SPANS, spans, found._replace(values=spans), given)
+            answer_exactly(exact, launches[0], code, spans, found)
+        one_by_one(code, spans, found, given)
+        if code in FROM_TAPE and (found.status == quantities.UNDECIDED).any():
+            one_by_one(code, spans, found, given._replace(exact=exact))
 
 
 def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:

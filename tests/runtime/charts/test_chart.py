@@ -1,7 +1,7 @@
 """Charts: curves known by numbers only, through the whole chain, against the same curves with formulas."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import ModuleType
 
@@ -16,7 +16,7 @@ from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.charts import evaluate
-from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.chart import MAGNIFIED, NODES, Chart, PieceData, assemble
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 ULP = 2.0**-52
@@ -51,6 +51,20 @@ class Ring:
     def is_exact(self, chart: Chart) -> bool:
         """No: here the chart is all there is."""
         return False
+
+
+@pytest.mark.parametrize("radius", [1e-3, 1.3, 700.0])
+def test_rows_are_off_by_no_more_than_they_may(radius: float) -> None:
+    """The changed charts of a circle are farther from it than the chart itself is, in each row."""
+    chart = Ring().chart((radius,))
+    s = np.linspace(0.0, 2.0 * np.pi * radius, 400, endpoint=False)
+    angle = s.astype(np.longdouble) / np.longdouble(radius)
+    exact = [radius * np.sin(angle), -radius * np.cos(angle), angle, np.full_like(angle, 1.0 / radius)]
+    found = chart.points(s)
+    for row, block in enumerate(chart.rounded()[:4]):
+        changed = replace(chart, block=block).points(s)
+        assert np.all(np.abs(found[row] - exact[row]) <= np.abs(changed[row] - found[row]) / MAGNIFIED)
+        assert np.array_equal(np.delete(changed, row, 0), np.delete(found, row, 0))
 
 
 @pytest.fixture(scope="module")

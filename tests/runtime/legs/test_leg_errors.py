@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+import generated.circle_coulomb as circle_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 
@@ -298,3 +299,18 @@ def test_drag_alone(t: float, build: Build) -> None:
     with mp.workdps(130):
         error = abs(mpf(state.lam) - 10 * mp.log(1 + mpf(t) / 5))
     assert error <= state.error <= 1e-9
+
+
+def test_charts_charge_their_own_rounding(build: Build) -> None:
+    """Swings on a ring without formulas, against the circle with formulas.
+
+    The chart's angle is off by a rounding of 2 pi, which moves the lowest point: places lay up to 658 bounds away.
+    """
+    curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
+    ring = build("ring_with_friction", curve, gqm.CoulombFriction(mu="mu"))
+    for lam0, v0 in ((2.55e-5, 0.00718), (1.51e-4, 0.0), (9.44e-4, 0.0), (-0.3, 0.2)):
+        one, other = circle_coulomb.solve(lam0, v0, L=1, mu="1e-4", mu_static="1e-4"), ring.solve(lam0, v0, mu="1e-4")
+        t = np.linspace(0.0, min(one.t_end, other.t_end, 4.0), 15)
+        exact, found = one.state(t), other.state(t)
+        assert np.all(np.abs(found.lam - exact.lam) <= found.error + exact.error)
+        assert found.error.max() < 1e-13

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
-from gqm_sym.runtime.sweep.quantities import SINGLE
+from gqm_sym.runtime.sweep.quantities import SINGLE, SOLVE
 
 # Curves with hills: their heights as formulas, an estimate of a hilltop, and where to launch from.
 HILLS: dict[str, tuple[Any, Any, float, tuple[float, float]]] = {
@@ -156,3 +156,41 @@ def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
         found = module.sweep("t_end", lam0, np.array([speed]), direction)
         assert found.route[0] == SINGLE
         assert ulps(float(found.values[0]), truth) <= MAX_PASSING_ULPS, (lam0, direction)
+
+
+# Half periods: twice the distance from 1 to the next double, relative.
+TWO_ULPS = 2.0 * 2.0**-52
+
+# Distances of an energy from that of a hilltop, as shares of the well's depth.
+GAPS = np.geomspace(0.3, 1e-7, 40)
+
+
+def test_half_periods_beside_a_hilltop_have_all_digits(modules: dict[str, ModuleType]) -> None:
+    """Of a pendulum that is thrown so that it all but comes to the top, by the complete elliptic integral."""
+    lam0 = np.linspace(-1.5, 2.0, GAPS.size)
+    with mp.workdps(40):
+        g = mpf("9.81")
+        v0 = [float(mp.sqrt(2 * g * (mp.cos(x) + 1 - 2 * gap))) for x, gap in zip(lam0, GAPS, strict=True)]
+        moduli = [(mpf(v) ** 2 / (2 * g) + 1 - mp.cos(x)) / 2 for x, v in zip(lam0, v0, strict=True)]
+        truth = np.array([float(2 * mp.ellipk(m) / mp.sqrt(g)) for m in moduli])
+    swept = modules["pendulum"].sweep("half_period", lam0, v0, np.resize([1, -1], GAPS.size))
+    assert (swept.route < SOLVE).all()
+    assert swept.values == pytest.approx(truth, rel=TWO_ULPS, abs=0.0)
+
+
+@pytest.mark.parametrize("name", ["uneven_wells", "two_wells", "waves"])
+def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[str, ModuleType]) -> None:
+    """Correctly rounded half periods and lap times, which compiled code finds without solving."""
+    _, height, near, (low, high) = HILLS[name]
+    lam0 = np.linspace(low, high, 12)
+    with mp.workdps(40):
+        top = height(mp.findroot(lambda x: mp.diff(height, x), near))
+        v0 = [
+            float(mp.sqrt(max(0, 2 * G * (top - height(mpf(x)) - gap * mpf("0.1")))))
+            for x, gap in zip(lam0, GAPS[4:], strict=False)
+        ]
+    swept = modules[name].sweep("half_period", lam0, v0)
+    assert (swept.route < SOLVE).all()
+    motions = [modules[name].solve(*launch) for launch in zip(lam0, v0, strict=True)]
+    times = [motion.half_period if motion.kind == "libration" else np.nan for motion in motions]
+    assert swept.values == pytest.approx(np.array(times), rel=TWO_ULPS, abs=0.0, nan_ok=True)

@@ -273,7 +273,7 @@ def test_mistakes_are_named(module_of: ModuleOf) -> None:
     sweep = module_of("circle").sweep
     with pytest.raises(InputError, match="quantity: must be one of half_period"):
         sweep("frequency", 0.1, L=1)
-    with pytest.raises(InputError, match="lam: is the place"):
+    with pytest.raises(InputError, match="lam: must be given with"):
         sweep("time_at", 0.1, L=1)
     with pytest.raises(InputError, match="v0: is a speed"):
         sweep("period", 0.1, [1.0, -1.0], L=1)

@@ -20,6 +20,7 @@ from numpy.polynomial import chebyshev
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, add, two_sum
+from gqm_sym.runtime.charts.chart import MAGNIFIED
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.emitted import compiler
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -236,6 +237,28 @@ def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array
     p = frame.p.copy()
     p[PLACE], p[PLACE_LOW], p[TERMS:OWN] = place, low, terms
     return frame._replace(p=p, error=ULP**2 * abs(place))
+
+
+def error_of_chart(frame: Frame, dissipation: Dissipation, charts: Array) -> tuple[float, float]:
+    """The error of the place of the equilibrium, and of the force next to it as a share, with those of the chart.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+    dissipation : Dissipation
+        The module's compiled functions.
+    charts : array
+        As of `leg_errors.carry`.
+    """
+    reach, terms = frame.reach, frame.p[TERMS:OWN]
+    places = float(frame.p[PLACE]) + reach * np.array([-1.0, 0.0, 1.0])
+    known, of_place, of_force = force_at_rest(dissipation, frame.p[OWN:], places)[0], frame.error, 0.0
+    for p in charts:
+        changes = (force_at_rest(dissipation, p, places)[0] - known) / (MAGNIFIED * abs(float(terms[0])))
+        of_place += abs(float(changes[1]))
+        of_force += float(np.abs(changes - changes[1]).max()) / reach
+    return of_place, of_force
 
 
 def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Number) -> tuple[Frame, float] | None:

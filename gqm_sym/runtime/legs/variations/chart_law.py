@@ -35,8 +35,9 @@ class ChartLaw(Law):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         formulas = problem.formulas
-        assert formulas.chart is not None
-        pieces = true_pieces_of(formulas.chart, problem.p, formulas.charted(problem.p))
+        maker, chart = formulas.chart, formulas.charted(problem.p)
+        assert maker is not None
+        pieces = true_pieces_of(maker, problem.p, chart) if maker.is_exact(chart) else None
         if not isinstance(formulas.exact, ExactChartLaw) or pieces is None:
             raise without_formulas()
         self._forces = ChartForces(formulas.exact, self.count, self.mass, shaping_of(formulas))

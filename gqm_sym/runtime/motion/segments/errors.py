@@ -91,8 +91,10 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
             own + (rounding / steep if steep > 0.0 else 0.0) for own, steep in zip(errors, steepness, strict=True)
         ]
     elif f.exact.edges.size:
-        size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
-        of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size)
+        # A body's path beside the curve has the roundings of the curve, which are larger by 1/ds there.
+        x, z, ds = path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:3]
+        size, shortest = float(np.hypot(x, z).max()), min(1.0, float(np.abs(ds).min()))
+        of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size) / shortest
     at_a, at_b = (
         of_chart if known is not None or _is_launch_from_rest(segment, place) else own + of_chart
         for place, known, own in zip((segment.a, segment.b), segment.ends, errors, strict=True)

@@ -12,6 +12,7 @@ VALUE                the time by the last level of nodes                        
 CHANGE               relative change of the time by that level                            time
 FACTOR_LOW           smallest value of V**2's regular factor at the nodes                 time
 FACTOR_HIGH          its largest value                                                    time
+FACTOR_AT_TURN       its value at the turning points of a thrown body in an even well     time
 OFFSET_LOW           offset of the lower end of the orbit from the launch place           time, proof
 OFFSET_HIGH          offset of the upper end                                              time, proof
 END_LOW, END_HIGH    both ends as values of the curve's parameter                         time of librations
@@ -45,10 +46,10 @@ from gqm_sym.runtime.compiled.types import Array
 # Orbits of a batch: its arrays stay in the first-level cache. The largest number of orbits in a register.
 BATCH, LANES = 128, 8
 
-INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, OFFSET_LOW, OFFSET_HIGH = range(8)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(8, 14)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(14, 19)
-ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(19, 25)
+INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(9)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(9, 15)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(15, 20)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(20, 26)
 TIME_ROWS, LIBRATION_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, LAUNCH_PLACE, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.

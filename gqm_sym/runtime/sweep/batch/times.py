@@ -33,6 +33,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     CHANGE,
     END_HIGH,
     END_LOW,
+    FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
     INDEX,
@@ -60,6 +61,11 @@ COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 
 # What becomes of an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
+
+# The ratio of the smallest to the largest regular factor of V**2 from which on roundings of the turning points, or of
+# the energy of a lap, do not matter. In even wells, both of whose turning points come near a hilltop, the factor counts
+# at these, unless they are exact, as those of a launch from rest are.
+MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.25, 0.1, 0.5
 
 # Steps of the arithmetic-geometric mean. Of two numbers in a ratio of 1 : 10, the root of MIN_CANCELLATION_RATIO, the
 # relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then exact to half an ulp,
@@ -162,13 +168,14 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def judge_level(rows, n, nodes, verdict):  # type: ignore[no-untyped-def]
-    """Set each orbit's time by a level of the rule, and the verdict on it."""
+def judge_level(rows, n, nodes, least, verdict):  # type: ignore[no-untyped-def]
+    """Set each orbit's time by a level of the rule, and the verdict on it; ``least`` is the ratio that doubles need."""
     for j in range(n):
         value, before = rows[SUM, j] / nodes, rows[CHANGE, j]
         change = fabs(value - rows[VALUE, j]) / value
         rows[VALUE, j], rows[CHANGE, j] = value, change
-        clear = rows[FACTOR_LOW, j] > MIN_CANCELLATION_RATIO * rows[FACTOR_HIGH, j]
+        high, at_turn = rows[FACTOR_HIGH, j], rows[FACTOR_AT_TURN, j]
+        clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > MIN_EVEN_RATIO * high)
         verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
 
 
@@ -197,13 +204,18 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     for j in range(n):
         rows[SUM, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, inf
         rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
+        rows[FACTOR_AT_TURN, j] = inf
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD and kind != CIRCULATION else 1.0
+    least = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
         more[:] = lost[:] = 0.0
         for node in range(begin, last + 1):
             rates = fill_integrand_batch(fns, kind, n, node, rows, p, work)
+            if mirrored and node == 0 and begin == 0:
+                for j in range(n):
+                    rows[FACTOR_AT_TURN, j] = choose(rows[LAUNCH_V2, j] == 0.0, inf, rows[FACTOR_LOW, j])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
@@ -215,7 +227,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
                     rows[VALUE, j] += share * rates[j]
         for j in range(n):
             rows[SUM, j] += more[j]
-        judge_level(rows, n, nodes, work[0, :n])
+        judge_level(rows, n, nodes, least, work[0, :n])
         if begin > 0:
             continuing = answer_level(rows, n, factor, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:
@@ -236,7 +248,8 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]
-        balanced = (b > MIN_CANCELLATION_RATIO * a) & (a > MIN_CANCELLATION_RATIO * b) & (a + b < inf)
+        least = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, MIN_EVEN_RATIO)
+        balanced = (b > least * a) & (a > least * b) & (a + b < inf)
         clear[j] = choose(balanced, 1.0, 0.0)
         pair[0, j], pair[1, j] = sqrt(a), sqrt(b)
     for _ in range(AGM_STEPS):

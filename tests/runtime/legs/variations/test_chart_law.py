@@ -11,6 +11,7 @@ from mpmath import mp, mpf
 from paths import ROOT
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
 # The goal for derivatives through legs, as a share of the largest of an array.
@@ -113,3 +114,12 @@ def test_jumps_of_the_force(rail: ModuleType) -> None:
             found = (turns[name][0], rest[name], force[name])
             for value, slope in zip(found, slopes, strict=True):
                 assert abs(value - slope) <= TOLERANCE * max(1.0, abs(slope)), name
+
+
+def test_points_in_space_have_none(generated_folder: Path) -> None:
+    """They are known in doubles only, which one error says."""
+    points = [(float(k), 3.0 * np.sin(k / 3.0), 8.0 - 0.4 * k) for k in range(8)]
+    model = gqm.derive(gqm.Curve.sampled(points), gqm.Gravity() + gqm.QuadraticDrag(b="1/100"))
+    slide = gqm.build(model, name="chute_in_space", folder=generated_folder).solve(0, v0=3)
+    with pytest.raises(SolutionError, match="known in doubles only"):
+        slide.gradient("t_end", "b")

@@ -73,6 +73,9 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
 # the other side, and bounds of the slope over the whole way do not prove that nothing stops them before.
 UNPROVED = {1: 50, -1: 49}
 
+# Amplitudes from which on times are left to double-double arithmetic.
+NEAR_TOP = 2.6
+
 
 @pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("way", [1, -1])
@@ -90,8 +93,10 @@ def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of
     assert (place[~done] * way < 0).all()
     assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
     times, why = answered(module_of("circle"), *launch, asked=quantities.HALF_PERIOD, **SAID[said])
-    assert ((why == quantities.ANSWERED) == done).all()
-    for value, a in zip(times[done, 0], 0.5 * (ends[done, 1] - ends[done, 0]), strict=True):
+    timed, clear = why == quantities.ANSWERED, reach < NEAR_TOP
+    assert (timed[clear] == done[clear]).all()
+    assert done[timed].all()
+    for value, a in zip(times[timed, 0], 0.5 * (ends[timed, 1] - ends[timed, 0]), strict=True):
         with mp.workdps(40):
             truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
         assert value == pytest.approx(float(truth), rel=4e-15)

@@ -1,0 +1,93 @@
+"""Half periods, lap times and turning points of single orbits in double-double arithmetic, where doubles lose digits.
+
+Next to a hilltop the turning point of a body moves far for a little energy, and so does its time: the rounding of V**2
+in doubles costs as many digits as the body comes close. Few launches of a sweep are so close, and curves with formulas
+have a tape for them (`double_double.orbit_time`).
+"""
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.strided import LAM0, PARAMETERS, V0, element
+from gqm_sym.runtime.compiled.types import MATRIX, Array
+from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
+from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, find_orbit_time
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+from gqm_sym.runtime.sweep.quantities import (
+    ANSWERED,
+    ANSWERS,
+    NOT_PERIODIC,
+    PERIOD,
+    SPAN_KNOWN,
+    TURNING_POINTS,
+    UNDECIDED,
+    Answers,
+)
+from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
+
+# The largest error of a turning point, as a share of the orbit's width.
+MAX_TURN_ERROR = 2.0**-54
+
+
+@entry(
+    types.void(EXACT, types.int64[:, ::1], types.int64, MATRIX, ANSWERS, types.UniTuple(MATRIX, 2)),
+    nogil=True,
+)
+def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignore[no-untyped-def]
+    """Answer each launch whose status is SPAN_KNOWN; it is UNDECIDED where double-double arithmetic does not suffice.
+
+    Parameters
+    ----------
+    exact : RecordedFormulas
+        The formulas.
+    columns : array
+        The launches, as `strided.pointers` gives them.
+    quantity : int
+        HALF_PERIOD, PERIOD or TURNING_POINTS.
+    spans : (n, 2) array
+        For each launch what SPANS asks for.
+    answers : Answers
+        Filled in.
+    nodes : (array, array)
+        The nodes of the trapezoidal rule for librations and for laps (`nodes.trapezoidal_nodes`).
+    """
+    (address, operations, parts, registers), work, p = exact
+    tape, work, p = (address, uncounted(operations), parts, registers), uncounted(work), uncounted(p)
+    half, lap = uncounted(nodes[0]), uncounted(nodes[1])
+    columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
+    statuses = uncounted(answers.status)
+    for k in range(statuses.size):
+        if statuses[k] != SPAN_KNOWN:
+            continue
+        low, high = spans[k, 0], spans[k, 1]
+        circulates, direction = high != high, 0
+        if circulates and quantity != PERIOD:
+            statuses[k] = NOT_PERIODIC
+            continue
+        if circulates:
+            direction = 1 if low > 0.0 else -1
+        for row in range(p.shape[1]):
+            p[0, row] = element(columns, PARAMETERS + row, k)
+        launch = element(columns, LAM0, k), 0.0, element(columns, V0, k), 0.0
+        found = find_orbit_time(tape, work, p, launch, (low, high), direction, lap if circulates else half)
+        duration, lower, upper, _ = found
+        if quantity == TURNING_POINTS:
+            values[k, 0], values[k, 1] = lower[0], upper[0]
+            enough = MAX_TURN_ERROR * (high - low)
+            decided = lower[2] <= enough and upper[2] <= enough  # NaN is not
+        else:
+            values[k, 0] = 2.0 * duration[0] if quantity == PERIOD and not circulates else duration[0]
+            decided = duration[2] <= MAX_ERROR * duration[0]
+        statuses[k] = ANSWERED if decided else UNDECIDED
+
+
+def answer_exactly(
+    exact: RecordedFormulas, columns: NDArray[np.int64], quantity: int, spans: Array, answers: Answers
+) -> None:
+    """Answer launches of which the spans are known (`fill_orbits`)."""
+    count = 0 if quantity == TURNING_POINTS else None
+    nodes = tuple(np.ascontiguousarray(trapezoidal_nodes(kind)[:, :count]) for kind in (LIBRATION, CIRCULATION))
+    fill_orbits(exact, columns, quantity, spans, answers, nodes)
