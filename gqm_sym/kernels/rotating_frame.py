@@ -28,7 +28,7 @@ def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
 
     Notes
     -----
-    The centrifugal potential is ``-Omega**2*x**2/2`` (MATHS, section 2).
+    The centrifugal potential is ``-Omega**2*(x**2 + y**2)/2``, with y = 0 in a plane (MATHS, section 2).
     """
     rate, pair = parameter(Omega, "Omega", where="rotating_frame")
     return Kernel(

@@ -90,6 +90,7 @@ TESTED_THROUGH = {
     "charts/exact_parts.py": "runtime/charts/test_exact_normals.py",
     "charts/level_pieces.py": "runtime/charts/test_tracing.py",
     "charts/train.py": "claims/test_trains.py",
+    "charts/train_load.py": "claims/test_trains.py",
     "compiled/buffers.py": "runtime/charts/test_tracing.py",
     "compiled/intrinsics.py": "runtime/arithmetic/test_elementary.py",
     "compiled/registers.py": "runtime/legs/panels/test_polynomials.py",

@@ -18,7 +18,7 @@ from gqm_sym.kernels import (
     RotatingFrame,
     SurfaceTension,
 )
-from gqm_sym.kernels.base import KAPPA, MASS, W
+from gqm_sym.kernels.base import KAPPA, MASS, W, Y
 
 x, z, g, k, beta, Omega = (sp.Symbol(name, real=True) for name in ("x", "z", "g", "k", "beta", "Omega"))
 mu, b, gamma, ell_c = (sp.Symbol(name, real=True) for name in ("mu", "b", "gamma", "ell_c"))
@@ -42,7 +42,7 @@ def test_gravity_takes_a_name_or_a_value(given, pair):
 def test_slots_add():
     """Potentials add, inertias add their excess over 1, parameters keep their order."""
     both = Gravity() + Rolling() + RotatingFrame()
-    assert both.potential == g * z - Omega**2 * x**2 / 2
+    assert both.potential == g * z - Omega**2 * (x**2 + Y**2) / 2
     assert both.inertia == 1 + beta
     assert both.parameters == ("g", "beta", "Omega")
     assert [name for name, _ in both.terms] == ["gravity", "rolling", "rotating_frame"]

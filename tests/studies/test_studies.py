@@ -154,7 +154,7 @@ def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
     ("line", "instead", "message"),
     [
         ("title: Pendulums", "titel: Pendulums", "1:1: unknown key 'titel'; did you mean title?"),
-        ("curve: swing.yaml", "curve: ../swing.yaml", "2:8: curve: '../swing.yaml': must be a path from the YAML"),
+        ("curve: swing.yaml", "curve: ../swing.yaml", "2:8: curve: '../swing.yaml': must be a path inside the YAML"),
         ("curve: swing.yaml", "curve: none.yaml", "2:8: curve: 'none.yaml': there is no such file in this folder"),
         ("[half_period, turning", "[half_time, turning", "3:14: quantities.0: must be 'half_period', 'period'"),
         ("[half_period, turning_points]", "[]", "3:13: quantities: must have"),

@@ -50,7 +50,8 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
-            f"gradients: there are none of {quantity} along points in space, because it contains the contact force"
+            f"gradients: there are none of {quantity}, because the contact force has no known derivatives along points "
+            "and pieces in space, nor on a space curve in a rotating frame"
         )
 
 

@@ -62,11 +62,11 @@ def test_one_crossing_a_leg(generated_folder: Path) -> None:
     def motion_to(t: float) -> Any:
         """A motion followed up to a time."""
         motion = module.solve(0, 3, c="0.01")
-        while motion._elapsed < t:
+        while motion._driver.elapsed < t:
             motion._go_on()
         return motion
 
     for t in (10.0, 300.0):
-        turns = sum(run.end == "turn" for run in motion_to(t)._runs)
+        turns = sum(run.end == "turn" for run in motion_to(t)._all_runs)
         assert turns <= crossings(lambda t=t: motion_to(t)) <= turns + 2  # a run may pause
         assert turns > 8.0 * t / 10.0

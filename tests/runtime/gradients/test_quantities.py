@@ -260,7 +260,7 @@ def test_the_time_at_a_place(place: float, circle: ModuleType) -> None:
         assert found[name] == pytest.approx(float(wanted), rel=1e-13)
     with pytest.raises(SolutionError, match="where the body turns"):
         circle.solve(**launch).gradient("time_at", lam=circle.solve(**launch).turning_points[0])
-    with pytest.raises(InputError, match="lam: is the place"):
+    with pytest.raises(InputError, match="lam: must be given with 'time_at'"):
         circle.solve(**launch).gradient("time_at")
 
 
