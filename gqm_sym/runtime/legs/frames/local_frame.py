@@ -2,8 +2,8 @@
 
 Doubles resolve a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e.
 So the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance
-from e. Functions of the interface then serve the legs with distances for places: P becomes ``C(d) + (P(e + d, W) - P(e
-+ d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
+from e. Functions of the interface then serve the legs with distances for places: P becomes
+``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
 
 Swings about a stable equilibrium stay so near to it. From an unstable one a launched body departs, the later the nearer
 it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
@@ -217,7 +217,9 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
 
 
 def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array]]) -> Frame:
-    """Return the frame with equilibrium and force from double-double arithmetic, more accurate than e in doubles.
+    """Return the frame with the equilibrium and the force on a body at rest computed in double-double arithmetic.
+
+    Doubles locate the equilibrium only to a rounding of e, and the fitted force has a few roundings of its own.
 
     Parameters
     ----------
