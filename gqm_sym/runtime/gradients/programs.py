@@ -271,7 +271,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
-    ds/dlam, m*kappa, m*n0, U without losses, y of a space curve, and m**2 times ``load_along_curvature`` of one in no
+    ds/dlam, m*kappa, m*n0, U (0 with losses), y of a space curve, and m**2 times ``load_along_curvature`` of one in no
     vertical plane.
     """
     op = Recorder(parameters)
@@ -279,8 +279,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     quantities = [formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)]
     for formula in (formulas.kappa, formulas.static_normal_load):
         quantities.append(m * formula(*arguments))
-    if isinstance(formulas, ExactFormulas):
-        quantities.append(formulas.effective_potential(*arguments))
+    quantities.append(formulas.effective_potential(*arguments) if isinstance(formulas, ExactFormulas) else op.number(0))
     if formulas.y is not None:
         quantities.append(formulas.y(*arguments))
     if formulas.load_along_curvature is not None:

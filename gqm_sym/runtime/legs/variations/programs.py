@@ -149,10 +149,10 @@ def chart_load_program(forces: ChartForces) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
-    """Return the program of states at a point, as `gradients.programs.path_program` without a potential."""
+    """Return the program of states at a point, as `gradients.programs.path_program`."""
     at = _ChartPoint(forces)
     op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
-    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load):
+    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load, op.number(0)):
         if quantity is None:
             outputs += [op.number(1), *at.stretches, op.number(0)]
         else:
