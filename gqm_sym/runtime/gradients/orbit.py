@@ -1,4 +1,6 @@
-"""A periodic orbit with its derivatives: turning points, duration, action, and how they come about along the orbit."""
+"""A periodic orbit with its derivatives: those of turning points, duration and action, and of the path and the time
+along the orbit.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -30,12 +32,12 @@ def without_formulas() -> SolutionError:
 
 
 def check_force(formulas: Formulas, quantity: str) -> None:
-    """Refuse derivatives that hold a contact force without a sign.
+    """Refuse derivatives of a contact force that has neither a sign nor a formula.
 
     Raises
     ------
     SolutionError
-        Unless the quantity has nothing to do with the contact force, or that has a formula.
+        If the quantity depends on the contact force, and that has neither a sign nor a formula.
     """
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
@@ -46,11 +48,12 @@ def check_force(formulas: Formulas, quantity: str) -> None:
 
 
 def pairs(*numbers: tuple[float, float, float]) -> Array:
-    """Numbers, as two doubles each with a bound on the error, as inputs of a program."""
+    """Return numbers, each given as two doubles and a bound on the error, as inputs of a program."""
     return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
 
 
-# Values of functions at shares of the phase, and their integrals from the beginning of it: a row for each function.
+# The type of a function that returns, for shares of the phase, the values of functions and their integrals from the
+# beginning of the phase: a row for each function.
 SeriesOf = Callable[[Array], Array]
 
 
@@ -66,8 +69,8 @@ class OrbitDerivatives(ABC):
     source : AnySource
         What programs are recorded from.
     by_arc_length : bool
-        Whether the parameter of the curve is its arc length. Then parameters may move the curve's points, and
-        derivatives at the points of the curve are not those at given arc lengths.
+        Whether the parameter of the curve is its arc length. In that case run-time parameters may move the curve's
+        points, and derivatives at the points of the curve differ from those at given arc lengths.
     """
 
     direction: int
@@ -92,28 +95,32 @@ class OrbitDerivatives(ABC):
     @property
     @abstractmethod
     def series(self) -> tuple[SeriesOf, Array]:
-        """The time per phase with its derivatives and then those of arc length per share; and those of the lap."""
+        """The series of the time per phase and its derivatives and then of those of arc length per share; and the
+        derivatives of the lap.
+        """
 
     @abstractmethod
     def at_places(self, lam: Array) -> PathRows:
-        """`path_rows` at places."""
+        """Return `path_rows` at places."""
 
     @abstractmethod
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Half of V**2, or the contact force, at places: with two derivatives by the place, and those by variables."""
+        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
+        variables.
+        """
 
     @abstractmethod
     def _integrals(self, first: int, count: int) -> Array:
-        """The integrals of results over a half period, or over a lap."""
+        """Return the integrals of results over a half period, or over a lap."""
 
     @property
     def moved_ends(self) -> Array:
-        """The derivatives of the turning points of a libration at the points of the curve, which do not move."""
+        """The derivatives of the turning points of a libration, relative to the points of the curve."""
         return self.ends
 
     @property
     def launch_moves(self) -> Array:
-        """How the place of the launch changes, at the points of the curve, which do not move."""
+        """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
         return moves
@@ -124,12 +131,12 @@ class OrbitDerivatives(ABC):
         return self._integrals(1, self.source.variables)
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
-        """The second derivatives of the half period of a libration, or of the time of a lap.
+        """Return the second derivatives of the half period of a libration, or of the time of a lap.
 
         Parameters
         ----------
         rows : tuple of int
-            The variables, of which each pair has one, as `programs.pairs_of` them.
+            The variables; there is a derivative for each of their pairs, in the order of `second_programs.pairs_of`.
         """
         raise SolutionError("gradient: second derivatives along curves without formulas are not there yet")
 
@@ -151,9 +158,9 @@ class OrbitDerivatives(ABC):
 
     @property
     def _period_share(self) -> float:
-        """How many of what is integrated over make a period."""
+        """The number of half periods, or of laps, in a period."""
         return 1.0 if self.direction else 2.0
 
     def without_shift(self, moved: Array, lam: Array) -> Array:
-        """Return the change of a place among the fixed points of the curve from the change of its parameter."""
+        """Convert the change of a place's parameter to the change of the place relative to the points of the curve."""
         return moved

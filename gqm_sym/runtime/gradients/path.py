@@ -1,4 +1,4 @@
-"""The path at given places, with its derivatives, and how what is read off it changes with place and velocity."""
+"""The path at given places with its derivatives, and the changes of coordinates and forces along a changed motion."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -14,12 +14,12 @@ from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 # The quantities of a path (`programs.path_program`).
 X, Z, DS, CURVATURE, LOAD, POTENTIAL, SPACE_Y, PRODUCT = range(8)
 
-# Rows of what changes with a path: the velocity, whose change is given, stands among them.
+# The rows of changes of states along a path. The change of the velocity is given.
 CHANGED_X, CHANGED_Z, CHANGED_V, CHANGED_FORCE, CHANGED_Y = range(5)
 
 
 class PathRows(NamedTuple):
-    """What `path_program` gives at n places.
+    """The results of `path_program` at n places.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class PathRows(NamedTuple):
 def path_rows(
     formulas: ExactFormulas | ExactLaw, parameters: Array, mass: int, high: Array, low: Array | None = None
 ) -> PathRows:
-    """The path at places, with derivatives."""
+    """Return the path at places, with derivatives."""
     count = parameters.shape[1]
     found = values(path_program(formulas, count, mass), parameters, high, low, parts=1)
     return PathRows(found.reshape(len(found) // (count + 2), count + 2, high.size))
@@ -75,7 +75,7 @@ def fill_changed(rows, variable, places, out):  # type: ignore[no-untyped-def]
 
 @Inner
 def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
-    """Fill the changes of what is read off a path.
+    """Fill the changes of coordinates and contact forces along a path.
 
     Parameters
     ----------

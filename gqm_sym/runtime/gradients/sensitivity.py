@@ -1,8 +1,8 @@
 """Derivatives of states at given times with respect to launch and parameters, after any number of periods.
 
-At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
-``delay`` is how much further on, in time, the body is along the changed orbit.
+At a fixed phase angle everything changes smoothly. When a variable changes, the body reaches a phase angle earlier or
+later, by the changes of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is the time by which the body is further along the changed orbit.
 """
 
 from collections.abc import Sequence
@@ -21,20 +21,19 @@ from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
 
-# Rows of points on an orbit: the phase angle, the velocity, +1 or -1 where the phase angle grows or falls with time,
-# how many half periods or laps lie before it, how many laps, and the place within the lap (`records.phases_along`).
+# The rows of points on an orbit (`records.phases_along`): the phase angle, the velocity, the sign of the change of the
+# phase angle with time, the numbers of half periods (or laps) and of laps before the point, and the place in the lap.
 PHASE, SPEED, SENSE, TURNS, LAPS, PLACE, POINT_ROWS = range(7)
 
-# What is constant along an orbit, a row for each and a number for each variable: the change of its half period or lap,
-# how much later the phase begins because of the launch, by how much arc length from launch changes where it begins and
-# in each lap, the changes of the length of a lap in lam and of both turning points, and the relative change of the
-# width.
+# The rows of the constants of an orbit, with a number for each variable: the changes of the half period (or the time of
+# a lap), of the time at which the phase begins, of the arc length from launch at that time, of the arc length of a lap,
+# of the length of a lap in lam, and of both turning points; and the relative change of the width.
 DURATION, LAUNCH_DELAY, LAUNCH_ARC, LAP_ARC, LAP, LOWER, UPPER, WIDENING, CONSTANTS = range(9)
 
-# Points that are taken together: with more of them, the system would have to provide memory anew for each question.
+# The number of points that are evaluated together; for more of them the system would provide memory anew each time.
 BLOCK = 2048
 
-# Rows of changes of states.
+# The rows of changes of states.
 LAM, S, X, V, N, Y, STATE_ROWS = 0, 1, 2, 4, 5, 6, 7
 
 
@@ -46,7 +45,7 @@ class Sensitivity(NamedTuple):
     Attributes
     ----------
     wrt : tuple of str
-        What the derivatives are by: run-time parameters, the launch place ``lam0`` and speed ``v0``.
+        The variables of differentiation: run-time parameters, the launch place ``lam0`` and the launch speed ``v0``.
     lam, s, x, z, v, normal_force, y : array
         Derivatives of the curve parameter, of arc length from launch, of the coordinates, of the velocity ds/dt and of
         the contact force, at fixed times. That of y is 0 along a planar curve.
@@ -108,7 +107,7 @@ def fill_changes(points, orbit, series, path, scale, found):  # type: ignore[no-
 
 
 def points_of(found: Any, lam: Array, v: Array) -> Array:
-    """Points on an orbit as `fill_changes` takes them.
+    """Return points on an orbit in the form that `fill_changes` takes.
 
     Parameters
     ----------
@@ -147,7 +146,7 @@ class OrbitSensitivity:
         self._orbits: dict[float, Array] = {}
 
     def _orbit(self, motion: Any, phi: float) -> Array:
-        """The constants of the orbit; the phase angle of the launch has more digits once the period is known so."""
+        """Return the constants of the orbit; the launch's phase angle gains digits once the period is known exactly."""
         if phi not in self._orbits:
             self._orbits[phi] = self._constants(motion, phi)
         return self._orbits[phi]
@@ -162,7 +161,7 @@ class OrbitSensitivity:
         else:
             orbit[LOWER], orbit[UPPER] = derivatives.moved_ends.T
             orbit[WIDENING] = (orbit[UPPER] - orbit[LOWER]) / self._width
-        # With no delay at launch so far, these are the changes at a fixed phase angle.
+        # Without a delay of the launch, these are the changes at a fixed phase angle.
         speed = motion.direction * motion.problem.launch.v0.value
         still = np.array([[phi], [speed], [0.0], [0.0], [0.0], [motion.problem.lam0]])
         series, found = self._series(still[PHASE] / self._scale), np.empty((STATE_ROWS, variables, 1))
@@ -175,7 +174,7 @@ class OrbitSensitivity:
         return orbit
 
     def _launch_delay(self, motion: Any, path: PathRows, times: Array, at_launch: Array) -> Array:
-        """How much later the orbit's phase begins because of the launch.
+        """Return the change of the time at which the phase begins.
 
         Parameters
         ----------
@@ -193,11 +192,12 @@ class OrbitSensitivity:
         if self._derivatives.direction:
             circulating: Array = direction * ds / v0 * moves
             return circulating
-        # The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
+        # It follows from the launch place and also from the launch speed; the speed is used near turning points, the
+        # place elsewhere.
         acceleration = -path.rows[POTENTIAL, -1, 0] / ds
         if v0**2 < abs(acceleration) * ds * self._width:
             own: Array = np.zeros_like(times)
-            own[V0] = given.direction  # at rest, the direction in which a speed would be
+            own[V0] = given.direction  # at rest, the direction that a speed would have
             passed: Array = direction * (own - at_launch[V]) / acceleration
         else:
             passed = ds / v0 * (moves - at_launch[LAM])
@@ -205,14 +205,14 @@ class OrbitSensitivity:
         return delay
 
     def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
-        """The derivatives of lam, s, x, z, v, N and y at times by some of the variables.
+        """Return the derivatives of lam, s, x, z, v, N and y at times by some of the variables.
 
         Parameters
         ----------
         motion : motion.periodic.PeriodicMotion
             The motion.
         points : (POINT_ROWS, n) array
-            Where it is at the times.
+            The points of the orbit at the times.
         phi : float
             The phase angle of the launch.
         rows : sequence of int
@@ -225,7 +225,7 @@ class OrbitSensitivity:
         return out
 
     def _part(self, orbit: Array, points: Array) -> Array:
-        """The derivatives at some of the points, by all variables."""
+        """Return the derivatives at some of the points by all variables."""
         found = np.empty((STATE_ROWS, orbit.shape[1], points.shape[1]))
         path, series = self._derivatives.at_places(points[PLACE]).rows, self._series(points[PHASE] / self._scale)
         fill_changes(points, orbit, series, path, self._scale, found)
@@ -237,7 +237,7 @@ class OrbitSensitivity:
         return found
 
     def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
-        """The derivatives of lam alone, as in `at`, where ds/dlam is known."""
+        """Return the derivatives of lam alone, by all variables, given ds/dlam."""
         orbit, share = self._orbit(motion, phi)[:, :, None], points[PHASE] / self._scale
         times = self._scale * self._series(share)[1, 1 : 1 + orbit.shape[1]]
         delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times

@@ -1,4 +1,4 @@
-"""The changes along an orbit as a series with its integrals: of Fourier, or of Legendre on panels."""
+"""The changes along an orbit as a series with its integrals: a Fourier series, or Legendre series on panels."""
 
 from math import cos, pi, sin
 
@@ -12,13 +12,13 @@ from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 from gqm_sym.runtime.gradients.evaluation import CUBE
 
-# Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
-# number at most.
+# Terms below this share of the largest one are rounding if at least so many follow each other; the last terms may be at
+# most the third number.
 MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
 
 
 class Series:
-    """Functions of a share u, periodic with period 1, by their values at the midpoints of N equal intervals.
+    """Functions of a share u, periodic with period 1, given by their values at the midpoints of N equal intervals.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Series:
         used = next((k for k in range(1, counts.size) if not counts[k : k + TERMS_IN_A_ROW].any()), counts.size)
         turns = np.divide(1.0, 2j * np.pi * order[:used], where=order[:used] > 0, out=np.zeros(used, complex))
         values, integrals = terms[:, :used], terms[:, :used] * turns
-        # The factors of all cosines, then those of sines, and that of the share; integrals vanish at 0.
+        # The factors of all cosines, of all sines, and of the share; integrals vanish at 0.
         self._table = np.zeros((2, len(samples), 2 * used + 1))
         self._table[:, :, :used], self._table[:, :, used:-1] = (
             (values.real, integrals.real),
@@ -50,7 +50,7 @@ class Series:
         self._table[1, :, -1] = values[:, 0].real
 
     def __call__(self, share: Array) -> Array:
-        """The values at shares, and the integrals from 0 to there: each a row for each function."""
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         waves = np.empty((self._table.shape[2], share.size))
         fill_waves(share, waves)
         found: Array = self._table @ waves
@@ -59,7 +59,7 @@ class Series:
 
 @entry(types.void(VECTOR, MATRIX), checked=False)
 def fill_waves(shares, waves):  # type: ignore[no-untyped-def]
-    """Fill rows of cosines of whole multiples of the phase, from the multiple 0 on, then those of sines, and shares."""
+    """Fill rows of the cosines of multiples of the phase, from the multiple 0 on, of their sines, and of the shares."""
     n, count = shares.size, waves.shape[0] // 2
     for i in range(n):
         waves[0, i], waves[count, i], waves[2 * count, i] = 1.0, 0.0, shares[i]
@@ -67,14 +67,14 @@ def fill_waves(shares, waves):  # type: ignore[no-untyped-def]
         for i in range(n):
             if k == 1:
                 waves[1, i], waves[count + 1, i] = cos(2.0 * pi * shares[i]), sin(2.0 * pi * shares[i])
-            else:  # of two halves, so that rounding grows with the logarithm of the order only
+            else:  # from two halves, so that rounding grows only with the logarithm of the order
                 one, other = k // 2, k - k // 2
                 c, s, more_c, more_s = waves[one, i], waves[count + one, i], waves[other, i], waves[count + other, i]
                 waves[k, i], waves[count + k, i] = c * more_c - s * more_s, s * more_c + c * more_s
 
 
 class PanelSeries:
-    """Functions of a share of the phase by their values at the nodes of panels.
+    """Functions of a share of the phase, given by their values at the nodes of panels.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class PanelSeries:
         self._table = np.ascontiguousarray(both.transpose(2, 3, 0, 1)).reshape(len(edges) - 1, RULE + 1, -1)
 
     def __call__(self, share: Array) -> Array:
-        """The values at shares, and the integrals from 0 to there: each a row for each function."""
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         found = np.empty((2, self._table.shape[2] // 2, share.size))
         fill_polynomials(self._edges, self._table, share, found)
         return found
@@ -124,7 +124,7 @@ def fill_polynomials(edges, table, shares, found):  # type: ignore[no-untyped-de
 
 
 def to_legendre() -> Array:
-    """The matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
+    """Return the matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
     rule = panel_rule()
     table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
     return table

@@ -1,7 +1,7 @@
-"""The state of a body on a periodic motion at any times, from the tables of its one segment, in one call from Python.
+"""The state of a body at any times of a periodic motion, from the tables of its one segment, in one call from Python.
 
-Everything that is needed is stored in one *record*, an array of doubles, because passing twenty arrays would take
-longer than reading them. A record begins with the positions of its sections; integers are stored by their bits.
+All data are stored in one *record*, an array of doubles, because passing twenty arrays would take longer than reading
+them. A record begins with the positions of its sections; integers are stored by their bits.
 
 ======================== ===================================================================================
 section                  contents
@@ -42,7 +42,7 @@ from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at
 from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block
 
-# Times that are answered together.
+# The number of times for which states are found together.
 BLOCK = 128
 FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
@@ -52,7 +52,7 @@ _STATE = types.UniTuple(types.float64, 10)
 
 
 class Phases(NamedTuple):
-    """Where a block of n times falls on the segment of a periodic motion.
+    """The positions of a block of n times on the segment of a periodic motion.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def phase_angles_at(timing, kind, table, t, n, phases):  # type: ignore[no-untyp
         r, low = two_sum(fma(-count, period, s), fma(-count, period_low, low))
         before = r + low < 0.0
         sign = choose(before, -1.0, 1.0)
-        # Before it reaches ``a``, the body is on its way back to it. The rounded quotient may pass the other end.
+        # Before the body reaches ``a``, it is on its way back to it. The rounded quotient may lie beyond the other end.
         if is_libration:
             r, low = sign * r, sign * low
             over = r > 0.5 * period
@@ -179,15 +179,17 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
 
 @Inlined
 def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore[no-untyped-def]
-    """The bound on the error of a curve parameter, from those of the time and of the table, and from its rounding."""
+    """Return the bound on the error of a curve parameter, from the errors of the time and of the table, and from its
+    rounding.
+    """
     rate = choose(ds > 0.0, fabs(v) / ds, 0.0)
-    of_time = choose(time_error < inf, rate * time_error, inf)  # without a known time, rest has no place
+    of_time = choose(time_error < inf, rate * time_error, inf)  # if the time is unknown, so is the place of rest
     return of_time + table_error + ULP * (1.5 * fabs(lam - in_lap) + 2.0 * fabs(in_lap))
 
 
 @Inner
 def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untyped-def]
-    """Fill where the body is at n times: its phases, and rows of the place within the lap, the velocity and its square.
+    """Fill the phases at n times, and rows of the place within the lap, of the velocity and of its square.
 
     ``work`` is space for 4 * n numbers.
     """
@@ -239,7 +241,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     owners = section(record, OWNERS).view(np.int64)
     direction = 1.0 if shape[1] > shape[0] else -1.0
     size = min(BLOCK, end - begin)
-    # Two arrays for all work space: an array for each row would take as long as the state at one time.
+    # Two arrays serve as all work space, because making an array for each row would take as long as finding the state
+    # at one time.
     buffer, indices = np.empty((19, size)), np.empty((2, size), dtype=np.int64)
     phi, sense, laps, motion, arc = buffer[0], buffer[1], buffer[2], buffer[3:6], buffer[6]
     reduced, v, v2 = motion[0], motion[1], motion[2]
@@ -267,9 +270,9 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
 
 @entry(types.void(VECTOR, VECTOR, VECTOR, MATRIX))
 def phases_along(record, p, t, out):  # type: ignore[no-untyped-def]
-    """Fill rows for times: the phase angle, the velocity, +1 or -1 where the phase angle grows or falls with time.
+    """Fill rows for times: the phase angle, the velocity, and the sign of the change of the phase angle with time.
 
-    After these come how many half periods or laps lie before the phase, how many laps or periods, and the place within
+    The next rows are the number of half periods (or laps) before the phase, the number of periods, and the place within
     the lap. The half periods are counted from the segment's end ``a``.
     """
     kind, timing = section(record, FUNCTIONS).view(np.int64)[5], section(record, TIMING)

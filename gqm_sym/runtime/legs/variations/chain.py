@@ -1,13 +1,13 @@
 """Compiled code that passes changes of a motion with losses on from leg to leg, and reads them off at given times.
 
-Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
+Here y, sigma and ``delay`` are the changes of W, of the place and of the time at a given distance from a moving origin
 (`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
-sgn(dlam/dt). Both halves of a leg agree on these in the middle, which determines how the turn at the end moves. A body
-that is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
-speed.
+sgn(dlam/dt). Both halves of a leg must agree on these in the middle, which determines the change of the turn at the
+end. A body that is thrown slowly and speeds up is followed from the place at which it would have been at rest, so that
+nothing is divided by its speed.
 
 A change of an origin has ORIGIN_ROWS rows with a number for each variable, which are the run-time parameters, lam0 and
-v0: sigma, y, ``delay``, and ``arc``, the change of arc length from launch, less ds/dlam times that of the place.
+v0: sigma, y, ``delay``, and ``arc``, the change of the arc length from launch, less ds/dlam times that of the place.
 """
 
 from math import inf, sqrt
@@ -44,16 +44,17 @@ from gqm_sym.runtime.legs.variations.equation import (
 
 SIGMA, Y, DELAY, ARC, ORIGIN_ROWS = range(5)
 
-# Records of runs, where they begin, where the panels of their halves begin, and the panels (`equation.lay_panels`).
+# The records of runs, the indices at which they begin and at which the panels of each half begin, and the panels
+# (`equation.lay_panels`).
 LAID = types.Tuple((VECTOR, WHOLE, WHOLE, MATRIX))
 
-# Rows of changes of states.
+# The rows of changes of states.
 LAM, S, X, SPEED_ROW, Y_ROW, ARC_ROW, STATE_ROWS = 0, 1, 2, 4, 6, 7, 8
 
 
 @Inner
 def mixed(origin, solutions, begin, step, parameters, variable):  # type: ignore[no-untyped-def]
-    """The sum of solutions for a variable: those from an index of a line on, each a step behind the one before."""
+    """Return the sum of solutions for a variable; on a line they follow each other from an index on, a step apart."""
     n = parameters
     found = origin[SIGMA, variable] * solutions[begin + n * step]
     found += origin[Y, variable] * solutions[begin + (n + 1) * step]
@@ -76,14 +77,14 @@ def go_ahead(origin, solutions, parameters):  # type: ignore[no-untyped-def]
 def go_back(origin, solutions, parameters, force, step, rate):  # type: ignore[no-untyped-def]
     """Carry a change from the middle of a run to its end, with the solutions on the last panel of the half from there.
 
-    The end moves as the middle does, and by so much more that both halves agree in the middle.
+    The end moves with the middle, and in addition by the amount for which both halves agree in the middle.
 
     Parameters
     ----------
     force : float
         dW/dlam at the end.
     step : float
-        By how much it jumps in the middle.
+        The jump of the force in the middle.
     rate : float
         dt/dlam in the middle.
     """
@@ -134,7 +135,7 @@ def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends): 
             origin[SIGMA, i] -= folded * lap[i]
             origin[ARC, i] += ds * folded * lap[i]
         if was_ahead:
-            if k > 0 and begin == first[2 * k - 1]:  # it goes on from where the last run ended
+            if k > 0 and begin == first[2 * k - 1]:  # the run begins at the end of the last one
                 step = jump(panels, forces, breaks, begin - 1, begin, TO_START)
                 for i in range(n + 2):
                     origin[Y, i] += step * origin[SIGMA, i]
@@ -159,7 +160,7 @@ def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends): 
 
 @Inner
 def panel_at(first, panels, half, w):  # type: ignore[no-untyped-def]
-    """The panel of a half at a march variable, by halving."""
+    """Return the panel of a half at a march variable, by bisection."""
     low, high = first[half], first[half + 1] - 1
     while low < high:
         middle = (low + high + 1) // 2
@@ -187,7 +188,7 @@ def fill_along(laid, series, origins, halves, points, rows, found, states):  # t
     points : (2, m) array
         The march variables, and V**2.
     rows : int
-        How many solutions are needed: all, or those of the time.
+        The number of solutions that are needed: all, or those of the time.
     found : (ORIGIN_ROWS, n + 2, m) array
         Changes as of origins, at given distances from them, but ``y`` as a share of V**2; they are filled.
     states : (5, m) array
@@ -228,7 +229,7 @@ def fill_states(along, law, path, v, found):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     along : (ORIGIN_ROWS, n + 2, m) array
-        What `fill_along` gives.
+        The results of `fill_along`.
     law, path : arrays
         The law (`law.Law.matrix`) and the path (`gradients.path.PathRows`) there.
     v : (m,) array

@@ -22,7 +22,7 @@ from gqm_sym.runtime.legs.variations.law import LawRows, states_of
 
 
 class Origin(NamedTuple):
-    """How the end of a run changes; each field has a number, or a row, for each variable.
+    """The changes of the end of a run; each field has a number for each variable.
 
     The variables are the run-time parameters, lam0 and v0.
 
@@ -31,11 +31,11 @@ class Origin(NamedTuple):
     sigma : array
         The change of the place.
     y : array
-        The change of V**2 there, at the place that moves.
+        The change of V**2 at the moving place.
     delay : array
-        The change of the time there, at the place that moves.
+        The change of the time at the moving place.
     arc : array
-        The change of arc length from launch, less ds/dlam times that of the place.
+        The change of the arc length from launch, less ds/dlam times the change of the place.
     """
 
     sigma: Array
@@ -45,7 +45,7 @@ class Origin(NamedTuple):
 
 
 class Along(NamedTuple):
-    """How some states change.
+    """The changes of some states.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Along(NamedTuple):
 
 
 class Changes:
-    """The changes of a motion with losses along some of its runs, the first one of which is that of the launch.
+    """The changes of a motion with losses along some of its runs, beginning with the run of the launch.
 
     Parameters
     ----------
@@ -74,11 +74,11 @@ class Changes:
     law : Law
         The law of motion.
     followed : int
-        How many runs there were, with approaches to an equilibrium.
+        The number of runs, including approaches to an equilibrium.
     runs : list of Run
         The runs.
     ends : list of Origin
-        For each run, how its end changes: the turn, or a place that moves with the origin of its last half.
+        For each run, the changes of its end: of the turn, or of a place that moves with the origin of its last half.
     """
 
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
@@ -102,11 +102,11 @@ class Changes:
 
     @property
     def variables(self) -> int:
-        """How many variables there are."""
+        """The number of variables."""
         return self.law.count + 2
 
     def by_all(self, rows: Array) -> Array:
-        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
+        """Extend derivatives by the run-time parameters to derivatives by all variables, where the others are zero."""
         return np.concatenate([rows, np.zeros((2, *rows.shape[1:]))])
 
     @property
@@ -132,14 +132,14 @@ class Changes:
         return lap
 
     def at_end(self, k: int) -> tuple[Array, float]:
-        """The state in which the k-th run ends, and the speed there."""
+        """Return the state at the end of the k-th run, and the speed there."""
         run, panel = self.runs[k], self._panels[self._first[2 * k + 1] - 1]
         speed = float(end_speed.py_func(panel))
         numbers = *run.pair(END), speed**2, float(run.record[HEADING]), float(panel[CONTACT_SIGN])
         return states_of(*(np.array([number]) for number in numbers)), speed
 
     def _launched(self, start: LawRows, state: Array) -> Array:
-        """How the launch changes: a row for each field of an origin."""
+        """Return the changes of the launch: a row for each field of an `Origin`."""
         n, launch = self.law.count, self._problem.launch
         changes = np.zeros((ORIGIN_ROWS, n + 2))
         sigma, y, delay, arc = changes
@@ -151,22 +151,24 @@ class Changes:
             slope = start.force[0, 0]
             if launch.direction == heading:
                 delay[n + 1] = -2.0 * start.ds[0] / abs(slope)
-            else:  # thrown the other way, it comes back with little less speed
+            else:  # a body thrown the other way comes back with little less speed
                 state = states_of(state[0], state[1], np.zeros(1), np.array([-heading]), state[4])
                 delay[n + 1] = 2.0 * start.ds[0] / abs(LawRows(self.law.matrix(state)).force[0, 0])
         return changes
 
     def told(self, sigma: Array, arc: Array, laps: Array | float) -> Array:
-        """How a place changes as it is told, from how its label does and the arc length to there (`Origin`)."""
+        """Return the change of a place in the curve's parameter, from the changes of its label and of the arc length to
+        it (`Origin`).
+        """
         if not self.law.by_arc_length:
             changed: Array = sigma + laps * self.lap.reshape(-1, *[1] * (sigma.ndim - 1))
             return changed
         changed = sigma + arc
-        changed[self.law.count] += 1.0  # the launch place itself, from the start point
+        changed[self.law.count] += 1.0  # the change of the launch place itself, from the start point
         return changed
 
     def half(self, leg: int, is_back: bool) -> int:
-        """The number of a half of the run with a number.
+        """Return the number of a half of the run with a given number.
 
         Raises
         ------
@@ -181,18 +183,20 @@ class Changes:
 
     @cached_property
     def _series(self) -> Array:
-        """Chebyshev coefficients of the solutions."""
+        """Return the Chebyshev coefficients of the solutions."""
         return np.ascontiguousarray((self._solutions[:, :, :COUNT] @ TO_COEFFICIENTS.T).swapaxes(1, 2))
 
     def along(self, halves: NDArray[np.int64], w: Array, v: Array, *, whole: bool = True) -> Along:
-        """How states change at march variables w on halves with numbers; unless ``whole``, places and times only."""
+        """Return the changes of states at march variables w on halves with given numbers; unless ``whole``, those of
+        places and times only.
+        """
         found, states = np.empty((ORIGIN_ROWS, self.variables, w.size)), np.empty((5, w.size))
         rows = self._series.shape[2] if whole else self.variables
         fill_along(self._laid, self._series, self._origins, halves, np.array([w, v * v]), rows, found, states)
         return Along(found, states)
 
     def states(self, along: Along, law: Array, v: Array) -> Array:
-        """The changes of states at given times (`chain.fill_states`), where the law and the velocities are known."""
+        """Return the changes of states at given times (`chain.fill_states`), given the law and the velocities there."""
         path = self.law.path(*along.states[:2])
         found = np.empty((STATE_ROWS, self.variables, v.size))
         fill_states(along.changes, law, path.rows, v, found)
@@ -200,6 +204,6 @@ class Changes:
 
 
 def _most_panels(run: Run) -> int:
-    """How many panels there are at most of a run, where those of a slow launch are divided (`equation.lay_half`)."""
+    """Return the largest number of panels of a run; those of a slow launch are divided (`equation.lay_half`)."""
     is_slow = run.ahead and 0.0 < run.half_c < inf
     return run.ahead + run.back + (int(log2(run.panels_ahead[-1, RIGHT] / run.half_c + 1.0)) + 1 if is_slow else 0)

@@ -1,7 +1,7 @@
 """The variational equation along the panels of legs, in the march variable in which the legs were found.
 
-Let dW/dlam = F(lam, W; p), where W is V**2, and let the place where a half of a leg begins (its *origin*: the start, or
-the turn at the end) move by sigma. At a given distance d from the origin, W changes by y with
+The law of motion is dW/dlam = F(lam, W; p), where W is V**2. If the beginning of a half of a leg (its *origin*: the
+start, or the turn at the end) moves by sigma, then W at a given distance d from the origin changes by y with
 
     dy/dd = u (F_W y + F_p + F_lam sigma),
 
@@ -9,12 +9,12 @@ where u is the direction in which d grows. This is the equation of the leg itsel
 the same integrating factor solves it. From a turning point y begins with 0 and vanishes as W does, so that y/W and the
 change of the time per w, ``dt/dw (ds_p/ds + ds_lam sigma/ds - y/(2 W))``, are smooth in the march variable w there too.
 The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for y = 1 at the origin are found for all
-panels at once; the change of a leg is a sum of them (`chain`).
+panels; the change of a leg is a linear combination of them (`chain`).
 
 Each run has two *halves*: number 2k is that of run k from its start, 2k + 1 that from its end. Either may have no
-panels. A panel is a row of PANEL_COLUMNS numbers: the march variable where it begins, how far it goes, the place of the
-origin as two doubles, u, the signs of dlam/dt and of N, and c/2 of the march variable (infinite where that is the
-distance); from SPEEDS on Y at its nodes.
+panels. A panel is a row of PANEL_COLUMNS numbers: the march variable at its beginning, its width, the place of the
+origin as two doubles, u, the signs of dlam/dt and of N, and c/2 of the march variable (infinite if that is the
+distance); from SPEEDS on, Y at its nodes.
 
 The solutions on a panel are rows of WIDE numbers, for its nodes and for its end: for each solution the change of the
 time from the origin, then for each solution y/W at the nodes and y at the end, then for each parameter the integral of
@@ -55,19 +55,19 @@ from gqm_sym.runtime.legs.panels.polynomials import (
     to_means,
 )
 
-# From values at the nodes to those at both ends of a panel.
+# The matrix that maps values at the nodes to those at both ends of a panel.
 TO_START, TO_END = (-1.0) ** np.arange(COUNT) @ TO_COEFFICIENTS, TO_COEFFICIENTS.sum(axis=0)
 
-# A panel that begins this near to where the curve is not smooth, as a share of the place, begins there.
+# A panel that begins this near to a break of the curve, as a share of the place, counts as beginning there.
 AT_BREAK = 1e-12
 
 PANEL_BEGIN, PANEL_WIDTH, ORIGIN, ORIGIN_LOW, OUTWARD, PANEL_HEADING, CONTACT_SIGN, PANEL_HALF_C = range(8)
 SPEEDS, PANEL_COLUMNS = WIDE, 2 * WIDE
 
-# Rows of states (`law.States`).
+# The rows of states (`law.states_of`).
 PLACE, PLACE_LOW, W, STATE_HEADING, STATE_SIGN = range(5)
 
-# States of each run before those of the nodes: where it starts and ends, and its middle.
+# The number of states of each run before those of the nodes: its start, its end and its middle.
 MARKS = 3
 
 CUBE, WHOLE = types.float64[:, :, ::1], types.int64[::1]
@@ -75,21 +75,21 @@ CUBE, WHOLE = types.float64[:, :, ::1], types.int64[::1]
 
 @Inner
 def distance_at(panel, w):  # type: ignore[no-untyped-def]
-    """The distance from the origin at a march variable, and V over Y there."""
+    """Return the distance from the origin at a march variable, and V over Y there."""
     half_c = panel[PANEL_HALF_C]
     return (w, 1.0) if half_c == inf else (w * (w + 2.0 * half_c), w + half_c)
 
 
 @Inner
 def place_on(panel, w):  # type: ignore[no-untyped-def]
-    """The place at a march variable, as two doubles."""
+    """Return the place at a march variable, as two doubles."""
     high, low = two_sum(panel[ORIGIN], panel[OUTWARD] * distance_at(panel, w)[0])
     return high, low + panel[ORIGIN_LOW]
 
 
 @Inner
 def value_at_end(weights, line, at):  # type: ignore[no-untyped-def]
-    """A function at an end of a panel, by its values at the nodes, which begin at an index of a line."""
+    """Return a function at an end of a panel, from its values at the nodes, which begin at an index of a line."""
     total = 0.0
     for j in range(COUNT):
         total += weights[j] * line[at + j]
@@ -98,13 +98,13 @@ def value_at_end(weights, line, at):  # type: ignore[no-untyped-def]
 
 @Inner
 def end_speed(panel):  # type: ignore[no-untyped-def]
-    """V at the end of a panel."""
+    """Return V at the end of a panel."""
     return distance_at(panel, panel[PANEL_BEGIN] + panel[PANEL_WIDTH])[1] * value_at_end(TO_END, panel, SPEEDS)
 
 
 @Inner
 def sum_series(terms, at, x):  # type: ignore[no-untyped-def]
-    """The sum of the Chebyshev series whose coefficients begin at an index of a line."""
+    """Return the sum of the Chebyshev series whose coefficients begin at an index of a line."""
     following, after = 0.0, 0.0
     for j in range(COUNT - 1, 0, -1):
         following, after = terms[at + j] + 2.0 * x * following - after, following
@@ -113,10 +113,10 @@ def sum_series(terms, at, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def lay_half(records, at, count, head, panels, k):  # type: ignore[no-untyped-def]
-    """Lay the panels of a half from row k on, of which the first PANEL_COLUMNS numbers but Y are those of ``head``.
+    """Fill the panels of a half from row k on, and return the next free row; ``head`` has what they have in common.
 
-    The march variable of a slow launch begins near a zero of V**2 behind it, at -c/2. There Y is smooth, but changes of
-    it are not: panels are no longer than their distance from it.
+    The march variable of a slow launch begins near a zero of V**2 behind it, at -c/2. Y is smooth there, but its
+    changes are not, so panels must be no wider than their distance from this zero.
     """
     terms, half_c, left = np.empty(WIDE), head[PANEL_HALF_C], 0.0
     mark = half_c if half_c > 0.0 else inf
@@ -151,23 +151,23 @@ def mark_state(states, at, record, mark, v2, panel):  # type: ignore[no-untyped-
 
 @entry(MATRIX(VECTOR, WHOLE, WHOLE, MATRIX), checked=False)
 def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
-    """Lay the panels of all halves, and return the states (`law.States`) in which the law is needed.
+    """Fill the panels of all halves, and return the states (`law.states_of`) in which the law is needed.
 
     Parameters
     ----------
     records : array
         The records of all runs, one after the other.
     begins : array of int
-        Where each begins.
+        The indices at which these begin.
     first : array of int
-        Where the panels of each half begin, which is filled; the last item is their number.
+        The indices at which the panels of each half begin; the last item is the number of panels. They are filled.
     panels : array
         The panels, which are filled.
 
     Returns
     -------
     array
-        The states where each run starts, where each ends, in the middle of each, and at the nodes of all panels.
+        The states at the start of each run, at the end of each, in the middle of each, and at the nodes of all panels.
     """
     runs, head = begins.size, np.zeros(WIDE)
     first[0] = 0
@@ -185,7 +185,7 @@ def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
     for k in range(runs):
         record, one, other = records[begins[k] :], first[2 * k], first[2 * k + 1]
         v2, on_way, at_end = record[START_V2], panels[one], panels[other if record[BACK] > 0.0 else one]
-        # Where no panels lead from the start, the start is the middle.
+        # If there are no panels from the start, the start is the middle.
         mark_state(states, k, record, START, v2, on_way)
         mark_state(states, runs + k, record, END, 0.0, at_end)
         middle_v2 = end_speed(panels[other - 1]) ** 2 if record[AHEAD] > 0.0 else v2
@@ -202,9 +202,9 @@ def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
 
 @Inner
 def jump(panels, forces, breaks, one, other, weights):  # type: ignore[no-untyped-def]
-    """By how much the force jumps from the end of a panel to an end of another one.
+    """Return the jump of the force from the end of a panel to an end of another one.
 
-    At a given distance from an origin that moves, V**2 changes by as much there, times how far that moves. The force at
+    At a given distance from a moving origin, V**2 changes there by the jump times the shift of the origin. The force at
     the nodes is ``forces``; the ``weights`` are those of one end of the other panel.
     """
     if breaks.size == 0:
@@ -254,7 +254,7 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
     parameters : int
         The number of run-time parameters.
     start, before : (n + 2,) arrays
-        y of the solutions, and the change of the time, where the panel begins; they are set to those where it ends.
+        y of the solutions, and the change of the time, at the beginning of the panel; they are set to those at its end.
     arcs : (n,) array
         The same of the integrals of ds/dlam.
     out : array
@@ -266,13 +266,14 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
     twice = 1.0 if by_distance else 2.0
     for j in range(COUNT):
         work[growth + j] = distance_at(panel, panel[PANEL_BEGIN] + width * SHARES[j])[1]
-        # By w and not by the distance: laws with the root of W have a pole here at a turn, but not times the growth.
+        # Integrals are over w and not over the distance: laws with the square root of W have a pole at a turn, which
+        # the growth of the distance with w cancels.
         work[rate + j] = twice * work[growth + j] * law[n + 4, at + j]
     to_means(work, rate, work, factor)
     for j in range(WIDE):
         work[factor + j] = exp(u * (width * ENDS_BY_NODE[j]) * work[factor + j])
     for row in range(n + 2):
-        # A row for each parameter, for sigma, and for what begins with y = 1 and has no source.
+        # A row for each parameter, for sigma, and for the solution that begins with y = 1, which has no source.
         force, stretch = (n + 5 + row, 2 + row) if row < n else (n + 3, 1)
         if row <= n:
             for j in range(COUNT):
@@ -284,7 +285,7 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
         for j in range(COUNT):
             y = work[factor + j] * (work[gained + j] + start[row])
             share = y / (panel[SPEEDS + j] * work[growth + j]) ** 2
-            # What begins with V**2 = 0 does not begin with a change of it.
+            # No solution begins with y = 1 where V**2 is 0.
             out[shares + j] = share if by_distance or row <= n else 0.0
             stretched = law[stretch, at + j] / law[0, at + j] if row <= n else 0.0
             work[rate + j] = twice * law[0, at + j] / panel[SPEEDS + j] * (stretched - 0.5 * out[shares + j])
