@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 11, input a0162e77d64e, body 7ad9de06a8d8
+# interface 11, input a0162e77d64e, body 9cd55e90b3a7
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -438,6 +438,11 @@ def orbit_invariants_batch(n, lows, highs, p, out):
         out[9, i] = 1/_t10
         out[10, i] = _t10
         out[11, i] = _t5
+    for i in range(n):
+        _a, b = lows[i], highs[i]
+        _t4 = cos(_a)
+        _t8 = cos(b)
+        _t9 = sin(b)
         out[12, i] = _t9
         out[13, i] = _t4
         out[14, i] = _t8

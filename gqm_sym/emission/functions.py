@@ -18,6 +18,10 @@ CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
 
+# LLVM vectorises a loop if it can check, before the loop begins, that no row that is written overlaps another one that
+# is read or written, and it makes at most 128 such checks.
+MAX_OVERLAPS = 128
+
 # The width up to which several loads of a value are on one line.
 WIDTH = 112
 
@@ -97,6 +101,31 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
     return replace(function, inside=(*rows, *kept), outputs=outputs), lines, set(charts)
 
 
+def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:
+    """The rows of ``out`` and the assignments of each of the loops that a function is divided into."""
+    parts: list[tuple[list[int], list[Assignment]]] = []
+    for row in range(len(function.outputs)):
+        rows = [*parts[-1][0], row] if parts else [row]
+        assignments = _needed(function, rows)
+        loads = sum(type(a.value).__name__ == "at" for a in assignments)
+        if len(rows) > 1 and len(rows) * loads + len(rows) * (len(rows) - 1) // 2 > MAX_OVERLAPS:
+            parts.append(([row], _needed(function, [row])))
+        else:
+            parts[-1:] = [(rows, assignments)]
+    return parts
+
+
+def _needed(function: FunctionIR, rows: Sequence[int]) -> list[Assignment]:
+    """The assignments inside a loop that some rows of ``out`` need, in their order."""
+    names = {symbol.name for row in rows for symbol in function.outputs[row].free_symbols}
+    kept: list[Assignment] = []
+    for a in reversed(function.inside):
+        if a.name in names:
+            kept.insert(0, a)
+            names |= {symbol.name for symbol in a.value.free_symbols}
+    return kept
+
+
 def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
     """The template's fields of a function over many places, and the names that it calls.
 
@@ -110,8 +139,12 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
     before = [_views(function)]
     before += _unpacked(function.parameters, function.arguments[-2])
     before += _statements(function.before, printer)
-    inside = _statements(function.inside, printer)
-    inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
+    # Rows of a chart that stand in ``out`` are overwritten by one loop, before another could read them.
+    whole = bool(filled) and not any("spare_rows" in line for line in filled)
+    loops = []
+    for rows, assignments in [(range(len(function.outputs)), function.inside)] if whole else _divided(function):
+        lines = _statements(assignments, printer)
+        loops.append([*lines, *(f"{out}[{k}, {index}] = {printer.doprint(function.outputs[k])}" for k in rows)])
     if filled:
         printer.used |= {name for name in ("chart_rows", "spare_rows") if any(f"{name}(" in line for line in filled)}
         printer.charts |= read
@@ -125,7 +158,7 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
         "loop": True,
         "index": index,
         "count": count,
-        "inside": inside,
+        "loops": loops,
     }
     return fields, printer.used
 
@@ -169,6 +202,7 @@ def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) 
         "loop": function.batch,
         "index": index,
         "count": count[0] if count else "",
+        "loops": [inside],
         "inside": inside,
     }
     return fields, printer.used
