@@ -65,7 +65,7 @@ def _launching() -> argparse.ArgumentParser:
 
 
 def _modules() -> argparse.ArgumentParser:
-    """Return the option that says where generated modules are."""
+    """Return the option for the folder of generated modules."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument(
         "-o",

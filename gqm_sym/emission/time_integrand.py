@@ -10,7 +10,9 @@ from gqm_sym.emission.subscripts import at
 
 
 def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """Times of orbits about an axis, by an arithmetic-geometric mean or by an integrand, and their turning points."""
+    """Return the functions for times of orbits about an axis, by an arithmetic-geometric mean or an integrand, and for
+    their turning points.
+    """
     orbits = lowering.model.symmetric_orbits
     if orbits is None:
         return ()

@@ -62,7 +62,7 @@ class Fit:
         return correlation
 
     def __str__(self) -> str:
-        """The estimates with their standard deviations, and how well they fit."""
+        """Return the estimates with their standard deviations, and the quality of the fit."""
         width = max(map(len, self.names))
         lines = [f"  {name:<{width}}  {self._estimate(name)}" for name in self.names]
         for names in self.unidentified:
@@ -127,7 +127,7 @@ class Fit:
 
 
 def with_deviation(value: float, std: float) -> str:
-    """Return a value with its standard deviation as text, with two digits of the latter."""
+    """Return a value with its standard deviation as text, with two digits of the deviation."""
     if not isfinite(std):
         return f"{value:.6g}, not determined"
     if std == 0.0:
