@@ -165,7 +165,7 @@ def compiled_model(module: Any, *, where: str) -> Any:
     model = getattr(module, "MODEL", None)
     if not (hasattr(model, "solve") and callable(getattr(module, "sweep", None))):
         raise ArgumentError(
-            f"{where}: module: must be what gqm.build returns, or an imported module, got {short(module)}"
+            f"{where}: module: must be a generated module, built by gqm.build or imported, got {short(module)}"
         )
     return model
 

@@ -168,7 +168,7 @@ def read_parameters(
         declared = dict.fromkeys(names(given, where=f"{where}: parameters"))
     for name in declared:
         if not isinstance(name, str):
-            raise DeclarationError(f"{where}: parameters: {name!r:.60} is no name; names are text")
+            raise DeclarationError(f"{where}: parameters: {name!r:.60} is not a name; names are text")
         if name not in order:
             raise DeclarationError(
                 f"{where}: parameter {short(name)} is declared but not used; "

@@ -105,14 +105,14 @@ def _read(value: Any, count: int) -> tuple[str, float]:
         if not _DECIMAL.fullmatch(text):
             raise DeclarationError(f"sampled: row {count}: {text[:40]!r} is not a decimal number")
     elif isinstance(value, bool):
-        raise DeclarationError(f"sampled: row {count}: {value} is no number")
+        raise DeclarationError(f"sampled: row {count}: {value} is not a number")
     else:
         try:
             # All digits of a float are kept, because it means its binary value and not the shortest decimal that is
             # read as it.
             text = str(value) if isinstance(value, int) else str(Decimal(float(value)))
         except (TypeError, ValueError, OverflowError):
-            raise DeclarationError(f"sampled: row {count}: {value!r:.40} is no number") from None
+            raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not a number") from None
     number = float(text)
     if not isfinite(number):
         raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not finite; leave the row out or mend it")

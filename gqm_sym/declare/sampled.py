@@ -133,7 +133,7 @@ def read_track(
     in_space = bool(places) and len(places[0]) == IN_SPACE
     if in_space and kind != "spline":
         raise DeclarationError(
-            f"sampled: kind {kind!r} is for tracks of x and z only yet; in space declare a spline, of points dense "
+            f"sampled: kind {kind!r} is so far only for tracks of x and z; in space declare a spline, of points dense "
             "enough where the track bends"
         )
     rows = list(range(1, len(places) + 1))

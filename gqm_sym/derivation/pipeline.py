@@ -205,7 +205,7 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
     )
     for name, given, what in refused:
         if given:
-            raise DeclarationError(f"derive: {name}: {what} is known for planar curves only yet; leave it out")
+            raise DeclarationError(f"derive: {name}: {what} is so far known for planar curves only; leave it out")
 
 
 def _refuse_of_train(kernel: Kernel) -> None:

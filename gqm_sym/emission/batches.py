@@ -145,7 +145,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     orbit = lowering.function(
         "orbit_invariants_batch",
         (lows, highs),
-        "Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters.",
+        "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters.",
         inside=ends,
         outputs=tuple(value for _, value in held),
         batch=True,

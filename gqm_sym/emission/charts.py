@@ -45,7 +45,7 @@ def _implicit(lowering: Lowering) -> ChartIR:
     exact.append(lowering.exact_function("level", doc, (found.value, found.slope_x, found.slope_z), (X, Z)))
     arguments = ["field=field.address", "start=exact_start", f"tangent={found.level.tangent}", "level=exact_level"]
     if model.domain != (None, None):
-        doc = "Both ends in arc length; None where there is none."
+        doc = "Both ends in arc length; None for an open end."
         exact.append(lowering.constants("exact_domain", doc, model.domain))
         arguments.append("domain=exact_domain")
     arguments.append(_shaped_by(field, *exact))
@@ -184,7 +184,7 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     pull = differentiate(train.potential, HEIGHT)
     numbers = lowering.constants(
         "exact_train",
-        "The length of a train, what gravity is, and its coefficient of friction.",
+        "Length of the train, acceleration of gravity, and coefficient of friction.",
         (train.train_length, pull, train.friction),
     )
     length = lowering.order[train.train_length.name]

@@ -73,7 +73,7 @@ class Lowering:
 
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
         """Yield the function that evaluates them, if there are any."""
-        doc = "What stands behind the run-time parameters in compiled functions."
+        doc = "Trigonometric values, which follow the run-time parameters in the arguments of compiled functions."
         return (self.constants("exact_trigonometric", doc, (*self.trigonometric,)),) if self.trigonometric else ()
 
     def bounds(self) -> FunctionIR:

@@ -145,7 +145,7 @@ class _ModelLowering(Lowering):
         function = self.function(
             "rider_loads",
             (places, speeds, v, nu),
-            "What a rider feels, given V**2 and the signs v = sgn(ds/dt) and nu = sgn(N).",
+            "Loads on a rider, their rates, and roll and place of the track; v = sgn(ds/dt), nu = sgn(N).",
             inside=[(self.place, at(places)), (w, at(speeds))],
             outputs=tuple(row.xreplace(symbols) for row in rows),
         )
@@ -256,7 +256,7 @@ class _ModelLowering(Lowering):
     def domain(self) -> ExactIR:
         """Return the formula for the range of the curve's parameter."""
         curve = self.model.curve
-        doc = "Both ends of the domain, and the period; None where there is none."
+        doc = "Both ends of the domain and the period; None for an open end or without a period."
         return self.constants("exact_domain", doc, (*curve.domain, curve.period))
 
     def inertia(self) -> tuple[ExactIR, ...]:
@@ -269,5 +269,5 @@ class _ModelLowering(Lowering):
         symmetry = self.model.symmetry
         if symmetry is None:
             return ()
-        doc = "A place about which V**2 and ds are even, and the distance to the next; None where there is none."
+        doc = "A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."
         return (self.constants("exact_axes", doc, (symmetry.place, symmetry.step)),)

@@ -65,7 +65,7 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
     )
     factors = lowering.constants(
         "exact_factors",
-        "What stands before the parts of U, then before those of n0.",
+        "Factors of the parts of U, then of the parts of n0.",
         (*potential.values(), *load.values()),
     )
     return SeparatedIR(

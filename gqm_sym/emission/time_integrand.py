@@ -78,7 +78,7 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits) -> tuple[Functi
     invariants = lowering.function(
         "integrand_invariants_batch",
         (halves,),
-        "Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters.",
+        "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters.",
         inside=[(own[HALF], at(halves))],
         outputs=tuple(value for _, value in held),
         batch=True,

@@ -102,7 +102,7 @@ def _column(values: Any, name: str, unit: str | None) -> Array:
     array = np.asarray(plain) if not hasattr(plain, "units") else plain
     if getattr(array, "dtype", None) is not None and array.dtype.kind == "f" and not np.isfinite(array).all():
         where = int(np.flatnonzero(~np.isfinite(np.ravel(array)))[0])
-        raise InputError(f"data: {name}: row {where + 1} is no finite number; leave out what was not measured")
+        raise InputError(f"data: {name}: row {where + 1} is not a finite number; leave out what was not measured")
     numbers, _, shape = read_numbers(plain, where=f"data: {name}", unit=unit)
     if len(shape) > 1:
         raise InputError(f"data: {name}: must be one column, got the shape {shape}")

@@ -67,7 +67,7 @@ class Fit:
         lines = [f"  {name:<{width}}  {self._estimate(name)}" for name in self.names]
         for names in self.unidentified:
             what = " and ".join(names)
-            lines.append(f"  the data do not tell {what}{' apart' if len(names) > 1 else ''}")
+            lines.append(f"  the data do not {f'tell {what} apart' if len(names) > 1 else f'determine {what}'}")
         count = sum(values.size for values in self.residuals.values())
         spread = "" if self.measured.sigma is not None else " (standard deviations from the residuals)"
         return "\n".join(

@@ -173,7 +173,9 @@ def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tup
     """Return the uncertain numbers by their names, and their covariance."""
     if isinstance(uncertain, Fit):
         if uncertain.unidentified:
-            raise InputError(f"uncertainty: the data of the fit do not tell {' and '.join(uncertain.unidentified[0])}")
+            raise InputError(
+                f"uncertainty: the data of the fit do not determine {' and '.join(uncertain.unidentified[0])}"
+            )
         return uncertain.estimates, uncertain.covariance
     if not isinstance(uncertain, Mapping) or not uncertain:
         raise InputError(

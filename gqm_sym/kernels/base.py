@@ -247,7 +247,7 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
             raise DeclarationError(f"kernel: {name} is given twice; give it once")
         if {name, *names} >= _EXCLUSIVE and name in _EXCLUSIVE:
             raise DeclarationError(
-                "kernel: rolling and coulomb exclude each other: what rolls without slipping does not slide; "
+                "kernel: rolling and coulomb exclude each other: a body that rolls without slipping does not slide; "
                 "leave one of them out (rolling has mu_static, the friction that it needs)"
             )
     values = dict(first.defaults)

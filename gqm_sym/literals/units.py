@@ -77,7 +77,7 @@ def read_unit(text: str, *, where: str) -> Unit:
     """
     unit = evaluate(parse(text, where=where), _Units(), where=where)
     if not unit.factor:
-        raise InputError(f"{where}: {text} is nothing; a unit is more than that")
+        raise InputError(f"{where}: {text} is zero, which is not a unit")
     return unit
 
 
@@ -171,7 +171,7 @@ def _named(name: str) -> Unit:
     powers = {str(base): power for base, power in one._units.items()}
     known = {"meter", "gram", "second", "radian"}
     if not powers.keys() <= known or any(power.denominator != 1 for power in powers.values()):
-        raise ValueError(f"{name!r} is no unit of mechanics, made of lengths, masses, times and angles")
+        raise ValueError(f"{name!r} is not a unit of mechanics, which is made of lengths, masses, times and angles")
     length, mass, time, angle = (int(powers.get(base, 0)) for base in ("meter", "gram", "second", "radian"))
     # pint measures mass in grams, and writes pi with 50 digits; the right power of pi is the one that leaves a short
     # number.
@@ -212,4 +212,4 @@ class _Units:
         return Unit(rationals.power(base.factor, int(n)), *(power * int(n) for power in base[1:]))
 
     def call(self, function: str, argument: Unit) -> Unit:
-        raise ValueError(f"{function} is no part of a unit")
+        raise ValueError(f"{function} cannot be part of a unit")

@@ -43,7 +43,7 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     if not path.is_relative_to(folder.resolve()):
         raise InputError(f"{name!r}: leads out of the YAML file's folder by a link; put the file itself there")
     if not path.is_file():
-        raise InputError(f"{name!r}: is no plain file; give {wanted}")
+        raise InputError(f"{name!r}: is not a plain file; give {wanted}")
     return path
 
 
@@ -57,7 +57,7 @@ def read_beside(name: str, folder: Path, *, wanted: str) -> str:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
         with os.fdopen(descriptor, "rb") as file:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise InputError(f"{name!r}: is no plain file; give {wanted}")
+                raise InputError(f"{name!r}: is not a plain file; give {wanted}")
             data = file.read(SIZE_LIMIT + 1)
     except OSError as error:
         raise _unreadable(name, error, wanted) from None

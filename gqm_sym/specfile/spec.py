@@ -83,13 +83,13 @@ class Spec:
         if self.launch is None:
             mistakes.add(
                 self.tree.mark,
-                "launch is missing, which is needed to solve",
+                "launch is missing; solving needs it",
                 "add it, as in launch: {lam0: 0.5, v0: 0}",
             )
         for name, value in model.defaults:
             if value is None:
                 mark = place_of(self.tree, ("parameters", name))
-                what = f"parameters.{name}: null, and to solve needs a value"
+                what = f"parameters.{name}: is null; solving needs a value"
                 mistakes.add(mark, what, f"write one, as in {name}: 1")
         lam0 = None if self.launch is None or model.curve.charted else str(self.launch["lam0"])
         if lam0 is not None and not mistakes and (fault := _fault(model, lam0)):

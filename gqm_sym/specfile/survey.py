@@ -140,7 +140,7 @@ def _number(value: Any, where: str) -> float:
     if isinstance(value, str) and not (value.isascii() and "_" not in value):
         number = float("nan")
     if not isfinite(number):
-        raise InputError(f"{where}: {str(value)[:40]!r} is no finite decimal number; leave the row out or mend it")
+        raise InputError(f"{where}: {str(value)[:40]!r} is not a finite decimal number; leave the row out or mend it")
     return number
 
 

@@ -183,7 +183,7 @@ def _columns(name: str, header: list[str], rows: list[list[str]]) -> dict[str, l
             raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
         for cell in row:
             if not _is_decimal(cell):
-                raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
+                raise InputError(f"{name!r}, row {number}: {cell!r:.60} is not a finite decimal number")
     return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
 
 

@@ -136,8 +136,8 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "what rolls and slides": (
         edited(("gravity: {}", "coulomb: {mu: 0.1}\n  rolling: {beta: 1}")),
         [
-            "a.yaml:6:3: kernel.rolling: rolling and coulomb exclude each other: what rolls without slipping does "
-            "not slide; leave one of them out (rolling has mu_static, the friction that it needs)"
+            "a.yaml:6:3: kernel.rolling: rolling and coulomb exclude each other: a body that rolls without slipping "
+            "does not slide; leave one of them out (rolling has mu_static, the friction that it needs)"
         ],
     ),
     "no form of surface tension": (
@@ -530,11 +530,11 @@ def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> Non
 UNSOLVABLE = {
     "no launch": (
         edited(("launch: {lam0: 1/2, v0: 0}", "")),
-        ["a.yaml:1:1: launch is missing, which is needed to solve; add it, as in launch: {lam0: 0.5, v0: 0}"],
+        ["a.yaml:1:1: launch is missing; solving needs it; add it, as in launch: {lam0: 0.5, v0: 0}"],
     ),
     "no value": (
         edited(("{h: 3}", "{h: null}")),
-        ["a.yaml:6:14: parameters.h: null, and to solve needs a value; write one, as in h: 1"],
+        ["a.yaml:6:14: parameters.h: is null; solving needs a value; write one, as in h: 1"],
     ),
     "no curve there": (
         edited(("h*x**2", "h*sqrt(x)"), ("lam0: 1/2", "lam0: -1/2")),

@@ -101,7 +101,7 @@ def test_a_table_that_changes_meanwhile(kind: str, here: Path, monkeypatch: pyte
     if kind == "a pipe":
         os.mkfifo("pipe")
         monkeypatch.setattr(beside, "path_beside", lambda *_, **__: here / "pipe")
-        message = "'a.csv': is no plain file; give a CSV file"
+        message = "'a.csv': is not a plain file; give a CSV file"
     else:
 
         def refuse(*_: Any) -> int:

@@ -156,9 +156,7 @@ def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
     """
     pull = differentiate(kernel.potential, Z)
     if not pull or (pull.free_symbols | (kernel.potential - pull * Z).free_symbols) & {X, Y, Z}:
-        raise DeclarationError(
-            "derive: train: potentials other than gravity are not known of a train; use Gravity() alone"
-        )
+        raise DeclarationError("derive: train: a train can have no potential other than gravity; use Gravity() alone")
     height, slope, _ = (head(lam) for head in MEAN_HEIGHT)
     potential = kernel.potential.xreplace({Z: height})
     return replace(
