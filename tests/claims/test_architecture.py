@@ -278,7 +278,7 @@ def _targets(node: ast.stmt) -> Iterator[str]:
 
 
 def _waits(node: ast.AST) -> bool:
-    """Whether what stands inside does not run when the file is imported."""
+    """Return whether the statements inside do not run when the file is imported."""
     if isinstance(node, ast.If):
         return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
     return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
@@ -391,7 +391,7 @@ def test_each_room_says_what_it_is_for() -> None:
 
 
 def test_the_front_loads_nothing_heavy() -> None:
-    """What ``import gqm_sym`` runs at once is the errors alone."""
+    """Of the package, ``import gqm_sym`` loads only the errors at once."""
     loaded = {row.target for row in _imports() if not row.unit and not row.waits}
     outside = {target for target in loaded if target.split(".")[0] not in sys.stdlib_module_names}
     assert outside <= {"gqm_sym.errors"}

@@ -367,7 +367,7 @@ def test_corners_of_space_curves_are_refused() -> None:
 
 
 def test_a_contact_force_without_a_sign_is_told() -> None:
-    """What asks for its sign is refused; derivatives are there."""
+    """Questions that need the sign of the contact force are refused; derivatives of the half period are known."""
     with pytest.raises(InputError, match="contact: 'above' needs to know which side"):
         generated.viviani.solve("3/10", contact="above")
     with pytest.raises(InputError, match="contact: 'below' needs to know which side"):

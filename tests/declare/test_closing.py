@@ -87,14 +87,14 @@ def test_random_waves_close_after_their_least_common_period(rates, polar):
     ],
 )
 def test_a_period_that_is_none_is_refused(declare, message):
-    """With the right one, where there is one."""
+    """The message gives the right period if there is one."""
     with pytest.raises(DeclarationError, match=message):
         declare()
 
 
 @pytest.mark.parametrize("period", ["2*pi", "4*pi", "6*pi"])
 def test_a_period_is_one_however_often_it_goes_round(period):
-    """Whoever wants to count two rounds as one may."""
+    """A period may be declared that counts two rounds as one."""
     assert drawn("cos(u)", "sin(u)", period=period).period == sp.sympify(period)
 
 

@@ -1,4 +1,4 @@
-"""What curves, forces and models say of themselves, and that they can be copied and sent to another process."""
+"""Curves, forces and models describe themselves, and can be copied and sent to another process."""
 
 import copy
 import pickle
@@ -160,7 +160,7 @@ def test_a_force_tells_the_units_of_its_parameters(kernel, told):
 
 
 def test_a_printed_model_is_no_promise_of_formulas():
-    """What has no room is shortened with an ellipsis, and whole in closed_forms()."""
+    """A formula that is too long is shortened with an ellipsis, and complete in closed_forms()."""
     model = gqm.derive(gqm.Curve.graph("x**3"), GRAVITY + gqm.CoulombFriction())
     assert "..." in str(model)
     assert "..." not in str(dict(model.closed_forms())["W = V**2"])

@@ -1,4 +1,4 @@
-"""What derivation and emission refuse, and what they leave to run time."""
+"""Refusals by derivation and emission, and checks that they leave to run time."""
 
 import importlib
 from pathlib import Path

@@ -220,7 +220,7 @@ TEXTBOOK = {
 
 @pytest.mark.parametrize("name", TEXTBOOK)
 def test_textbook_forms(name):
-    """What is written is as books write it, not only equal to that."""
+    """Formulas are written as in textbooks, not only equal to those."""
     curve, ds, kappa = TEXTBOOK[name]
     model = derive(curve, Gravity())
     assert model.ds == read(ds)

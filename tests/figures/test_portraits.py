@@ -34,7 +34,7 @@ def curves(figure: object, label: str) -> list[np.ndarray]:
 
 
 def test_separatrix_of_the_pendulum(circle: ModuleType) -> None:
-    """V = 2*sqrt(g)*|cos(theta/2)|, through the tops, at each of which the body could rest."""
+    """The separatrix is V = 2*sqrt(g)*|cos(theta/2)|, through the tops, where the body could rest."""
     figure = gqm.figures.phase_portrait(circle)
     branches = curves(figure, "separatrix")
     assert len(branches) == 4
@@ -76,7 +76,7 @@ def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:
 
 
 def test_a_launch_is_on_its_orbit(circle: ModuleType) -> None:
-    """What is drawn through a launch has its energy, however many turns away the launch is."""
+    """The curve that is drawn through a launch has its energy, however many turns away the launch is."""
     figure = gqm.figures.phase_portrait(circle, through=[("4*pi + 1/2", 3)])
     (axes,) = figure.axes
     (mark,) = [line for line in axes.lines if line.get_label() == "launch"]

@@ -519,7 +519,7 @@ UNFIT = {
 
 @pytest.mark.parametrize("case", UNFIT.values(), ids=UNFIT.keys())
 def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> None:
-    """What only shows when curve and kernel meet is a mistake of the file too, with its place."""
+    """A mistake that appears only when curve and kernel are combined is reported with its place in the file too."""
     text, expected = case
     spec = read(tmp_path, text)
     with pytest.raises(SpecFileError) as caught:

@@ -54,7 +54,7 @@ def test_keys_that_are_none(text: str, message: str, here: Path) -> None:
 
 
 def test_reading_has_a_budget(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What takes too long is refused by the file's name."""
+    """A file that takes too long to read is refused with its name."""
     monkeypatch.setattr(reader, "SECONDS", -1.0)
     with pytest.raises(SpecFileError, match=r"^a\.yaml: reading: not done after -1 s of processor time; write fewer"):
         read_sweep(sweep("grid: {lam0: [1, 2]}"))

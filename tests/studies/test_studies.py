@@ -242,7 +242,7 @@ def test_files_that_are_none_are_refused(here: Path) -> None:
 
 
 def test_every_quantity_has_a_name_and_a_unit() -> None:
-    """What is swept is described in the results."""
+    """Every quantity of a sweep is described in the results."""
     assert set(QUANTITIES) - {"turning_points"} <= set(DESCRIBED)
 
 
@@ -297,7 +297,7 @@ def test_a_killed_sweep_goes_on(here: Path) -> None:
 
 
 def test_a_damaged_part_is_computed_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What an interruption leaves is used where it is sound."""
+    """Parts that an interruption leaves are used if they are sound."""
     plan = read_sweep("periods.yaml")
     object.__setattr__(plan, "part", 13)
     whole = run(plan, "whole.nc")

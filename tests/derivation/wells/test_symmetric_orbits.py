@@ -166,7 +166,9 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     "z", ["x**3", "exp(x)", "cos(x) + x**2", "cos(x) + cosh(x)", "cos(x) + cos(9*x)", "exp(-x**2)"]
 )
 def test_there_is_none(z: str) -> None:
-    """Of wells that are not even, of unlike heads, and of waves of which one is many times as fast."""
+    """There is no such form for wells that are not even, for unlike functions, and for waves of very different
+    frequencies.
+    """
     assert gqm.derive(graph(z), gqm.Gravity()).symmetric_orbits is None
 
 

@@ -256,7 +256,7 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
     ],
 )
 def test_bad_points_are_refused(points: object, options: dict[str, object], message: str) -> None:
-    """With the row, counted from 1."""
+    """Bad points are refused with their row, counted from 1."""
     with pytest.raises(DeclarationError, match=f"^sampled: {message}"):
         gqm.Curve.sampled(points, **options)
 
@@ -317,7 +317,7 @@ def test_options_of_a_file(tmp_path: Path) -> None:
     ],
 )
 def test_bad_files_are_refused(tmp_path: Path, points: str, data: bytes | str | None, message: str) -> None:
-    """With the place in the YAML, the file and its row; nothing outside the folder is read."""
+    """Bad files are refused with the place in the YAML, the file and its row; nothing outside the folder is read."""
     folder = tmp_path / "here"
     (folder / "inside").mkdir(parents=True)
     with pytest.raises(gqm.GQMError, match=message):

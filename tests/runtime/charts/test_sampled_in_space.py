@@ -174,7 +174,7 @@ LINE = [(float(k), 0.5 * k, -1.0 * k) for k in range(9)]
     ],
 )
 def test_bad_points_are_refused(points: object, options: dict[str, object], message: str) -> None:
-    """With the row, counted from 1."""
+    """Bad points are refused with their row, counted from 1."""
     with pytest.raises(DeclarationError, match=f"^sampled: {message}"):
         gqm.Curve.sampled(points, **options)
 

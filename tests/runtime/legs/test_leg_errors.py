@@ -131,7 +131,9 @@ def slow_launches() -> list[tuple[float, float, int, float, float]]:
 
 
 def test_a_turn_next_to_the_launch_under_a_viscous_law(build: Build) -> None:
-    """The turn is off by up to 1e-8 of the short way to it, of which no error told; all later times inherit that."""
+    """The turn was wrong by up to 1e-8 of the short way to it, which no error bound showed; all later times inherited
+    that.
+    """
     viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
     module = spring(build, "slowly_launched", viscous)
     for lam0, v0, direction, k, c in slow_launches():
