@@ -136,7 +136,7 @@ def slide(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list
 
 
 def falls(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Launch on an incline with two ends: at the ends, next to them and between, also from places that no double has."""
+    """Launch on an incline with two ends: at the ends, next to them and between, also from places between doubles."""
     a, end = signed(draw, -3.0, 1.0), draw.choice(("-1", "1/3"))
     inwards = Fraction(draw.randint(1, 9), 10 ** draw.randint(1, 15)) * (1 if end == "-1" else -1)
     lam0: str | float = draw.choice((end, str(Fraction(end) + inwards), "1/7", "-1/7", float(Fraction(end) + inwards)))
