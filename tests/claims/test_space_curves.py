@@ -360,7 +360,7 @@ def test_forces_that_are_not_there_yet_are_refused(force: gqm.Kernel, message: s
 
 
 def test_corners_of_space_curves_are_refused() -> None:
-    """Also where only the third coordinate has them."""
+    """A corner is refused also if only the third coordinate has it."""
     for y, message in (("abs(u)", "the tangent turns by"), ("u*abs(u)", "the curvature jumps")):
         with pytest.raises(DeclarationError, match=message):
             gqm.derive(gqm.Curve.space(x="u", y=y, z="u**2", parameter="u"), gqm.Gravity())

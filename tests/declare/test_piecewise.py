@@ -122,7 +122,7 @@ def test_declarations_that_cannot_be(declare: Any, message: str) -> None:
 
 
 def test_parameters_of_pieces() -> None:
-    """In order of appearance, each once, with the defaults of curves and those given."""
+    """Parameters of pieces are listed once each in order of appearance, with the defaults of curves and those given."""
     pieces = [
         gqm.arc(radius="R", angle="turn"),
         gqm.Curve.graph("k*x + R", domain=(0, "w"), parameters={"k": 2, "w": None, "R": None}, positive=["k"]),

@@ -46,7 +46,7 @@ def heights_of(places: np.ndarray, share: Any, period: Any) -> list[Any]:
 
 
 def test_a_period_that_grows(growing: ModuleType) -> None:
-    """Through declaration, chart and sweep to 3 ulp; by `period_to` to 20 digits."""
+    """The prescribed period is met by declaration, chart and sweep to 3 ulp, and by `period_to` to 20 digits."""
     with mp.workdps(30):
         period = lambda h: 2 * (1 + h / 4)  # noqa: E731
         places = np.array([-1.6, -0.9, -0.31, 0.02, 0.2, 0.75, 1.2, 1.75])

@@ -221,7 +221,7 @@ def test_the_body_digest() -> None:
 
 
 def test_the_input_digest() -> None:
-    """It changes with whatever the module was made from."""
+    """The digest changes with every input of the module."""
     inputs = [
         gqm.emit(declared("k*u**2", k="1"), name="digest"),
         gqm.emit(declared("k*u**2", k="1"), name="other"),

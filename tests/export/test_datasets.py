@@ -25,7 +25,7 @@ def cells(html: str) -> list[list[str]]:
 
 
 def test_a_motion_as_html(circle: ModuleType) -> None:
-    """Its kind, launch as it was written, period, parameters and events."""
+    """The page of a motion has its kind, the launch as written, the period, the parameters and the events."""
     motion = circle.solve("5/2")
     rows = cells(motion._repr_html_())
     assert ["kind", "libration"] in rows

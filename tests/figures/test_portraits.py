@@ -103,7 +103,7 @@ def test_what_cannot_be_drawn(options: dict, error: type[Exception], said: str, 
 
 
 def test_period_against_amplitude(circle: ModuleType) -> None:
-    """Along the arc, in rising order, with the periods of the motions themselves; L scales them."""
+    """Amplitudes are in rising order along the arc, with the periods of the motions themselves; L scales them."""
     figure = gqm.figures.period_against_amplitude(circle, [2, 1, "pi", "-1/2"], L=4)
     (line,) = figure.axes[0].lines
     amplitude, period = line.get_data()

@@ -70,7 +70,7 @@ def functions(model: gqm.Model, *forms: sp.Expr | None, by: tuple[sp.Symbol, ...
 
 
 def integral(rate: Callable[[Any], Any]) -> mpf:
-    """Over a quarter turn; no node comes near its ends."""
+    """Return the integral over a quarter turn; no node comes near its ends."""
     return mp.quad(rate, mp.linspace(0, mp.pi / 2, 7), method="gauss-legendre")
 
 
@@ -131,7 +131,7 @@ def test_which_have_closed_forms() -> None:
 
 @pytest.mark.parametrize("name", AGM)
 def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
-    """Of two numbers, the arithmetic-geometric one."""
+    """A half period is pi over the arithmetic-geometric mean of two numbers."""
     model, half = model_of(name), CASES[name][-1]
     assert model.symmetric_orbits is not None
     assert model.symmetric_orbits.agm_arguments is not None
