@@ -338,7 +338,7 @@ REFUSED = (
 FORCES = (
     (
         gqm.SurfaceTension(form="printed"),
-        "surface_tension: form: the printed form's sign is known for planar curves only",
+        "surface_tension: form: the printed form's sign is so far known for planar curves only",
     ),
     (gqm.Rolling(radius="1/10"), "the path of the centre of a rolling body is so far known for planar curves only"),
     (gqm.Potential("k*y", parameters={"y": 1, "k": 1}), "'y' is a coordinate on a space curve"),

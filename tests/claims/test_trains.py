@@ -236,8 +236,8 @@ def test_declared_in_one_piece() -> None:
     assert dict(gqm.derive(circle, train + gqm.Gravity()).defaults)["m"] == 1200
     for force, message in (
         (gqm.Gravity() + gqm.RotatingFrame(), "rotating_frame: a turning frame"),
-        (gqm.Gravity() + gqm.Potential("x**2"), "potentials other than gravity"),
-        (gqm.Kernel(terms=()), "potentials other than gravity"),
+        (gqm.Gravity() + gqm.Potential("x**2"), "no potential other than gravity"),
+        (gqm.Kernel(terms=()), "no potential other than gravity"),
         (gqm.Gravity() + gqm.Rolling(radius=1), "rolling: radius"),
         (gqm.Gravity() + train, "train is given twice"),
     ):
