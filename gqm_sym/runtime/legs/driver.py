@@ -34,6 +34,7 @@ from gqm_sym.runtime.legs.body import (
     HIGH,
     LAM0,
     LAPS,
+    LEAST_SIZE,
     LOW,
     MAY_REST,
     PANEL_COUNT,
@@ -67,6 +68,9 @@ FEW_PANELS, LEGS_PER_CALL = 12, 8
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
+
+# The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
+PIECE_SHARE = 2.0**-6
 
 # A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
 # than this share of its place and of the length of the leg.
@@ -159,7 +163,11 @@ class Driver:
         ends, asked = problem.domain.numbers[:3], (ONLY_SIGN[launch.contact], horizon, nan)
         given = (launch.lam0.value, *ends, launch.direction, *asked, problem.w0)
         self.body = launched((given,), LEGS_PER_CALL if passes else 0)
+        chart = problem.functions.chart
+        if chart.size:
+            self.body[0, LEAST_SIZE] = PIECE_SHARE * float(chart[3] - chart[2]) / float(chart[1])
         self._frame: Frame | None = None
+        self._last_record = np.empty(0)
 
     @property
     def reached(self) -> float:
@@ -182,6 +190,8 @@ class Driver:
     def go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         if self.at and self.at[PANEL_COUNT] >= MAX_STORED:
+            if self._force_cancels(self._last_record):
+                raise self._lost(self._last_record)
             raise BudgetError(
                 f"motion: {self.at[PANEL_COUNT]:.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
@@ -192,6 +202,7 @@ class Driver:
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
         self.at, record = at, records[-1]
+        self._last_record = record
         if len(records) > 1:
             earlier = zip(records[:-1], before[:-1], strict=True)
             self.runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
@@ -210,7 +221,9 @@ class Driver:
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))
             what = drive_along(self.track, self.dissipation, p, RUN_AGAIN, body, record)
-            if what in PASSED:
+            # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
+            left = abs(float(run.record[END] - record[0, END]))
+            if what in PASSED or (what == PAUSED and left <= ULP * self.problem.period):
                 return run.with_panels([*parts, record[0]], self._horizon)
             if what == FULL:
                 space *= 4
@@ -278,7 +291,7 @@ class Driver:
         elif what == ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame:
-            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * abs(end)
+            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
             creeps = what == PAUSED and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
             if turns_nearby or creeps:
                 self._enter_frame()
@@ -338,7 +351,7 @@ class Driver:
         place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
         reach = min(starting_step(problem), float(ends.min()))
-        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach, float(line[LEAST_SIZE]))
         if frame is None or not (frame.is_stable or lam0):
             return
         if isinstance(problem.formulas.exact, ExactLaw):
