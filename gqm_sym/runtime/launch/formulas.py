@@ -51,6 +51,8 @@ class ParameterValues(tuple[Number, ...]):
         A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
     columns : tuple of lists of arrays or None
         What sweeps lay out of them (`sweep.columns`), once one has been asked for.
+    conditions : dict
+        What legs with losses take of them (`legs.driver.Conditions`), by contact, as far as it has been asked for.
     """
 
     values: Array
@@ -59,6 +61,7 @@ class ParameterValues(tuple[Number, ...]):
     tape: Any = None
     true_pieces: Any = None
     columns: Any = None
+    conditions: dict[str, Any]
 
 
 def shape_of(maker: ChartMaker, values: tuple[Any, ...], other: Any) -> tuple[Any, ...]:
@@ -235,6 +238,7 @@ class Formulas:
         self._check_lower_limits(dict(zip(self.parameters, out, strict=True)))
         p = ParameterValues(out)
         p.values = np.array([*(number.value for number in out), *self.trigonometric_values(out)])
+        p.conditions = {}
         return p
 
     def trigonometric_over(self, operations: Any, p: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -1,9 +1,7 @@
 """States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
-from contextlib import AbstractContextManager
 from math import inf
-from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -42,7 +40,6 @@ class Positions(ABC):
         self.problem = problem
         self.kind = kind
         self.direction = direction
-        self._lock: AbstractContextManager[Any] = RLock()
         horizon = problem.launch.t_max
         self._horizon = inf if horizon is None else horizon.value
 
