@@ -2,7 +2,7 @@
 
 The means are those of the midpoint rule in phase angles, which converges as fast as the trapezoidal rule and needs no
 values at turning points, where V**2 and the divided differences of the potential vanish together. Near a separatrix it
-would need too many nodes; Gauss's rules on the panels of the motion do there.
+would need too many nodes; there Gauss's rules on the panels of the motion are used.
 """
 
 from math import fabs, inf
@@ -21,20 +21,22 @@ from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fil
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
-# by this factor and the next one would be smaller than the second number. Errors fall geometrically: the first change,
-# from 16 to 32 nodes, is about the square root of the next one.
+# by this factor and the next one would be smaller than the second number. Errors decrease geometrically: the first
+# change, from 16 to 32 nodes, is about the square root of the next one.
 MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
 
-# The change of an integral over a panel when it is halved, as a share of that of the absolute values.
+# The largest change of an integral over a panel when the panel is halved, as a share of the integral of the absolute
+# values.
 MAX_PANEL_CHANGE = 1e-20
 
 # The codes in place of the number of nodes: digits were lost, or the nodes are too few with any number of digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
 
-# What there is of each mean: the high and the low double, a bound on the error, and the mean of the absolute values.
+# The number of values for each mean: the high and the low double, a bound on the error, and the mean of the absolute
+# values.
 MEAN = 4
 
 # A program as compiled code takes it (`programs.Program.operands`), with its work space.
@@ -44,7 +46,7 @@ CUBE = types.float64[:, :, ::1]
 
 @Inner
 def begin(program, work, inputs):  # type: ignore[no-untyped-def]
-    """Fill the registers of the inputs, and of all that does not depend on the place."""
+    """Fill the registers of the inputs, and all that do not depend on the place."""
     address, operations, first, count, _ = program
     for k in range(count):
         for i in range(BLOCK):
@@ -71,7 +73,9 @@ def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
 
 @Inner
 def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def]
-    """Fill the sums over n nodes of each result: the high and the low double, the error, and of absolute values."""
+    """Fill the sums of each result over n nodes (high and low double, and error), and the sums of the absolute
+    values.
+    """
     outputs = program[4]
     sums[:, :] = 0.0
     for start in range(n, 2 * n, BLOCK):
@@ -89,7 +93,7 @@ def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def
 
 @Inner
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results, as `fill_means`."""
+    """Fill the means of all results, as `fill_means` does."""
     begin(program, work, inputs)
     sums, before, rounding = np.empty((found.shape[0], MEAN)), 1.0, inf
     for level in range(1, len(LEVELS) - 1):
@@ -99,7 +103,7 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
         for j in range(found.shape[0]):
             size = sums[j, 3] / n
             high, low = sums[j, 0] / n, sums[j, 1] / n
-            if not size <= sums[j, 2] / n:  # otherwise it is zero within rounding
+            if not size <= sums[j, 2] / n:  # a smaller mean is zero within rounding
                 step = fabs(add(high, low, -found[j, 0], -found[j, 1])[0]) / size
                 change = step if not step <= change else change
                 rounding = max(rounding, sums[j, 2] / (n * size))
@@ -156,7 +160,7 @@ def integrate(program, work, kind, left, width, panels, rule, found):  # type: i
 
 @entry(INTEGER(PROGRAM, VECTOR, MATRIX, INTEGER, VECTOR, MATRIX, MATRIX), checked=False)
 def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results as `fill_means`, where the motion passes near an equilibrium.
+    """Fill the means of all results, as `fill_means` does, for a motion that passes near an equilibrium.
 
     Parameters
     ----------
@@ -172,13 +176,13 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
     Returns
     -------
     int
-        The number of intervals, or why there are no means.
+        The number of intervals, or a code of failure.
     """
     begin(program, work, inputs)
     now, before = np.empty((found.shape[0], MEAN)), np.empty((found.shape[0], MEAN))
     found[:, :] = 0.0
     for k in range(edges.size - 1):
-        # The upper turning point is at pi itself.
+        # The upper turning point is at the angle pi itself.
         right = edges[k + 1], 2.0 * QUARTER[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
         left, panels, change = (edges[k], 0.0), MIN_PANELS, inf
         width = add(right[0], right[1], -left[0], 0.0)

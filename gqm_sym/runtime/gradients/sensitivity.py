@@ -1,8 +1,8 @@
 """Derivatives of states at given times with respect to launch and parameters, after any number of periods.
 
-At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
-``delay`` is how much further on, in time, the body is along the changed orbit.
+At a fixed phase angle everything changes smoothly. When a variable changes, the body reaches a phase angle earlier or
+later, by the changes of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is the time by which the body is further along the changed orbit.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ class Sensitivity(NamedTuple):
     Attributes
     ----------
     wrt : tuple of str
-        What the derivatives are by: run-time parameters, the launch place ``lam0`` and speed ``v0``.
+        The variables of differentiation: run-time parameters, the launch place ``lam0`` and the launch speed ``v0``.
     lam, s, x, z, v, normal_force, y : array
         Derivatives of the curve parameter, of arc length from launch, of the coordinates, of the velocity ds/dt and of
         the contact force, at fixed times. That of y is 0 along a planar curve.
@@ -46,16 +46,16 @@ class _Along(NamedTuple):
     Attributes
     ----------
     times : array
-        The change of the time from where the phase begins.
+        The change of the time since the beginning of the phase.
     places : array
         The change of the place within the lap.
     speeds : array
         The relative change of the velocity.
     arcs : array
-        The change of arc length from where the phase begins: for a libration between fixed places, for a circulation
-        at a fixed share.
+        The change of the arc length since the beginning of the phase: for a libration between fixed places, for a
+        circulation at a fixed share.
     acceleration : array
-        The acceleration along the curve in m/s2, without row.
+        The acceleration along the curve in m/s2, of the shape of the times.
     path : PathRows
         The path there.
     """
@@ -84,7 +84,7 @@ class OrbitSensitivity:
         self._launches: dict[float, _Along] = {}
 
     def _by_all(self, rows: Array) -> Array:
-        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
+        """Extend derivatives by the run-time parameters to derivatives by all variables, where the others are zero."""
         return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
 
     def _places(self, share: Array) -> Array:
@@ -97,7 +97,7 @@ class OrbitSensitivity:
         return places
 
     def _along(self, share: Array, lam: Array, v: Array) -> _Along:
-        """Return the changes at shares of the phase, at which the places and velocities are known."""
+        """Return the changes at shares of the phase, given the places and velocities there."""
         derivatives = self._derivatives
         (rates, times), arcs = self._rates(share), self._arcs(share)[1]
         path, places = derivatives.at_places(lam), self._places(share)
@@ -119,7 +119,7 @@ class OrbitSensitivity:
         )
 
     def _at_launch(self, motion: Any, points: Any) -> _Along:
-        """Return the changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        """Return the changes at the launch; its phase angle gains digits once the period is known exactly."""
         phi = points.trajectory.segments[0].phi_start
         if phi not in self._launches:
             v0 = motion.direction * motion.problem.launch.v0.value
@@ -130,13 +130,14 @@ class OrbitSensitivity:
     def _launch_delay(self, launch: _Along, motion: Any) -> Array:
         """Return the derivatives of the time from the lower turning point to the launch of a libration.
 
-        The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
+        This time follows from the launch place and also from the launch speed; the speed is used near turning points,
+        the place elsewhere.
         """
         direction, given = motion.direction, motion.problem.launch
         v0, ds, acceleration = given.v0.value, launch.path.ds[0], launch.acceleration
         own: Array = np.zeros_like(launch.times)
         if v0**2 < abs(acceleration[0]) * ds[0] * self._width:
-            own[V0] = given.direction  # at rest, the direction in which a speed would be
+            own[V0] = given.direction  # at rest, the direction that a speed would have
             passed: Array = direction * (own - launch.speeds) / acceleration
         else:
             own[:] = self._derivatives.launch_moves[:, None]
@@ -145,14 +146,14 @@ class OrbitSensitivity:
         return passed
 
     def at(self, motion: Any, points: Any, lam: Array, v: Array) -> list[Array]:
-        """The derivatives of lam, s, x, z, v, N and y at times: a row for each variable.
+        """Return the derivatives of lam, s, x, z, v, N and y at times: a row for each variable.
 
         Parameters
         ----------
         motion : motion.periodic.PeriodicMotion
             The motion.
         points : motion.trajectory.PhasePoints
-            Where it is at the times.
+            The points on the orbit at the times.
         lam, v : array
             The places within the lap, and the velocities.
         """
@@ -181,21 +182,21 @@ class OrbitSensitivity:
         return [arcs, arcs, *others]
 
     def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
-        """The derivatives of lam alone, as in `at`, where v and ds/dlam are known."""
+        """Return the derivatives of lam alone, as in `at`, given v and ds/dlam."""
         share, launch = self._share(points), self._at_launch(motion, points)
         delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
         found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
         return found
 
     def _share(self, points: Any) -> Array:
-        """The shares of the phase at points."""
+        """Return the shares of the phase at points."""
         share: Array = np.zeros_like(points.laps)
         for _, mask, phi in points.segments:
             share[mask] = phi / self._scale
         return share
 
     def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
-        """Return the changes of time along the orbit at the times of points."""
+        """Return the delays at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
             delay: Array = -times - points.laps * gradient

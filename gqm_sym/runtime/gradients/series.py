@@ -1,4 +1,4 @@
-"""The changes along an orbit as a series with its integrals: of Fourier, or of Legendre on panels."""
+"""The changes along an orbit as a series with its integrals: a Fourier series, or Legendre series on panels."""
 
 import numpy as np
 from numpy.polynomial.legendre import legint, legvander
@@ -7,16 +7,16 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 
-# Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
-# number at most.
+# Terms below this share of the largest one are rounding if at least so many follow each other; the last terms may be at
+# most the third number.
 MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
 
-# Places that are evaluated together.
+# The number of places that are evaluated together.
 BLOCK = 2048
 
 
 class Series:
-    """Functions of a share u, periodic with period 1, by their values at the midpoints of N equal intervals.
+    """Functions of a share u, periodic with period 1, given by their values at the midpoints of N equal intervals.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Series:
         self._terms, self._order = terms[:, :used], order[:used]
 
     def __call__(self, share: Array) -> tuple[Array, Array]:
-        """The values at shares, and the integrals from 0 to there: a row for each function."""
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         count = self._order.size
         found = np.empty((2, self._terms.shape[0], share.size))
         factor = np.divide(1.0, 2j * np.pi * self._order, where=self._order > 0, out=np.zeros(count, complex))
@@ -55,7 +55,9 @@ class Series:
 
 
 def _powers(bases: Array, count: int) -> Array:
-    """The powers 0 to count - 1 of complex numbers, a row for each; rounding grows with the logarithm of the power."""
+    """Return the powers 0 to count - 1 of complex numbers, a row for each; rounding grows with the logarithm of the
+    power.
+    """
     powers = np.ones((count, bases.size), dtype=complex)
     powers[1:2] = bases
     done = 2
@@ -67,7 +69,7 @@ def _powers(bases: Array, count: int) -> Array:
 
 
 class PanelSeries:
-    """Functions of a share of the phase by their values at the nodes of panels.
+    """Functions of a share of the phase, given by their values at the nodes of panels.
 
     Parameters
     ----------
@@ -87,7 +89,7 @@ class PanelSeries:
         self._terms = np.concatenate([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
 
     def __call__(self, share: Array) -> tuple[Array, Array]:
-        """The values at shares, and the integrals from 0 to there: a row for each function."""
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         panel = np.clip(np.searchsorted(self._edges, share, side="right") - 1, 0, len(self._edges) - 2)
         left, right = self._edges[panel], self._edges[panel + 1]
         waves = legvander(np.clip((2.0 * share - left - right) / (right - left), -1.0, 1.0), RULE)
@@ -100,7 +102,7 @@ class PanelSeries:
 
 
 def to_legendre() -> Array:
-    """The matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
+    """Return the matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
     rule = panel_rule()
     table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
     return table

@@ -1,7 +1,7 @@
-"""The state of a body on a periodic motion at any times, from the tables of its one segment, in one call from Python.
+"""The state of a body at any times of a periodic motion, from the tables of its one segment, in one call from Python.
 
-Everything that is needed is stored in one *record*, an array of doubles, because passing twenty arrays would take
-longer than reading them. A record begins with the positions of its sections; integers are stored by their bits.
+All data are stored in one *record*, an array of doubles, because passing twenty arrays would take longer than reading
+them. A record begins with the positions of its sections; integers are stored by their bits.
 
 ======================== ===================================================================================
 section                  contents
@@ -42,7 +42,7 @@ from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at
 from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block
 
-# Times that are answered together.
+# The number of times for which states are found together.
 BLOCK = 128
 FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
@@ -52,7 +52,7 @@ _STATE = types.UniTuple(types.float64, 10)
 
 
 class Phases(NamedTuple):
-    """Where a block of n times falls on the segment of a periodic motion.
+    """The positions of a block of n times on the segment of a periodic motion.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def phase_angles_at(timing, kind, table, t, n, phases):  # type: ignore[no-untyp
         r, low = two_sum(fma(-count, period, s), fma(-count, period_low, low))
         before = r + low < 0.0
         sign = choose(before, -1.0, 1.0)
-        # Before it reaches ``a``, the body is on its way back to it. The rounded quotient may pass the other end.
+        # Before the body reaches ``a``, it is on its way back to it. The rounded quotient may lie beyond the other end.
         if is_libration:
             r, low = sign * r, sign * low
             over = r > 0.5 * period
@@ -179,9 +179,11 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
 
 @Inlined
 def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore[no-untyped-def]
-    """The bound on the error of a curve parameter, from those of the time and of the table, and from its rounding."""
+    """Return the bound on the error of a curve parameter, from the errors of the time and of the table, and from its
+    rounding.
+    """
     rate = choose(ds > 0.0, fabs(v) / ds, 0.0)
-    of_time = choose(time_error < inf, rate * time_error, inf)  # without a known time, rest has no place
+    of_time = choose(time_error < inf, rate * time_error, inf)  # if the time is unknown, so is the place of rest
     return of_time + table_error + ULP * (1.5 * fabs(lam - in_lap) + 2.0 * fabs(in_lap))
 
 
@@ -217,7 +219,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     integrand = Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0)))
     direction = 1.0 if b > a else -1.0
     size = min(BLOCK, end - begin)
-    # Two arrays for all work space: an array for each row would take as long as the state at one time.
+    # Two arrays serve as all work space, because making an array for each row would take as long as finding the state
+    # at one time.
     buffer, indices = np.empty((19, size)), np.empty((2, size), dtype=np.int64)
     phi, sense, laps, v, reduced, v2, arc = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4], buffer[5], buffer[6]
     spare, work, rows, segments, panels = buffer[7:10], buffer[10:14], buffer[14:19], indices[0], indices[1]

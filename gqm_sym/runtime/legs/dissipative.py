@@ -42,20 +42,20 @@ from gqm_sym.runtime.motion.sampler import (
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
-# When the record that compiled code reads is made anew for later times, it has this many times the pieces, so that many
-# questions one after the other do not copy it for each leg.
+# When the record that compiled code reads is extended to later times, its number of pieces grows by this factor, so
+# that successive questions do not copy it for each leg.
 EXTENSION = 1.25
 
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    """The motion of a launch where forces dissipate."""
+    """Return the motion of a launch with dissipative forces."""
     problem = Problem(formulas, launch, p, formulas.domain(p), bind_all(formulas, p))
     motion = DissipativeMotion(problem)
     return motion if motion.direction else MotionAtRest(problem)
 
 
 def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: Array) -> Array:
-    """V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
+    """Return V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
     motion = dissipate(formulas, p, launch)
     v2 = np.full(places.shape, np.nan)
     if isinstance(motion, DissipativeMotion):
@@ -65,13 +65,13 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
 
 
 def _times_from_launch(t: Any) -> tuple[Array, float] | None:
-    """An array of times from launch on as doubles, with the greatest; None if they are not that."""
+    """Return an array of times from launch on as doubles, with the largest; None if they are not such numbers."""
     times = plain_times(t)
     return (times[0], times[2]) if times is not None and 0.0 <= times[1] <= times[2] < inf else None
 
 
 class Reading(NamedTuple):
-    """What compiled code reads of a motion.
+    """The record of a motion for compiled code.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Reading(NamedTuple):
     since : float
         The time in s from which on it holds.
     pieces : sequence of TabulatedPiece
-        What it is made of.
+        The pieces that the record contains.
     """
 
     record: Array = np.empty(0)
@@ -91,12 +91,12 @@ class Reading(NamedTuple):
     pieces: Sequence[TabulatedPiece] = ()
 
     def has(self, t: float, errors: bool) -> bool:
-        """Whether it holds up to a time, with all errors if these are required."""
+        """Return whether it holds up to a time, with all errors if these are required."""
         return t <= self.until and (self.pieces[-1].has_all_errors or not errors)
 
 
 class DissipativeMotion(FollowedMotion):
-    """A motion that loses energy: leg after leg, until the body rests or leaves the track, or for ever.
+    """A motion that loses energy, leg by leg until the body rests or leaves the track, or for ever.
 
     Each leg begins with V**2 = 0 at a turning point, so that its accuracy does not depend on the legs before it; times
     are summed as two doubles. Legs are computed when they are needed. Without ``t_max``, `legs` and `events` of a
@@ -141,7 +141,7 @@ class DissipativeMotion(FollowedMotion):
         return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
 
     def lam(self, t: Any) -> Any:
-        """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
+        """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         one = self._one_time(t, errors=False)
         if one is not None:
             return place_on_leg(*one)
@@ -151,7 +151,7 @@ class DissipativeMotion(FollowedMotion):
         return self._read(*times, 1, self._read_places, super().lam)[0].reshape(times[0].shape)
 
     def state(self, t: Any) -> State:
-        """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
+        """Return the state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         in_space = self.problem.formulas.path_in_space is not None
         if in_space and self.problem.period:
             return super().state(t)
@@ -169,11 +169,11 @@ class DissipativeMotion(FollowedMotion):
         return self._state_of(times[0], self._read(*times, STATE_ROWS, self._read_states, by_segments))
 
     def error_bound(self, t: Any) -> Any:
-        """A bound of the error of ``lam(t)``; see `Motion.error_bound`."""
+        """Return a bound of the error of ``lam(t)``; see `Motion.error_bound`."""
         return self.state(t).error
 
     def _one_time(self, t: Any, errors: bool) -> tuple[Array, float] | None:
-        """The record that compiled code reads at a single time, and the time as a double; None for any other times."""
+        """Return the record that compiled code reads at a single time, and the time; None for any other times."""
         time = plain_time(t)
         if time is None or not 0.0 <= time < inf:
             return None
@@ -188,7 +188,7 @@ class DissipativeMotion(FollowedMotion):
         by_record: Callable[[Array, Array, Array], None],
         by_segments: Callable[[Array], Array],
     ) -> Array:
-        """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
+        """Return rows of numbers at times, as far as possible from the record that compiled code reads."""
         read = self._reading_at if times.size == 1 else self._reading_up_to
         record, until = read(greatest, rows > 1)[:2]
         times = times.reshape(-1)
@@ -234,7 +234,7 @@ class DissipativeMotion(FollowedMotion):
 
     @locked
     def _read_first(self, t: float, errors: bool) -> Reading:
-        """`_reading_at`, once the motion is followed so far."""
+        """Return the record of `_reading_at` after following the motion up to the time."""
         self._check_end(t)
         pieces, first = self._pieces, self._first_reading
         k = bisect_right(pieces, t, key=lambda timed: timed.t_stop[0])
@@ -247,7 +247,7 @@ class DissipativeMotion(FollowedMotion):
         return self._first_reading
 
     def _with_errors(self, made: Sequence[TabulatedPiece], pieces: Sequence[TimedSegment]) -> list[TabulatedPiece]:
-        """Tabulated pieces with all errors."""
+        """Return tabulated pieces with all errors."""
         return [
             piece
             if piece.has_all_errors
@@ -260,10 +260,10 @@ class DissipativeMotion(FollowedMotion):
 
     @locked
     def _extended(self, t: float, errors: bool) -> Reading:
-        """`_reading_up_to`, once the motion is followed so far."""
+        """Return the record of `_reading_up_to` after following the motion up to the time."""
         self._check_end(t)
         before = self._reading
-        if before.has(t, errors):  # another thread has followed it
+        if before.has(t, errors):  # another thread has extended it
             return before
         made = list(before.pieces)
         if t > before.until:
@@ -298,7 +298,7 @@ class DissipativeMotion(FollowedMotion):
 
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
-        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))

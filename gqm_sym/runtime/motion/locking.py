@@ -1,4 +1,4 @@
-"""One answer at a time: a motion computes answers on request and keeps them, and many threads may request them."""
+"""A lock for objects that compute answers on request and keep them, while many threads may request them."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -12,10 +12,10 @@ T = TypeVar("T")
 
 
 def lock_of(owner: Any) -> AbstractContextManager[Any]:
-    """The lock of an object, which the thread that holds it may take again.
+    """Return the lock of an object, which the thread that holds it may take again.
 
-    It is made when it is first needed, because most launches of many are asked one question only, or none. All threads
-    get the same lock, because a dictionary sets a default in one step.
+    The lock is made when it is first needed. All threads get the same one, because a dictionary sets a default in a
+    single step.
     """
     attributes = owner.__dict__
     lock: AbstractContextManager[Any] | None = attributes.get("_lock")
@@ -23,7 +23,7 @@ def lock_of(owner: Any) -> AbstractContextManager[Any]:
 
 
 def locked(method: Callable[Concatenate[T, P], R]) -> Callable[Concatenate[T, P], R]:
-    """Let a method run while its object's lock is held, so that no other thread sees what is half computed."""
+    """Return a method that holds its object's lock while it runs, so that no other thread sees incomplete results."""
 
     @wraps(method)
     def one_at_a_time(self: T, *args: P.args, **keywords: P.kwargs) -> R:

@@ -18,14 +18,16 @@ from gqm_sym.runtime.legs.variations.law import LawRows, States
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
-# An extreme inside a leg is improved by Newton's method, whose steps may be this share of the time of the motion.
+# An extreme inside a leg is improved by Newton's method, whose steps may be at most this share of the time of the
+# motion.
 MAX_STEP, NEWTON_STEPS = 1e-5, 3
 
-# Points that are taken together.
+# The number of points that are evaluated together.
 BLOCK = 4096
 
-# An extreme this near to the end of a motion, as a share of its time, is there; and one this near to a place where the
-# force jumps, as a share of the place. This share of the time later or earlier, it is on one side of it.
+# An extreme this near to the end of a motion, as a share of its time, counts as the end. An extreme this near to a jump
+# of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
+# is on one side of the jump.
 AT_END, AT_BREAK, BESIDE = 1e-12, 1e-9, 1e-13
 
 
@@ -39,8 +41,8 @@ class Switch(NamedTuple):
     lam : float
         The place, in the unit of the curve's parameter.
     margin : float
-        By how much the pull along the track is larger there than what can hold the body, as a share of the latter. It
-        is negative where the body stays. At 0 one more leg begins or ends, and derivatives are one-sided.
+        The excess of the driving force along the track over the largest force that can hold the body there, as a share
+        of the latter. It is negative if the body stays. At 0 the number of legs changes, and derivatives are one-sided.
     """
 
     t: float
@@ -49,27 +51,27 @@ class Switch(NamedTuple):
 
 
 class StateChanges:
-    """How states at points of a motion with losses change: a row for each variable, at fixed times.
+    """The changes of the states at points of a motion with losses, at fixed times: a row for each variable.
 
     Parameters
     ----------
     changes : Changes
         The changes of its legs.
     points : PhasePoints
-        Where it is at the times.
+        The points of the motion at the times.
     v : array
         The velocities there.
 
     Attributes
     ----------
     lam, s, x, z, v, normal_force, y : arrays
-        As in `gradients.sensitivity.Sensitivity`, but for places by the labels of points, within the lap.
+        As in `gradients.sensitivity.Sensitivity`, except that places are the labels of points, within the lap.
     labels, arc : array
-        How the labels of the places change, and as of `changes.Origin`.
+        The changes of the labels of the places, and ``arc`` as in `changes.Origin`.
     acceleration : array
-        How the velocity changes with time.
+        The derivative of the velocity by time.
     states : States
-        The last of the points.
+        The states of the last points that were evaluated.
     law : LawRows
         The law there.
     """
@@ -88,7 +90,7 @@ class StateChanges:
         self.acceleration, self.labels = found[8, 0], found[0]
 
     def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
-        """The attributes for some of the points: a row for each, and for the acceleration a row of equal rows."""
+        """Return the attributes for some of the points: a row for each, with equal rows for the acceleration."""
         along = changes.along(half, w)
         self.states = States(*along.places, v**2, along.heading, along.contact_sign)
         self.law = law = changes.law.rows(self.states)
@@ -107,7 +109,7 @@ class StateChanges:
 
 
 def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
-    """The halves of legs on which points lie, and their march variables."""
+    """Return the halves of legs on which points lie, and their march variables."""
     half, w = np.empty(points.laps.size, dtype=np.intp), np.empty(points.laps.size)
     for timed, here, phi in points.segments:
         last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
@@ -116,8 +118,8 @@ def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], A
 
 
 def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
-    """How the places of a motion at times, of two doubles each, change."""
-    if changes.law.by_arc_length:  # the stretch of the way is needed, too
+    """Return the changes of the places of a motion at times of two doubles each."""
+    if changes.law.by_arc_length:  # the change of the arc length is needed too
         found: Array = states_at(motion, changes, t, low).lam
         return found
     points, f = motion._phase_points(t, low), motion.problem.functions
@@ -128,7 +130,7 @@ def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
 
 
 def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
-    """How the states of a motion at times, of two doubles each, change."""
+    """Return the changes of the states of a motion at times of two doubles each."""
     points = motion._phase_points(t, low)
     found = StateChanges(changes, points, motion._velocities(points))
     found.lam = changes.told(found.lam, found.arc, points.laps)
@@ -138,7 +140,7 @@ def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChang
 
 
 def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
-    """The derivatives of a quantity of a motion by all variables; of turning points a column for each.
+    """Return the derivatives of a quantity of a motion by all variables; for turning points, a column for each.
 
     Parameters
     ----------
@@ -167,7 +169,7 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
 
 
 def turning_points(motion: Any, changes: Changes) -> Array:
-    """The derivatives of the turning points of a motion."""
+    """Return the derivatives of the turning points of a motion."""
     turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
     columns = [changes.told(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns]
     if motion.problem.w0 == 0.0:
@@ -176,7 +178,9 @@ def turning_points(motion: Any, changes: Changes) -> Array:
 
 
 def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
-    """The derivatives of the place and time where a motion ends; zero if ``t_max`` ends it, or if it ends at once."""
+    """Return the derivatives of the place and the time at which a motion ends; zero if ``t_max`` ends it, or if it ends
+    at once.
+    """
     what, k, zero = motion.legs[-1].end, len(changes.runs) - 1, np.zeros(changes.variables)
     if what == "horizon" or motion.t_end == 0.0:
         return zero, zero
@@ -201,14 +205,15 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
 def balance_at(static_balance, p, places):  # type: ignore[no-untyped-def]
-    """The accelerations of a body at rest that is about to move forwards, and backwards, at places."""
+    """Return the accelerations, at places, of a body at rest that is about to move forwards or backwards."""
     out = np.empty((2, places.size))
     call_static_balance(static_balance, places.size, places, p, out)
     return out
 
 
 def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: float) -> Switch | None:
-    """The turn at which the number of legs is nearest to changing; None if nothing can hold the body at any.
+    """Return the turn at which the number of legs is nearest to changing; None if no force can hold the body at any
+    turn.
 
     Parameters
     ----------
@@ -219,7 +224,7 @@ def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: 
     turns : sequence of Leg
         The legs that end with a turn, or with rest.
     period : float
-        That of the curve's parameter, or 0.
+        The period of the curve's parameter, or 0.
     """
     places = np.array([leg.lam_end for leg in turns])
     forwards, backwards = balance_at(static_balance, p, np.mod(places, period) if period else places)
@@ -232,11 +237,11 @@ def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: 
 
 
 def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
-    """The derivatives of an extreme of a motion.
+    """Return the derivatives of an extreme of a motion.
 
-    Inside a leg it changes as the quantity does at a fixed time, since it is stationary there (envelope theorem), and
-    so it does where the horizon cuts the motion. Where the motion ends by itself, its time changes too. An extreme at a
-    place where the force jumps stays there.
+    Inside a leg the extreme changes as the quantity does at a fixed time, because the quantity is stationary there
+    (envelope theorem); the same holds if the horizon cuts the motion there. If the motion ends by itself there, the
+    time of the extreme changes too. An extreme at a jump of the force stays there.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
@@ -247,7 +252,8 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     else:
         t, is_stationary = _improved(motion, changes, of_speed, found)
         if not is_stationary and np.abs(found.lam - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(found.lam):
-            # On the side of the extreme, and from two times back to its own.
+            # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
+            # itself.
             sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * BESIDE * t_end
             states = [motion.state(side[0]) for side in sides]
             values = [abs(state.v) if of_speed else state.normal_force for state in states]
@@ -261,7 +267,9 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
 
 
 def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
-    """How the speed or the contact force changes at times that themselves change; if not told how, the places stay."""
+    """Return the changes of the speed or the contact force at times that change by ``moved``; without it, the places
+    stay fixed.
+    """
     at, v = states_at(motion, changes, t, np.zeros_like(t)), motion.state(t).v
     if moved is None:
         moved = -at.labels * at.law.ds / v
@@ -275,9 +283,9 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
 
 
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
-    """The time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
+    """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 
-    The time is left where it is not.
+    The time is not changed if it is not stationary.
     """
     t = found.t
     for _ in range(NEWTON_STEPS):

@@ -1,10 +1,10 @@
 """Changes of a motion with losses from leg to leg: of its turning points, their times, and its states between them.
 
-Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
+Here y, sigma and ``delay`` are the changes of W, of the place and of the time at a given distance from a moving origin
 (`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
-sgn(dlam/dt). Both halves of a leg agree on these in the middle, which determines how the turn at the end moves. A body
-that is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
-speed.
+sgn(dlam/dt). Both halves of a leg must agree on these in the middle, which determines the change of the turn at the
+end. A body that is thrown slowly and speeds up is followed from the place at which it would have been at rest, so that
+nothing is divided by its speed.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from gqm_sym.runtime.legs.variations.law import LawRows, States, one_state
 
 
 class Origin(NamedTuple):
-    """How the beginning of a half of a leg changes; each field has a number, or a row, for each variable.
+    """The changes of the beginning of a half of a leg; each field has a number, or a row, for each variable.
 
     The variables are the run-time parameters, lam0 and v0.
 
@@ -35,11 +35,11 @@ class Origin(NamedTuple):
     sigma : array
         The change of the place.
     y : array
-        The change of V**2 there, at the place that moves.
+        The change of V**2 at the moving place.
     delay : array
-        The change of the time there, at the place that moves.
+        The change of the time at the moving place.
     arc : array
-        The change of arc length from launch, less ds/dlam times that of the place.
+        The change of the arc length from launch, less ds/dlam times the change of the place.
     """
 
     sigma: Array
@@ -49,7 +49,7 @@ class Origin(NamedTuple):
 
 
 class Along(NamedTuple):
-    """How some states change: a row for each variable.
+    """The changes of some states: a row for each variable.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Along(NamedTuple):
 
 
 class Changes:
-    """The changes of a motion with losses along some of its runs, the first one of which is that of the launch.
+    """The changes of a motion with losses along some of its runs, beginning with the run of the launch.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ class Changes:
     law : Law
         The law of motion.
     followed : int
-        How many runs there were, with approaches to an equilibrium.
+        The number of runs, including approaches to an equilibrium.
     runs : list of Run
         The runs.
     ends : list of Origin
-        For each run, how its end changes: the turn, or a place that moves with the origin of its last half.
+        For each run, the changes of its end: of the turn, or of a place that moves with the origin of its last half.
     """
 
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
@@ -106,11 +106,11 @@ class Changes:
 
     @property
     def variables(self) -> int:
-        """How many variables there are."""
+        """The number of variables."""
         return self.law.count + 2
 
     def _marks(self, marks: Sequence[tuple[int, list[float], bool]]) -> States:
-        """Places of the records of all runs, each with V**2 there and whether it is on the last half."""
+        """Return places of the records of all runs, each with V**2 there and whether it is on the last half."""
         places = np.array([run.pair(at) for at, _, _ in marks for run in self.runs]).T
         heading = np.array([run.record[HEADING] for run in self.runs] * len(marks))
         v2 = np.concatenate([speeds for _, speeds, _ in marks])
@@ -122,26 +122,26 @@ class Changes:
         return States(places[0], places[1], v2, heading, self.panels.contact_sign[first])
 
     def _half(self, run: int, is_back: bool) -> tuple[int, int]:
-        """The first panel of a half of the run with a number, and the one behind its last."""
+        """Return the index of the first panel of a half of run k, and the index after its last panel."""
         k = self._where[run, is_back]
         return self.panels.first[k], self.panels.first[k + 1]
 
     def _mixed(self, origin: Origin, rows: Array) -> Array:
-        """The sum of solutions (`equation`) for each variable."""
+        """Return the sum of solutions (`equation`) for each variable."""
         n = self.law.count
         found: Array = origin.sigma * rows[n] + origin.y * rows[n + 1]
         found[:n] += rows[:n]
         return found
 
     def by_all(self, rows: Array) -> Array:
-        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
+        """Extend derivatives by the run-time parameters to derivatives by all variables, where the others are zero."""
         return np.concatenate([rows, np.zeros((2, *rows.shape[1:]))])
 
     def _follow(self) -> None:
         runs, panels = self.runs, self.panels
         speeds = panels.end_speeds
         start_v2 = [float(run.record[START_V2]) for run in runs]
-        # Where no panels lead from the start, the start is the middle.
+        # If there are no panels from the start, the start is the middle.
         middle = [
             float(speeds[self._half(k, False)[1] - 1]) if run.ahead else start_v2[k] ** 0.5
             for k, run in enumerate(runs)
@@ -160,7 +160,7 @@ class Changes:
             laps = run.laps
             origin = origin._replace(sigma=origin.sigma - folded, arc=origin.arc + starts.ds[k] * folded)
             if run.ahead:
-                if k and not runs[k - 1].back:  # it goes on from where the last run ended
+                if k and not runs[k - 1].back:  # the run begins at the end of the last one
                     jump = panels.jump(self._half(k - 1, False)[1] - 1, self._half(k, False)[0], 0)
                     origin = origin._replace(y=origin.y + jump * origin.sigma)
                 if start_v2[k] > 0.0 and np.isfinite(run.half_c):
@@ -176,7 +176,8 @@ class Changes:
                     origin.arc + self.by_all(panels.arcs[:, last, -1]),
                 )
             if run.back:
-                # The end moves as the middle does, and by so much more that both halves agree in the middle.
+                # The end moves with the middle, and in addition by the amount for which both halves agree in the
+                # middle.
                 last = self._half(k, True)[1] - 1
                 still = origin._replace(y=zero)
                 more = self._mixed(still, panels.ends[:, last]) - origin.y
@@ -215,14 +216,14 @@ class Changes:
         return lap
 
     def at_end(self, k: int) -> tuple[States, float]:
-        """The state in which the k-th run ends, and the speed there."""
+        """Return the state at the end of the k-th run, and the speed there."""
         run, last = self.runs[k], self._half(k, False)[1] - 1
         speed = float(self.panels.end_speeds[last])
         sign = float(self.panels.contact_sign[last])
         return one_state(run.pair(END), speed**2, float(run.record[HEADING]), sign), speed
 
     def _launched(self, starts: LawRows) -> Origin:
-        """How the launch changes."""
+        """Return the changes of the launch."""
         n, launch = self.law.count, self._problem.launch
         sigma, y, delay, arc = np.zeros((4, n + 2))
         sigma += self.law.launch_moves
@@ -233,23 +234,25 @@ class Changes:
             slope = starts.slope[0]
             if launch.direction == heading:
                 delay[n + 1] = -2.0 * starts.ds[0] / abs(slope)
-            else:  # thrown the other way, it comes back with little less speed
+            else:  # a body thrown the other way comes back with little less speed
                 contact_sign = float(self.panels.contact_sign[0])
                 upwards = self.law.rows(one_state(self.runs[0].pair(START), 0.0, -heading, contact_sign)).slope[0]
                 delay[n + 1] = 2.0 * starts.ds[0] / abs(upwards)
         return Origin(sigma, y, delay, arc)
 
     def told(self, sigma: Array, arc: Array, laps: Array | float) -> Array:
-        """How a place changes as it is told, from how its label does and the arc length to there (`Origin`)."""
+        """Return the change of a place in the curve's parameter, from the changes of its label and of the arc length to
+        it (`Origin`).
+        """
         if not self.law.by_arc_length:
             changed: Array = sigma + laps * self.lap.reshape(-1, *[1] * (sigma.ndim - 1))
             return changed
         changed = sigma + arc
-        changed[self.law.count] += 1.0  # the launch place itself, from the start point
+        changed[self.law.count] += 1.0  # the change of the launch place itself, from the start point
         return changed
 
     def half(self, leg: int, is_back: bool) -> int:
-        """The number of a half of the run with a number.
+        """Return the number of a half of the run with a given number.
 
         Raises
         ------
@@ -263,7 +266,7 @@ class Changes:
         return self._where[leg, is_back]
 
     def along(self, half: NDArray[np.intp], w: Array) -> Along:
-        """How states change at march variables on halves with numbers."""
+        """Return the changes of states at march variables on halves with given numbers."""
         panels = self.panels
         k = panels.panel_at(half, w)
         shares, times, arcs = panels.at(k, w)
@@ -280,7 +283,7 @@ class Changes:
         )
 
     def delays(self, half: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
-        """Of `along` the places, as doubles, and how they and the times change."""
+        """Return the places of `along` as doubles, and the changes of places and times."""
         panels = self.panels
         k = panels.panel_at(half, w)
         origin = Origin(*self._stacked[:, :, half])

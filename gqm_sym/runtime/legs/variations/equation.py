@@ -1,7 +1,7 @@
 """The variational equation along the panels of legs, in the march variable in which the legs were found.
 
-Let dW/dlam = F(lam, W; p), where W is V**2, and let the place where a half of a leg begins (its *origin*: the start, or
-the turn at the end) move by sigma. At a given distance d from the origin, W changes by y with
+The law of motion is dW/dlam = F(lam, W; p), where W is V**2. If the beginning of a half of a leg (its *origin*: the
+start, or the turn at the end) moves by sigma, then W at a given distance d from the origin changes by y with
 
     dy/dd = u (F_W y + F_p + F_lam sigma),
 
@@ -9,7 +9,7 @@ where u is the direction in which d grows. This is the equation of the leg itsel
 the same integrating factor solves it. From a turning point y begins with 0 and vanishes as W does, so that y/W and the
 change of the time per w, ``dt/dw (ds_p/ds + ds_lam sigma/ds - y/(2 W))``, are smooth in the march variable w there too.
 The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for y = 1 at the origin are found for all
-panels at once; the change of a leg is a sum of them (`changes`).
+panels at once; the change of a leg is a linear combination of them (`changes`).
 """
 
 from collections.abc import Sequence
@@ -33,10 +33,10 @@ from gqm_sym.runtime.legs.variations.law import LawRows, States
 # The nodes of a panel and its end, as shares of it.
 POINTS = np.append(SHARES, 1.0)
 
-# From values at the nodes to those at both ends of a panel.
+# The matrix that maps values at the nodes to those at both ends of a panel.
 TO_START, TO_END = (-1.0) ** np.arange(COUNT) @ TO_COEFFICIENTS, TO_COEFFICIENTS.sum(axis=0)
 
-# A panel that begins this near to where the curve is not smooth, as a share of the place, begins there.
+# A panel that begins this near to a break of the curve, as a share of the place, counts as beginning there.
 AT_BREAK = 1e-12
 
 
@@ -62,14 +62,14 @@ class Panels:
     Parameters
     ----------
     halves : sequence of (Run, bool)
-        Runs, each with whether the half from its end is meant.
+        Runs, each with True for the half from its end.
 
     Attributes
     ----------
     first : list of int
-        Where the panels of each half begin; the last item is their number.
+        The indices at which the panels of each half begin; the last item is the number of panels.
     begin, width, contact_sign : (n,) arrays
-        The march variable where each panel begins, how far it goes, and the sign of N on it.
+        The march variable at the beginning of each panel, the panel's width, and the sign of N on it.
     nodes : States
         The nodes of all panels.
     shares : (k+2, n, COUNT) array
@@ -119,21 +119,21 @@ class Panels:
         return speeds
 
     def panel_at(self, half: NDArray[np.intp], w: Array) -> NDArray[np.intp]:
-        """The panels at march variables w on halves with numbers."""
+        """Return the panels at march variables w on halves with given numbers."""
         low, high = np.array(self.first)[half], np.array(self.first)[half + 1] - 1
-        while (low < high).any():  # by halving
+        while (low < high).any():  # by bisection
             middle = (low + high + 1) // 2
             is_behind = self.begin[middle] <= w
             low, high = np.where(is_behind, middle, low), np.where(is_behind, high, middle - 1)
         return low
 
     def distances(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
-        """At march variables w on panels k the distance from the origin, and V over Y there."""
+        """Return the distances from the origin at march variables w on panels k, and V over Y there."""
         distance = np.where(self._is_distance[k], w, w * (w + 2.0 * self._half_c[k]))
         return distance, np.where(self._is_distance[k], 1.0, w + self._half_c[k])
 
     def places(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
-        """The places at march variables w on panels k, as two doubles each."""
+        """Return the places at march variables w on panels k, as two doubles each."""
         high, low = two_sum.py_func(self.place[k], self.u[k] * self.distances(k, w)[0])
         return high, low + self._low[k]
 
@@ -151,10 +151,11 @@ class Panels:
         offset, zero = self.width[:, None] * POINTS, np.zeros_like(rows.ds)
         twice = np.where(self._is_distance, 1.0, 2.0)[:, None]
         ds = rows.ds.reshape(count, COUNT)
-        # By w and not by the distance: laws with the root of W have a pole here at a turn, but not times the growth.
+        # Integrals are over w and not over the distance: laws with the square root of W have a pole at a turn, which
+        # the growth of the distance with w cancels.
         rate = twice * self._growth * rows.by_w.reshape(count, COUNT)
         factor = np.exp(self.u[:, None] * offset * (rate @ MEANS.T))
-        # Sources for each parameter, for sigma, and none for what begins with y = 1.
+        # The sources for each parameter and for sigma; the solution that begins with y = 1 has none.
         sources = np.vstack([rows.by_parameters, rows.by_place, zero]).reshape(n + 2, count, COUNT)
         gained = self._over_distance(sources / factor[:, :COUNT])
         slopes = rows.slope.reshape(count, COUNT)
@@ -163,7 +164,7 @@ class Panels:
         jumps = np.append(0.0, self.jumps(panels - 1, panels, 0))
         y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1], jumps)[:, :, None])
         self.shares, self.ends = y[:, :, :COUNT] / self.nodes.w.reshape(count, COUNT), y[:, :, -1]
-        self.shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
+        self.shares[n + 1, ~self._is_distance] = 0.0  # no solution begins there with y = 1
         stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, zero]).reshape(n + 2, count, COUNT)
         changes = twice * ds / self._y * (stretch / ds - 0.5 * self.shares)
         times = offset * (changes @ MEANS.T)
@@ -172,7 +173,7 @@ class Panels:
 
     @cached_property
     def _series(self) -> tuple[Array, Array]:
-        """Chebyshev coefficients on each panel: rows for ``times``, and for ``shares`` and ``arcs``."""
+        """Return Chebyshev coefficients on each panel: rows for ``times``, and for ``shares`` and ``arcs``."""
         others = np.concatenate([self.shares, self.arcs[:, :, :COUNT]])
         parts = (self.times[:, :, :COUNT], others)
         times, others = (np.ascontiguousarray(np.moveaxis(part @ TO_COEFFICIENTS.T, 0, 1)) for part in parts)
@@ -184,17 +185,17 @@ class Panels:
         return out
 
     def times_at(self, k: NDArray[np.intp], w: Array) -> Array:
-        """``times`` at march variables w on panels k."""
+        """Return ``times`` at march variables w on panels k."""
         return self._sums(self._series[0], k, w)
 
     def at(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
-        """``shares``, ``times`` and ``arcs`` at march variables w on panels k."""
+        """Return ``shares``, ``times`` and ``arcs`` at march variables w on panels k."""
         others = self._sums(self._series[1], k, w)
         count = len(self.shares)
         return others[:count], self.times_at(k, w), others[count:]
 
     def _over_distance(self, rows: Array) -> Array:
-        """Integrals of u times rows over the distance, from the start of each panel to its points."""
+        """Return the integrals of u times rows over the distance, from the start of each panel to its points."""
         offset = self.width[:, None] * POINTS
         slope = np.where(self._is_distance, 1.0, 2.0 * (self.begin + self._half_c))[:, None]
         graded = np.where(self._is_distance, 0.0, 1.0)[:, None] * offset * (rows @ GRADED_MEANS.T)
@@ -209,9 +210,9 @@ class Panels:
         return before
 
     def jumps(self, one: NDArray[np.intp], other: NDArray[np.intp], end: int) -> Array:
-        """By how much the force jumps between the ends of some panels and the beginnings (or ends) of others.
+        """Return the jumps of the force between the ends of some panels and the beginnings (or ends) of others.
 
-        At a given distance from an origin that moves, V**2 changes by as much there, times how far that moves.
+        At a given distance from a moving origin, V**2 changes there by the jump times the shift of the origin.
         """
         if not self._breaks.size:
             return np.zeros(one.size)
@@ -221,11 +222,11 @@ class Panels:
         return np.where(at_break, self._slopes[end, other] - self._slopes[1, one], 0.0)
 
     def jump(self, one: int, other: int, end: int) -> float:
-        """As `jumps`, between two panels."""
+        """Return the jump of the force between two panels, as in `jumps`."""
         return float(self.jumps(np.array([one]), np.array([other]), end)[0])
 
     def _chained(self, gained: Array, factors: Array, jumps: Array) -> Array:
-        """The values of y with which panels begin: at the origin 0, and 1 for the last of the solutions."""
+        """Return the values of y with which panels begin: 0 at the origin, but 1 for the last solution."""
         start = np.zeros_like(gained)
         for first, stop in pairwise(self.first):
             start[-1, first] = 1.0
@@ -236,7 +237,7 @@ class Panels:
 
 
 def _as_followed(tables: Sequence[Array]) -> Array:
-    """The panels of all halves: where each begins, how far it goes, the sign of N on it, and Y at its nodes."""
+    """Return the panels of all halves: the beginning and the width of each, the sign of N on it, and Y at its nodes."""
     table = np.concatenate(tables)
     right = table[:, RIGHT]
     begin = np.append(0.0, right[:-1])
@@ -246,10 +247,10 @@ def _as_followed(tables: Sequence[Array]) -> Array:
 
 
 def _divided(panels: Array, half_c: float) -> Array:
-    """The panels of a half, divided where its launch is slow.
+    """Return the panels of a half, divided further after a slow launch.
 
-    The march variable of a slow launch begins near a zero of V**2 behind it, at -half_c. There Y is smooth, but changes
-    of it are not: panels are no longer than their distance from it.
+    The march variable of a slow launch begins near a zero of V**2 behind it, at -half_c. Y is smooth there, but its
+    changes are not, so panels must be no wider than their distance from this zero.
     """
     if not 0.0 < half_c < inf:
         return panels
