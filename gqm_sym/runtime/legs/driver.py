@@ -280,7 +280,9 @@ class Driver:
             )
 
     def _followed(self) -> tuple[int, Array]:
-        """Return the code for the end of the last of the next legs (`advance`), and an array with their records first."""
+        """Return the code for the end of the last of the next legs (`advance`), and an array that begins with their
+        records.
+        """
         legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
         while True:
             frame = self._frame

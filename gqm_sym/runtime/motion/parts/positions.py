@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gqm_sym.arguments import ChecksArguments
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number, read_numbers
@@ -24,7 +25,7 @@ from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRid
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
 
 
-class Positions(ABC):
+class Positions(ChecksArguments, ABC):
     """The places and states of a motion.
 
     Attributes
@@ -33,6 +34,7 @@ class Positions(ABC):
         As in `Motion`.
     """
 
+    _called = "motion"
     kind: MotionKind
     direction: int
 
