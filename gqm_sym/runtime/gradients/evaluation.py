@@ -13,11 +13,12 @@ from numba import types
 from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS, RULE
 from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fill_panel
+from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
@@ -220,8 +221,8 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
         As for `fill_means`.
     places : (2*k, n) array
         The k coordinates of the places, as two doubles each.
-    found : (k, 3, n) array
-        For each result and place the value as two doubles, and a bound on its error.
+    found : (k, 3, n) or (k, 1, n) array
+        For each result and place the value as two doubles and a bound on its error, or the value alone.
     """
     begin(program, work, inputs)
     (address, operations, first, count, outputs), n = program, places.shape[1]
@@ -231,6 +232,54 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
             set_coordinate(work, count + k, places[2 * k, start:stop], places[2 * k + 1, start:stop])
         call_interpreter(address, operations, first, operations.shape[0], work, stop - start)
         for j in range(outputs.size):
-            for part in range(3):
+            for part in range(found.shape[1]):
                 for i in range(stop - start):
                     found[j, part, start + i] = work[outputs[j] + part * BLOCK + i]
+
+
+@entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX, CUBE), checked=False)
+def fill_signed_values(program, work, inputs, places, states, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program as `fill_values` does, for signs of dlam/dt and of N at each place.
+
+    These signs are the last two inputs of the program, and the last two rows of ``states``.
+
+    The places of the same signs are evaluated together.
+    """
+    (address, operations, first, count, outputs), n = program, places.shape[1]
+    coordinates, headings, signs = places.shape[0] // 2, states[states.shape[0] - 2], states[states.shape[0] - 1]
+    chosen, some = np.empty(n, dtype=np.int64), np.empty((2, BLOCK))
+    for pair in range(4):
+        heading, sign, total = 1.0 if pair < 2 else -1.0, 1.0 if pair % 2 == 0 else -1.0, 0
+        for i in range(n):
+            if headings[i] == heading and signs[i] == sign:
+                chosen[total] = i
+                total += 1
+        if total > 0:
+            inputs[0, count - 2], inputs[0, count - 1] = heading, sign
+            begin(program, work, inputs)
+        for start in range(0, total, BLOCK):
+            size = min(BLOCK, total - start)
+            for k in range(coordinates):
+                for i in range(size):
+                    at = chosen[start + i]
+                    some[0, i], some[1, i] = places[2 * k, at], places[2 * k + 1, at]
+                set_coordinate(work, count + k, some[0, :size], some[1, :size])
+            call_interpreter(address, operations, first, operations.shape[0], work, size)
+            for j in range(outputs.size):
+                for part in range(found.shape[1]):
+                    for i in range(size):
+                        found[j, part, chosen[start + i]] = work[outputs[j] + part * BLOCK + i]
+
+
+def values(
+    program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array, parts: int = 3
+) -> Array:
+    """Return the results of a program at places: ``parts`` rows for each, as in `fill_values`.
+
+    ``others`` are coordinates after the first, as doubles.
+    """
+    zero = np.zeros_like(high)
+    places = np.array([high, zero if low is None else low, *(row for other in others for row in (other, zero))])
+    found = np.empty((program.outputs.size, parts, high.size))
+    fill_values(program.operands, program.work, inputs, places, found)
+    return found

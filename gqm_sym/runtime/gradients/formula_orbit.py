@@ -15,17 +15,16 @@ from gqm_sym.runtime.gradients.evaluation import (
     NOT_SMOOTH,
     fill_means,
     fill_panel_means,
+    values,
 )
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.orbit import (
     OrbitDerivatives,
-    PathRows,
     SeriesOf,
     pairs,
-    path_rows,
-    values,
     without_formulas,
 )
+from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
     Source,
@@ -222,16 +221,16 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return high - low
 
     @property
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """As `OrbitDerivatives.series`."""
         n, samples = self.source.variables, self.samples
         rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
         if self.direction:
-            return Series(rates), Series(arcs[1 : 1 + n]), arcs[2 + n :, :1]
+            return Series(np.vstack([rates, arcs[1 : 1 + n]])), arcs[2 + n :, 0]
         count = samples.shape[1]
         rise = 0.5 * self.width * np.sin(2.0 * np.pi * (np.arange(count) + 0.5) / count)
         others = np.zeros((n - self.source.parameters, count))
-        return Series(rates), Series(np.vstack([rise * arcs, others])), np.zeros((n, 1))
+        return Series(np.vstack([rates, rise * arcs, others])), np.zeros(n)
 
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` at places."""

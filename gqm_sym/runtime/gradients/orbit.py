@@ -5,24 +5,14 @@ along the orbit.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.evaluation import (
-    fill_values,
-)
-from gqm_sym.runtime.gradients.programs import (
-    AnySource,
-    Program,
-    path_program,
-)
-from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
+from gqm_sym.runtime.gradients.path import PathRows
+from gqm_sym.runtime.gradients.programs import AnySource
 from gqm_sym.runtime.launch.formulas import Formulas
-
-# Pi as two doubles.
 
 
 @contextmanager
@@ -62,72 +52,9 @@ def pairs(*numbers: tuple[float, float, float]) -> Array:
     return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
 
 
-def values(program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array) -> Array:
-    """Return the results of a program at places, one row for each; ``others`` are coordinates after the first, as
-    doubles.
-    """
-    zero = np.zeros_like(high)
-    places = np.array([high, zero if low is None else low, *(row for other in others for row in (other, zero))])
-    found = np.empty((program.outputs.size, 3, high.size))
-    fill_values(program.operands, program.work, inputs, places, found)
-    return found
-
-
-class PathRows(NamedTuple):
-    """The results of `path_program` at n places. Each is an (m + 2, n) array of the values and their derivatives by m
-    parameters and by the place.
-
-    Attributes
-    ----------
-    x, z, ds, curvature, load : array
-        x, z, ds/dlam, m*kappa and m*n0.
-    potential : array or None
-        U; None for a motion with losses.
-    y, product : array or None
-        y for a space curve, and m**2 times ``load_along_curvature`` for one that lies in no vertical plane; None for
-        other curves.
-    """
-
-    x: Array
-    z: Array
-    ds: Array
-    curvature: Array
-    load: Array
-    potential: Array | None = None
-    y: Array | None = None
-    product: Array | None = None
-
-    def force_changes(self, v: Array, faster: Array, changed: Callable[[Array], Array]) -> Array:
-        """Return the change of the contact force, given the change of the velocity, ``faster``; ``changed`` returns the
-        change of rows.
-        """
-        curvature, load = changed(self.curvature), changed(self.load)
-        if self.product is None:
-            force: Array = load + v**2 * curvature + 2.0 * v * self.curvature[0] * faster
-            return force
-        w, kappa, product = v**2, self.curvature[0], self.product[0]
-        half_square = kappa * w * w * curvature + w * changed(self.product) + self.load[0] * load
-        half_square += 2.0 * v * (kappa * kappa * w + product) * faster
-        with np.errstate(divide="ignore", invalid="ignore"):  # |N| has a kink where it vanishes
-            force = half_square / np.sqrt((kappa * w) ** 2 + 2.0 * product * w + self.load[0] ** 2)
-        return force
-
-
-def path_rows(
-    formulas: ExactFormulas | ExactLaw, parameters: Array, mass: int, high: Array, low: Array | None = None
-) -> PathRows:
-    """Return the path at places, with derivatives."""
-    count = parameters.shape[1]
-    found = values(path_program(formulas, count, mass), parameters, high, low)[:, 0]
-    rows: list[Any] = list(found.reshape(len(found) // (count + 2), count + 2, high.size))
-    if isinstance(formulas, ExactLaw):
-        rows.insert(5, None)  # no potential
-    return PathRows(*rows)
-
-
 # The type of a function that returns, for shares of the phase, the values of functions and their integrals from the
 # beginning of the phase: a row for each function.
-SeriesOf = Callable[[Array], tuple[Array, Array]]
+SeriesOf = Callable[[Array], Array]
 
 
 class OrbitDerivatives(ABC):
@@ -140,7 +67,7 @@ class OrbitDerivatives(ABC):
     direction : int
         0 for a libration, else the sign of ds/dt.
     source : AnySource
-        The formulas from which programs are recorded.
+        What programs are recorded from.
     by_arc_length : bool
         Whether the parameter of the curve is its arc length. In that case run-time parameters may move the curve's
         points, and derivatives at the points of the curve differ from those at given arc lengths.
@@ -167,8 +94,10 @@ class OrbitDerivatives(ABC):
 
     @property
     @abstractmethod
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """The series of the time per phase and its derivatives and then of those of arc length per share; and the
+        derivatives of the lap.
+        """
 
     @abstractmethod
     def at_places(self, lam: Array) -> PathRows:

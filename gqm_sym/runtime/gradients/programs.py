@@ -276,17 +276,16 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
 def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int) -> Program:
     """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
-    The inputs are the run-time parameters; ``mass`` is the index of the mass among them. The results are x, z, ds/dlam,
-    m*kappa, m*n0, then U if there are no losses, y for a space curve, and m**2 times ``load_along_curvature`` for one
-    that lies in no vertical plane; each is followed by its derivatives.
+    The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
+    ds/dlam, m*kappa, m*n0, U (0 with losses), y of a space curve, and m**2 times ``load_along_curvature`` of one in no
+    vertical plane.
     """
     op = Recorder(parameters)
     arguments, m = (op, op.place, op.values), op.values[mass]
     quantities = [formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)]
     for formula in (formulas.kappa, formulas.static_normal_load):
         quantities.append(m * formula(*arguments))
-    if isinstance(formulas, ExactFormulas):
-        quantities.append(formulas.effective_potential(*arguments))
+    quantities.append(formulas.effective_potential(*arguments) if isinstance(formulas, ExactFormulas) else op.number(0))
     if formulas.y is not None:
         quantities.append(formulas.y(*arguments))
     if formulas.load_along_curvature is not None:

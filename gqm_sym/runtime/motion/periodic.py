@@ -15,7 +15,7 @@ from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for, without_formulas
 from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
-from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
+from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
@@ -112,11 +112,9 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        points = self._phase_points(times, low)
-        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
-        chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
-        return Sensitivity(tuple(rows), *chosen)
+        points, phi, shape = self._orbit_points(t)
+        found = self._orbit_sensitivity.at(self, points, phi, list(rows.values()))
+        return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
@@ -124,12 +122,25 @@ class PeriodicMotion(PeriodicTimes):
         if self.problem.formulas.chart is not None:
             return super().place_changes(t, wrt)
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        points, f = self._phase_points(times, low), self.problem.functions
-        v = self._velocities(points)
-        ds = path_and_force_at(f.addresses, f.p, self._places(points), v**2)[2]
-        found = self._orbit_sensitivity.places_at(self, points, v, ds)
+        (points, phi, shape), f = self._orbit_points(t), self.problem.functions
+        ds = path_and_force_at(f.addresses, f.p, points[PLACE], points[SPEED] ** 2)[2]
+        found = self._orbit_sensitivity.places_at(self, points, phi, ds)
         return found[list(rows.values())].reshape(len(rows), *shape)
+
+    def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
+        """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""
+        time = plain_time(t)
+        given = plain_times(t) if time is None else (np.array([time]), time, time)
+        # The speeds of some segments can be computed from their panels only.
+        from_panels = given is None or self._segment.from_multiprecision
+        sampler = None if given is None or from_panels else self._sampler_for(*given[1:])
+        if given is not None and sampler is not None:
+            trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
+            return sampler.phases(given[0].reshape(-1)), trajectory.segments[0].phi_start, shape
+        times, low, shape = self._times(t)
+        found = self._phase_points(times, low)
+        points = points_of(found, self._places(found), self._velocities(found))
+        return points, found.trajectory.segments[0].phi_start, shape
 
     @locked
     def fourier(self, quantity: str, n: int) -> Fourier:

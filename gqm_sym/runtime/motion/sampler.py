@@ -32,6 +32,9 @@ ALTERNATING = (-1.0) ** np.arange(TERMS)
 # The number of fields of a state other than the time.
 STATE_ROWS = 9
 
+# The number of rows of `records.phases_along`.
+PHASE_ROWS = 6
+
 
 def plain_time(t: Any) -> float | None:
     """Return a time that is a double or equal to one; None for any other time."""
@@ -169,6 +172,12 @@ class Sampler:
         )
         if self._problem.formulas.chart is not None:
             out[1] = out[0]  # the parameter of a chart is its arc length
+        return out
+
+    def phases(self, t: Array) -> Array:
+        """Return the rows of `records.phases_along` at times."""
+        out = np.empty((PHASE_ROWS, t.size))
+        records.phases_along(self._record, self._problem.functions.p, t, out)
         return out
 
 

@@ -9,8 +9,8 @@ from paths import ROOT
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
+from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
-from gqm_sym.runtime.gradients.orbit import values
 
 ULP = 2.0**-52
 

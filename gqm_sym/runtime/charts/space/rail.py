@@ -32,9 +32,9 @@ POWERS = 6
 # The numbers that define each piece: the length of a transition, followed by the coefficients of its rates.
 PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
 
-# On a part of a piece the frame turns by less than a half even where distances are RADIUS times as long: terms of its
-# series fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
-RADIUS, MAX_GROWTH, TERMS = 4.0, 0.5, 36
+# The frame turns by less than MAX_TURN over RADIUS times the length of a part, also where distances are complex: terms
+# of its series on the part fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
+RADIUS, MAX_TURN, TERMS = 4.0, 2.0, 36
 
 # The number of parts of a piece is multiplied by one of these, the first for which the last coefficients of its roll
 # angle are below MAX_TAIL.
@@ -250,19 +250,14 @@ def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tup
     turned = float((sizes * length ** (orders + 1)).sum())
     if not turned <= MAX_TOTAL_TURN:
         raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
-    # Bounds of the rates' Taylor coefficients anywhere on the piece.
-    most = np.array([sum(comb(i, j) * sizes[i] * length ** (i - j) for i in range(j, POWERS)) for j in range(POWERS)])
-    count = 1
-    while (most * (length / count) ** (orders + 1) * RADIUS**orders).sum() > MAX_GROWTH:
+    count, scaled = 1, _on_parts(length, rates, 1)
+    while (np.sqrt((scaled**2).sum(axis=1)) @ (RADIUS ** (orders + 1) / (orders + 1))).max() > MAX_TURN:
         count = ceil(1.25 * count)
-    count *= finer
+        scaled = _on_parts(length, rates, count)
+    if finer > 1:
+        count *= finer
+        scaled = _on_parts(length, rates, count)
     step = np.longdouble(length) / count
-    left = step * np.arange(count)
-    scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
-    for j in range(POWERS):
-        for i in range(j, POWERS):
-            scaled[:, :, j] += comb(i, j) * rates[:, i] * (left ** (i - j))[:, None]
-        scaled[:, :, j] *= step ** (j + 1)
     yaw, pitch, roll = np.moveaxis(scaled, 1, 0)
     turn = np.zeros((POWERS, count, 3, 3), dtype=np.longdouble)
     for (row, column), rate in {(0, 1): yaw, (0, 2): pitch, (2, 1): roll}.items():
@@ -293,6 +288,18 @@ def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tup
     across, along = -frames[1:, 0, 1], frames[1:, 0, 0]
     left, upright = (frames[1:, row, 0] * across + frames[1:, row, 1] * along for row in (1, 2))
     return pieces, Pen(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
+
+
+def _on_parts(length: float, rates: Long, count: int) -> Long:
+    """Return the rates on equal parts of a piece: for each part their coefficients in powers of its share passed."""
+    step = np.longdouble(length) / count
+    left = step * np.arange(count)
+    scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
+    for j in range(POWERS):
+        for i in range(j, POWERS):
+            scaled[:, :, j] += comb(i, j) * rates[:, i] * (left ** (i - j))[:, None]
+        scaled[:, :, j] *= step ** (j + 1)
+    return scaled
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))

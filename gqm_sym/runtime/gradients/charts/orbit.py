@@ -32,9 +32,10 @@ from gqm_sym.runtime.gradients.charts.programs import (
     speed_program,
 )
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
-from gqm_sym.runtime.gradients.evaluation import fill_values
+from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows, SeriesOf, pairs, values
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
+from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
@@ -257,8 +258,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return self._panels[2][first : first + count]
 
     @property
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """As `OrbitDerivatives.series`."""
         edges, samples, _ = self._panels
         n = self.source.variables
         arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
@@ -268,7 +269,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             left, rule = edges[:-1, None], panel_rule()
             arcs *= 0.5 * self.width * np.sin(left + np.diff(edges)[:, None] * rule[0])
             edges = edges / (2.0 * np.pi)
-        return PanelSeries(edges, samples[: 1 + n]), PanelSeries(edges, arcs), np.zeros((n, 1))
+        return PanelSeries(edges, np.concatenate([samples[: 1 + n], arcs])), np.zeros(n)
 
     @property
     def width(self) -> float:
@@ -281,8 +282,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` at arc lengths, with derivatives at the points of the curve."""
         path = self._shape.path(self._shape.places(lam))
-        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:])[:, 0]
-        return PathRows(*found.reshape(6, self.source.parameters + 2, lam.size))
+        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:], parts=1)
+        return PathRows(found.reshape(6, self.source.parameters + 2, lam.size))
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
         """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
@@ -293,7 +294,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         places = self._shape.places(lam)
         rows = self._values(speed_program(self.source), self._inputs, np.zeros((2, lam.size)), places)[:, 0]
         if not of_speed:
-            mass_curvature, load = self.at_places(lam)[3:5]
+            path = self.at_places(lam)
+            mass_curvature, load = path.curvature, path.load
             by_variables = np.zeros((LAUNCH_VARIABLES, lam.size))
             force = [2.0 * rows[0] * mass_curvature[0] + load[0]]
             force.append(2.0 * (rows[1] * mass_curvature[0] + rows[0] * mass_curvature[-1]) + load[-1])

@@ -13,8 +13,9 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
+from gqm_sym.runtime.legs.variations.chain import DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes
-from gqm_sym.runtime.legs.variations.law import LawRows, States
+from gqm_sym.runtime.legs.variations.law import LawRows
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
@@ -22,8 +23,8 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints
 # motion.
 MAX_STEP, NEWTON_STEPS = 1e-5, 3
 
-# The number of points that are evaluated together.
-BLOCK = 4096
+# The number of points that are evaluated together; for more of them the system would provide memory anew each time.
+BLOCK = 2048
 
 # An extreme this near to the end of a motion, as a share of its time, counts as the end. An extreme this near to a jump
 # of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
@@ -68,16 +69,11 @@ class StateChanges:
         As in `gradients.sensitivity.Sensitivity`, except that places are the labels of points, within the lap.
     labels, arc : array
         The changes of the labels of the places, and ``arc`` as in `changes.Origin`.
-    acceleration : array
-        The derivative of the velocity by time.
-    states : States
-        The states of the last points that were evaluated.
+    states : array
+        The points (`law.states_of`).
     law : LawRows
         The law there.
     """
-
-    law: LawRows
-    states: States
 
     def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
         half, w = _marched(changes, points)
@@ -85,32 +81,20 @@ class StateChanges:
             self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
             for start in range(0, max(v.size, 1), BLOCK)
         ]
-        found = np.concatenate(parts, axis=-1)
-        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found[:8]
-        self.acceleration, self.labels = found[8, 0], found[0]
+        found, self.states, law = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found
+        self.labels, self.law = self.lam, LawRows(law)
 
-    def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
-        """Return the attributes for some of the points: a row for each, with equal rows for the acceleration."""
-        along = changes.along(half, w)
-        self.states = States(*along.places, v**2, along.heading, along.contact_sign)
-        self.law = law = changes.law.rows(self.states)
-        path = changes.law.path(*along.places)
-        lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
-        faster = 0.5 * v * along.y - acceleration * along.delay
-
-        def changed(rows: Array) -> Array:
-            found: Array = changes.by_all(rows[1:-1]) + rows[-1] * lam
-            return found
-
-        x, z, force = changed(path.x), changed(path.z), path.force_changes(v, faster, changed)
-        y = np.zeros_like(lam) if path.y is None else changed(path.y)
-        accelerations = np.broadcast_to(acceleration, lam.shape)
-        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, y, along.arc, accelerations])
+    def _part(self, changes: Changes, half: NDArray[np.int64], w: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Return for some of the points the rows of all attributes, the states, and the law."""
+        along = changes.along(half, w, v)
+        law = changes.law.matrix(along.states)
+        return changes.states(along, law, v), along.states, law
 
 
-def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
+def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.int64], Array]:
     """Return the halves of legs on which points lie, and their march variables."""
-    half, w = np.empty(points.laps.size, dtype=np.intp), np.empty(points.laps.size)
+    half, w = np.empty(points.laps.size, dtype=np.int64), np.empty(points.laps.size)
     for timed, here, phi in points.segments:
         last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
         half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
@@ -123,9 +107,10 @@ def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
         found: Array = states_at(motion, changes, t, low).lam
         return found
     points, f = motion._phase_points(t, low), motion.problem.functions
-    (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
-    ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
-    places: Array = moved - v / ds * delay + points.laps * changes.lap[:, None]
+    v = motion._velocities(points)
+    along = changes.along(*_marched(changes, points), v, whole=False)
+    ds = path_and_force_at(f.addresses, f.p, along.states[0], v**2)[2]
+    places: Array = along.changes[SIGMA] - v / ds * along.changes[DELAY] + points.laps * changes.lap[:, None]
     return places
 
 
@@ -190,12 +175,12 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
-    law, v = changes.law.rows(at_end), run.record[HEADING]
+    law, v = LawRows(changes.law.matrix(at_end)), run.record[HEADING]
     if what == "liftoff":
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
         path = changes.law.path(*place)
         curvature, load = path.curvature[:, 0], path.load[:, 0]
-        faster = origin.y - law.slope[0] * origin.sigma
+        faster = origin.y - law.force[0, 0] * origin.sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
         moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
     else:
@@ -224,7 +209,7 @@ def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: 
     turns : sequence of Leg
         The legs that end with a turn, or with rest.
     period : float
-        The period of the curve's parameter, or 0.
+        That of the curve's parameter, or 0.
     """
     places = np.array([leg.lam_end for leg in turns])
     forwards, backwards = balance_at(static_balance, p, np.mod(places, period) if period else places)
@@ -274,7 +259,7 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
     if moved is None:
         moved = -at.labels * at.law.ds / v
     if of_speed:
-        faster: Array = np.sign(v) * (at.v + at.acceleration * moved)
+        faster: Array = np.sign(v) * (at.v + 0.5 * at.law.force[0] / at.law.ds * moved)
         return faster
     law = changes.law
     rate = law.parameters[0, law.mass] * law.loads(at.states)[0] * v / at.law.ds
@@ -285,14 +270,14 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
     """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 
-    The time is not changed if it is not stationary.
+    The time is left where it is not.
     """
     t = found.t
     for _ in range(NEWTON_STEPS):
         at = states_at(motion, changes, np.array([t]), np.zeros(1))
         law = at.law
-        slope, by_place, by_w = (law.slope, law.by_place, law.by_w) if of_speed else changes.law.loads(at.states)
-        bend, v = by_place[0] + by_w[0] * law.slope[0], motion.state(t).v
+        slope, by_place, by_w = law.force if of_speed else changes.law.loads(at.states)
+        bend, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
         step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
             return float(found.t), False

@@ -10,11 +10,12 @@ import numpy as np
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
-from gqm_sym.runtime.gradients.orbit import PathRows, without_formulas
+from gqm_sym.runtime.gradients.orbit import without_formulas
+from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.interface import ExactChartLaw
 from gqm_sym.runtime.launch.formulas import true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.variations.law import FormulaLaw, Law, LawRows, States
+from gqm_sym.runtime.legs.variations.law import FormulaLaw, Law
 from gqm_sym.runtime.legs.variations.programs import (
     ORDERS,
     ChartForces,
@@ -58,9 +59,9 @@ class ChartLaw(Law):
         """See `Law`. The ends of the curve keep their labels."""
         return np.zeros((3, self.count))
 
-    def coordinates(self, states: States) -> Array:
+    def coordinates(self, states: Array) -> Array:
         """See `Law`."""
-        return self._coordinates(states.high, states.low)
+        return self._coordinates(*states[:2])
 
     def _coordinates(self, high: Array, low: Array) -> Array:
         """Return the coordinates of places, as two doubles each."""
@@ -71,25 +72,24 @@ class ChartLaw(Law):
         found = np.concatenate(parts, axis=1)
         return np.stack([found, np.zeros_like(found)], axis=1).reshape(-1, high.size)
 
-    def rows(self, states: States) -> LawRows:
+    def matrix(self, states: Array) -> Array:
         """See `Law`."""
-        found = self.values(chart_law_program(self._forces), states)[:, 0]
-        stretches, slope = found[: self.count], found[self.count :]
-        return LawRows(
-            np.ones_like(states.w), np.zeros_like(states.w), stretches, slope[0], slope[1], slope[2], slope[3:]
-        )
+        n, found = self.count, self.values(chart_law_program(self._forces), states, parts=1)[:, 0]
+        # Places are arc lengths along the curve for the given parameters.
+        ds: Array = np.vstack([np.ones_like(found[0]), np.zeros_like(found[0])])
+        return np.vstack([ds, found[:n], found[n:]])
 
-    def loads(self, states: States) -> Array:
+    def loads(self, states: Array) -> Array:
         """See `Law`."""
-        found: Array = self.values(chart_load_program(self._forces), states)[:, 0]
+        found: Array = self.values(chart_load_program(self._forces), states, parts=1)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
         """See `Law`."""
         program, places = chart_path_program(self._forces), self._coordinates(high, low)
-        found = np.empty((program.outputs.size, 3, high.size))
+        found = np.empty((program.outputs.size, 1, high.size))
         fill_values(program.operands, program.work, self.parameters, places, found)
-        return PathRows(*found[:, 0].reshape(5, self.count + 2, high.size))
+        return PathRows(found.reshape(6, self.count + 2, high.size))
 
 
 def law_of(problem: Problem) -> Law:

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
-from gqm_sym.runtime.gradients.evaluation import fill_values
-from gqm_sym.runtime.gradients.orbit import PathRows, pairs, path_rows, values, without_formulas
+from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
+from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
+from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
@@ -31,56 +32,36 @@ MAX_FORCE_ERROR = 1e-11
 
 
 class LawRows(NamedTuple):
-    """The law of motion at places: a column for each.
+    """The law of motion in states, with its derivatives: a column for each.
 
     Attributes
     ----------
-    ds, ds_by_place : (n,) arrays
-        ds/dlam and its derivative by the place.
-    ds_by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
-    slope, by_place, by_w : (n,) arrays
-        F = dW/dlam and its derivatives by the place and by W.
-    by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
+    matrix : (2 * k + 5, n) array
+        ds/dlam, its derivative by the place and those by the k run-time parameters, then F = dW/dlam and its
+        derivatives by the place, by W and by the parameters.
     """
 
-    ds: Array
-    ds_by_place: Array
-    ds_by_parameters: Array
-    slope: Array
-    by_place: Array
-    by_w: Array
-    by_parameters: Array
+    matrix: Array
 
-    def part(self, first: int, last: int | None) -> "LawRows":
-        """Return the law at some of the places."""
-        return LawRows(*(row[..., first:last] for row in self))
+    @property
+    def ds(self) -> Array:
+        """ds/dlam."""
+        ds: Array = self.matrix[0]
+        return ds
+
+    @property
+    def force(self) -> Array:
+        """F and its derivatives by the place and by W: a row for each."""
+        first = (len(self.matrix) - 1) // 2
+        force: Array = self.matrix[first : first + 3]
+        return force
 
 
-class States(NamedTuple):
-    """The states for which the law is evaluated: a number for each.
-
-    Attributes
-    ----------
-    high, low : (n,) arrays
-        The places as two doubles each.
-    w : (n,) array
-        V**2 there.
-    heading, contact_sign : (n,) arrays
-        The signs of dlam/dt and of N.
+def states_of(high: Array, low: Array, w: Array, heading: Array, contact_sign: Array) -> Array:
+    """Return the states for which the law is evaluated, from places of two doubles each, V**2, and the signs of dlam/dt
+    and of N.
     """
-
-    high: Array
-    low: Array
-    w: Array
-    heading: Array
-    contact_sign: Array
-
-
-def one_state(place: Pair, w: float, heading: float, contact_sign: float) -> States:
-    """Return one state, at a place of two doubles."""
-    return States(*(np.array([number]) for number in (*place, w, heading, contact_sign)))
+    return np.array([high, low, w, heading, contact_sign])
 
 
 class Law(ABC):
@@ -124,11 +105,11 @@ class Law(ABC):
         """The derivatives of both ends of the range of labels and of their period: a row for each, by parameters."""
 
     @abstractmethod
-    def rows(self, states: States) -> LawRows:
-        """Return the law in states."""
+    def matrix(self, states: Array) -> Array:
+        """Return the law in states, as `LawRows.matrix`."""
 
     @abstractmethod
-    def loads(self, states: States) -> Array:
+    def loads(self, states: Array) -> Array:
         """Return the slope of the contact force per mass along the motion, and its derivatives by the place and by
         W.
         """
@@ -138,24 +119,18 @@ class Law(ABC):
         """Return the path at places of two doubles each, with derivatives at points with fixed labels."""
 
     @abstractmethod
-    def coordinates(self, states: States) -> Array:
+    def coordinates(self, states: Array) -> Array:
         """Return the coordinates that programs take, as two doubles each except for the last one, which is V**2."""
 
-    def values(self, program: Program, states: States, errors: Array | None = None) -> Array:
-        """Return the results of a program in states (`orbit.values`), for parameters with bounds on their errors."""
-        signs, found = 2.0 * states.heading + states.contact_sign, np.empty((program.outputs.size, 3, states.w.size))
-        w = np.maximum(states.w, LEAST_V2)  # laws may contain its square root
-        places = np.vstack([self.coordinates(states), [w, np.zeros_like(w)]])
-        for heading in (-1.0, 1.0):
-            for contact_sign in (-1.0, 1.0):
-                here = np.flatnonzero(signs == 2.0 * heading + contact_sign)
-                if here.size:
-                    inputs = np.hstack([self.parameters, [[heading, contact_sign], [0.0, 0.0], [0.0, 0.0]]])
-                    if errors is not None:
-                        inputs[2, : self.count] = errors
-                    some = np.empty((program.outputs.size, 3, here.size))
-                    fill_values(program.operands, program.work, inputs, np.ascontiguousarray(places[:, here]), some)
-                    found[:, :, here] = some
+    def values(self, program: Program, states: Array, errors: Array | None = None, *, parts: int = 3) -> Array:
+        """Return the results of a program in states (`evaluation.values`), given bounds on the errors of parameters."""
+        found = np.empty((program.outputs.size, parts, states.shape[1]))
+        w = np.maximum(states[2], LEAST_V2)  # laws may contain its square root
+        places = np.vstack([self.coordinates(states), w, np.zeros_like(w)])
+        inputs = np.hstack([self.parameters, np.zeros((3, 2))])
+        if errors is not None:
+            inputs[2, : self.count] = errors
+        fill_signed_values(program.operands, program.work, inputs, places, states, found)
         return found
 
 
@@ -185,20 +160,18 @@ class FormulaLaw(Law):
         found = values(range_program(self._domain, self.count), self.parameters, np.zeros(1))[:, 0, 0]
         return found.reshape(3, -1)[:, 1:]
 
-    def coordinates(self, states: States) -> Array:
+    def coordinates(self, states: Array) -> Array:
         """See `Law`."""
-        return np.array([states.high, states.low])
+        return states[:2]
 
-    def rows(self, states: States) -> LawRows:
+    def matrix(self, states: Array) -> Array:
         """See `Law`."""
-        n = self.count
-        found = self.values(law_program(self._exact, n), states)[:, 0]
-        ds, slope = found[: n + 2], found[n + 2 :]
-        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:])
+        found: Array = self.values(law_program(self._exact, self.count), states, parts=1)[:, 0]
+        return found
 
-    def loads(self, states: States) -> Array:
+    def loads(self, states: Array) -> Array:
         """See `Law`."""
-        found: Array = self.values(load_program(self._exact, self.count), states)[:, 0]
+        found: Array = self.values(load_program(self._exact, self.count), states, parts=1)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
@@ -235,7 +208,7 @@ class FormulaLaw(Law):
 
         Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
         """
-        states = States(places, np.zeros_like(places), np.zeros_like(places), v, nu)
+        states = states_of(places, np.zeros_like(places), np.zeros_like(places), v, nu)
         lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
         force, slope = self.values(force_program(self._exact, self.count), states, lows)
         return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
@@ -246,7 +219,8 @@ class FormulaLaw(Law):
         Places are given as two doubles each.
         """
         ones = np.ones_like(high)
-        force, slope = self.values(force_program(self._exact, self.count), States(high, low, 0.0 * ones, ones, ones))
+        states = states_of(high, low, 0.0 * ones, ones, ones)
+        force, slope = self.values(force_program(self._exact, self.count), states)
         return force[0], slope[0]
 
     def cancels(self, place: float, heading: int) -> bool:

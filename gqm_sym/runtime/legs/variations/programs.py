@@ -58,7 +58,7 @@ def range_program(domain: Callable[..., Any], parameters: int) -> Program:
     """Return the program of both ends of the parameter's range and its period, each with its derivatives by the
     run-time parameters.
 
-    Values that do not exist are zero.
+    Those that do not exist are zero.
     """
     op = Recorder(parameters)
     numbers = [0 if number is None else number for number in domain(op, op.values)]
@@ -157,10 +157,10 @@ def chart_load_program(forces: ChartForces) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
-    """Return the program of states at a point, as `gradients.programs.path_program` does, but without a potential."""
+    """Return the program of states at a point, as `gradients.programs.path_program`."""
     at = _ChartPoint(forces)
     op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
-    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load):
+    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load, op.number(0)):
         if quantity is None:
             outputs += [op.number(1), *at.stretches, op.number(0)]
         else:
