@@ -24,7 +24,16 @@ from gqm_sym.runtime.legs.leg_record import (
     LAPS_BEFORE,
 )
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece, leg_record, tabulated
-from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
+from gqm_sym.runtime.legs.variations.answers import (
+    MarchPoints,
+    Switch,
+    gradient,
+    nearest_switch,
+    places_at,
+    points_by_record,
+    points_of,
+    states_at,
+)
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
@@ -290,9 +299,8 @@ class DissipativeMotion(FollowedMotion):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        self._trajectory(float(times.max(initial=0.0)))
-        found = states_at(self, self._changes, times, low)
+        points, shape = self._march_points(t)
+        found = states_at(self._changes, points)
         fields = (getattr(found, name) for name in Sensitivity._fields[1:])
         return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
 
@@ -300,10 +308,24 @@ class DissipativeMotion(FollowedMotion):
     def place_changes(self, t: Any, wrt: Any) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
+        points, shape = self._march_points(t)
+        found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        return found
+
+    def _march_points(self, t: Any) -> tuple[MarchPoints, tuple[int, ...]]:
+        """Return the points of the motion at times, and the shape of the times."""
+        one = plain_time(t)
+        given = _times_from_launch(t if one is None else [one])
+        if given is not None:
+            times, greatest = given
+            reading = (self._reading_at if times.size == 1 else self._reading_up_to)(greatest, errors=False)
+            if greatest <= reading.until:
+                shape = times.shape if one is None else ()
+                return points_by_record(reading.record, reading.pieces, times.reshape(-1)), shape
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))
-        found: Array = places_at(self, self._changes, times, low)[list(rows.values())].reshape(len(rows), *shape)
-        return found
+        found = self._phase_points(times, low)
+        return points_of(found, self._velocities(found)), shape
 
     @property
     @locked

@@ -63,7 +63,8 @@ class PeriodicMotion(PeriodicTimes):
         direction = self.direction if self.kind == "circulation" else 0
         if self.problem.formulas.chart is not None:
             return self._derivatives_along_chart(direction)
-        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+        segment = self._segment  # its panels, which are laid when edges are read, are needed near a separatrix only
+        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, lambda: segment.edges)
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
