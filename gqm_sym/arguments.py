@@ -10,6 +10,7 @@ from functools import wraps
 from itertools import islice
 from os import PathLike, fspath
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
 from gqm_sym.errors import ArgumentError, DeclarationError
@@ -46,15 +47,53 @@ def checked(called: str, also: Iterable[str] = ()) -> Callable[[Callable[P, R]],
 
         @wraps(function)
         def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-            try:
-                signature.bind(*args, **kwargs)
-            except TypeError:
-                raise ArgumentError(_reason(called, signature, tuple(also), args, kwargs)) from None
+            _check(called, signature, tuple(also), args, kwargs)
             return function(*args, **kwargs)
 
         return wrapper
 
     return decorate
+
+
+class ChecksArguments:
+    """A base of classes whose public methods refuse arguments that they do not have, with the remedy.
+
+    The arguments are checked only when Python has refused them, so that a call takes hardly longer.
+    """
+
+    # The name of an instance in messages, which subclasses set.
+    _called = ""
+
+    def __init_subclass__(cls) -> None:
+        """Wrap the public methods that a subclass defines."""
+        super().__init_subclass__()
+        for name, method in list(vars(cls).items()):
+            if isinstance(method, FunctionType) and not name.startswith("_"):
+                setattr(cls, name, _checked_when_refused(f"{cls._called}.{name}", method))
+
+
+def _checked_when_refused(called: str, method: Callable[P, R]) -> Callable[P, R]:
+    """Return a method that explains the TypeError of a call with wrong arguments."""
+
+    @wraps(method)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return method(*args, **kwargs)
+        except TypeError:
+            _check(called, inspect.signature(method), (), args, kwargs)
+            raise
+
+    return wrapper
+
+
+def _check(
+    called: str, signature: inspect.Signature, also: tuple[str, ...], args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> None:
+    """Refuse arguments that a function does not have."""
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError:
+        raise ArgumentError(_reason(called, signature, also, args, kwargs)) from None
 
 
 def _reason(

@@ -60,7 +60,7 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
     """
     from xarray import Dataset
 
-    times = np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
+    times = _times(motion, t)
     state = motion.state(times)
     if np.ndim(state.t) > 1:
         raise InputError(f"t: must be one time or a row of times, got an array of shape {np.shape(state.t)}")
@@ -85,6 +85,16 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
 
 def _attributes(long_name: str, units: str | None) -> dict[str, str]:
     return {"long_name": long_name, **({"units": units} if units else {})}
+
+
+def _times(motion: "Motion", t: Any) -> Any:
+    """Return the given times, or else those by which a motion is sampled."""
+    return np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
+
+
+def motion_frame(motion: "Motion", t: Any = None) -> Any:
+    """Sample a motion into a pandas table; `Motion.to_pandas` is the public way to it, with times as in `dataset`."""
+    return state_frame(motion.state(_times(motion, t)))
 
 
 @require("data")

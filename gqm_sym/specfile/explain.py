@@ -66,10 +66,13 @@ def explain(
         mistakes.add(mark, what, f"add {loc[-1]}: {_example(field)}")
     elif kind in ("union_tag_not_found", "union_tag_invalid"):
         place = place_of(tree, (*loc, "name"))
-        what = "name is missing"
+        what, near = "name is missing", None
         if kind == "union_tag_invalid":
-            what = f"unknown family {shown(str(detail['ctx']['tag']))}"
-        mistakes.add(place, f"{label}{what}", f"known are {', '.join(FAMILY_MODELS)}")
+            name = str(detail["ctx"]["tag"])
+            what, near = f"unknown family {shown(name)}", nearest(name, list(FAMILY_MODELS))
+        mistakes.add(
+            place, f"{label}{what}", f"did you mean {near}?" if near else f"known are {', '.join(FAMILY_MODELS)}"
+        )
     elif kind == "literal_error":
         what = f"{label}must be {detail['ctx']['expected']}"
         mistakes.add(value_mark, f"{what}, got {_given(node)}")

@@ -54,7 +54,7 @@ LAYERS = (
 # A motion is drawn and converted by what lies above it, as pandas and xarray do it: these imports alone go upwards.
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
-    ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_xarray
+    ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
     ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_, Motion.__str__
     ("declare/curve.py", "gqm_sym.building"),  # Curve.plot
     ("derivation/model.py", "gqm_sym.building"),  # Model.equilibria

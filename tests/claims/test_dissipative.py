@@ -258,6 +258,9 @@ def test_drag_on_straight_tracks(build: Build) -> None:
     assert motion.lam(t) == pytest.approx(10.0 * np.log1p(0.3 * t), rel=FEW)
     assert motion.state(t).v == pytest.approx(3.0 / (1.0 + 0.3 * t), rel=FEW)
     assert motion.time_at(20) == pytest.approx(math.expm1(2.0) / 0.3, rel=FEW)
+    # A run through many powers of ten of V**2 had a table that was no better than its whole width.
+    late = np.logspace(-1, 6, 8)
+    assert np.all(motion.error_bound(late) <= 1e-14 * (10.0 + motion.lam(late)))
     slope = build("slope_dragged", gqm.Curve.graph("-x/2", parameter="x"), gqm.QuadraticDrag(b="c"))
     motion = slope.solve(lam0=0, c="0.1")
     pull = G / math.sqrt(5.0)
@@ -351,6 +354,21 @@ def test_laws_of_the_user(law: str, build: Build) -> None:
     truth = solve_ivp(pull, (0.0, 4.0), [1.0, 0.0], method="DOP853", rtol=1e-13, atol=1e-13, t_eval=t, max_step=0.01).y
     assert np.abs(motion.lam(t) - truth[0]).max() <= 1e-12
     assert len(motion.turning_points) >= 4
+
+
+def test_a_viscous_law_on_the_level(build: Build) -> None:
+    """The body slows down for ever, and comes to v0/c from where it was launched; it was refused at any speed."""
+    law = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
+    module = build("level_viscous", gqm.Curve.graph("0*x", parameter="x"), law)
+    for lam0, v0, c in ((1.0, 0.5, 0.3), (-2.0, 1e-7, 1.9), (0.0, 3.0, 40.0)):
+        motion, t = module.solve(lam0, v0, c=c), np.array([0.01, 1.0, 10.0, 100.0, 1e5])
+        assert motion.t_end == math.inf
+        assert motion.legs[-1].end == "asymptote"
+        with mp.workdps(40):
+            true = [mpf(lam0) - mpf(v0) / mpf(c) * mp.expm1(-mpf(c) * mpf(one)) for one in t.tolist()]
+            off = [float(abs(mpf(place) - one)) for place, one in zip(motion.lam(t).tolist(), true, strict=True)]
+        assert np.all(off <= motion.error_bound(t))
+        assert np.all(motion.error_bound(t) <= 1e-12 * max(1.0, abs(lam0) + v0 / c))
 
 
 @pytest.mark.parametrize("loss", ["friction", "drag"])

@@ -280,11 +280,15 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         ],
     ),
     "an unknown family": (
-        edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
+        edited((GRAPH, "family: {name: spline, a: h, b: 1}")),
         [
-            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, circle, "
+            "a.yaml:3:12: curve.family: unknown family 'spline'; known are cartesian_graph, circle, "
             "ellipse, parabola, log_spiral, catenary, cycloid, helix, conical_helix, torus_knot, viviani, implicit"
         ],
+    ),
+    "a family that was probably meant": (
+        edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
+        ["a.yaml:3:12: curve.family: unknown family 'elipse'; did you mean ellipse?"],
     ),
     "a name that means two things": (
         edited((GRAPH, "family: {name: ellipse, a: h, b: h}")),
