@@ -1,5 +1,6 @@
 """A periodic orbit along a curve with formulas, with its derivatives: means over equal steps of the phase angle."""
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -79,14 +80,19 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         0 for a libration, else the sign of ds/dt.
     offsets : (float, float)
         The distances of both turning points from the launch, for a libration.
-    edges : array
-        Phase angles between which the speed changes smoothly, from the first to the last.
+    edges : callable
+        It returns the phase angles between which the speed changes smoothly, from the first to the last.
     """
 
     source: Source
 
     def __init__(
-        self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float], edges: Array
+        self,
+        problem: Problem,
+        orbit: Orbit | None,
+        direction: int,
+        offsets: tuple[float, float],
+        edges: Callable[[], Array],
     ) -> None:
         self.direction, self._edges = direction, edges
         self.source = source_of(problem.formulas)
@@ -163,7 +169,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         n = fill_means(program.operands, program.work, inputs, nodes, found)
         if n == NOT_SMOOTH:
             kind = CIRCULATION if self.direction else LIBRATION
-            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges, panel_rule(), found)
+            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found)
             if n > 0:
                 return found, 0, True
             raise SolutionError(UNDECIDED)

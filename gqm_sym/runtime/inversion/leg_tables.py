@@ -85,6 +85,18 @@ def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
     return choose(share <= 0.5, from_a, to_b)
 
 
+@Inlined
+def speed_at(states, panels, of, phi):  # type: ignore[no-untyped-def]
+    """Return the index of the panel of a phase angle, the place on it from -1 to 1, and the speed there.
+
+    ``of`` is the index at which the state of its interval begins.
+    """
+    panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
+    x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
+    speed = legendre_sum(panels[panel + SERIES + WIDE : panel + SERIES + 2 * WIDE], x)
+    return panel, x, speed * fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+
+
 @Inner
 def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the curve parameter at times, from the index ``begin`` to ``end``."""
@@ -119,12 +131,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             time, j = t[start + i], start + i
             launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
             phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
-            panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
-            x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
-            series = panel + SERIES
-            arc = panels[panel + ARC] + legendre_sum(panels[series : series + WIDE], x)
-            speed = legendre_sum(panels[series + WIDE : series + 2 * WIDE], x)
-            speed *= fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+            panel, x, speed = speed_at(states, panels, of, phi)
+            arc = panels[panel + ARC] + legendre_sum(panels[panel + SERIES : panel + SERIES + WIDE], x)
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
             lam = choose(launched, place, place + item_at(intervals, at + LAPS))
@@ -150,3 +158,39 @@ def places_along_legs(record, t, out, begin, end):  # type: ignore[no-untyped-de
 def states_along_legs(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Call `find_states` from Python."""
     find_states(record, p, t, out, begin, end)
+
+
+@entry(types.float64(VECTOR, types.float64))
+def place_on_leg(record, t):  # type: ignore[no-untyped-def]
+    """Return the curve parameter at one time."""
+    pair = np.empty(2)
+    pair[0] = t
+    find_places(record, pair[:1], pair[1:], 0, 1)
+    return pair[1]
+
+
+@entry(types.UniTuple(types.float64, 10)(VECTOR, VECTOR, types.float64))
+def state_on_leg(record, p, t):  # type: ignore[no-untyped-def]
+    """Return the time, and the nine numbers of `find_states` at it."""
+    when, out = np.empty(1), np.empty((9, 1))
+    when[0] = t
+    find_states(record, p, when, out, 0, 1)
+    r = out.reshape(-1)
+    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
+
+
+@entry(types.void(VECTOR, VECTOR, MATRIX))
+def phases_along_legs(record, t, out):  # type: ignore[no-untyped-def]
+    """Fill rows for times: the number of the interval, the phase angle, and the velocity."""
+    intervals, slots, launch = (
+        section(record, INTERVALS),
+        section(record, SLOTS).view(np.int64),
+        section(record, LAUNCH),
+    )
+    states, panels, rate = section(record, STATES), section(record, PANELS), (slots.size - 1) / launch[3]
+    for i in range(t.size):
+        at = interval_at(intervals, slots, rate, t[i])
+        number, phi = at // INTERVAL_COLUMNS, phase_angle_at(intervals, at, t[i])
+        of = number * STATE_COLUMNS
+        v = states[of + HEADING] * speed_at(states, panels, of, phi)[2]
+        out[0, i], out[1, i], out[2, i] = number, phi, choose(t[i] == 0.0, launch[1], v)

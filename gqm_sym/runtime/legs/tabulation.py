@@ -31,6 +31,10 @@ class TabulatedPiece(NamedTuple):
         INTERVALS, STATES and PANELS; panels are counted from the first one of the piece.
     edges : array
         The phase angles at the edges of its panels.
+    leg, sense, laps : int
+        As in `TimedSegment`.
+    last : float
+        The march variable at the last phase angle, which is 1.
     has_all_errors : bool
         Whether the errors in STATES are those of times and places from launch, or of this piece alone.
     """
@@ -39,6 +43,10 @@ class TabulatedPiece(NamedTuple):
     states: Array
     panels: Array
     edges: Array
+    leg: int
+    sense: int
+    laps: int
+    last: float
     has_all_errors: bool = False
 
     def with_errors(self, of_place: float, of_times: Array) -> "TabulatedPiece":
@@ -165,7 +173,7 @@ def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
     )
     marks = np.array([edges, *segment.edge_times, lengths])
     intervals, states, panels = tabulate_piece(marks, time_terms, length_terms, speed_terms, timing)
-    return TabulatedPiece(intervals, states, panels, edges)
+    return TabulatedPiece(intervals, states, panels, edges, timed.leg, timed.sense, timed.laps, last)
 
 
 def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:

@@ -10,9 +10,11 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
+from gqm_sym.runtime.legs.tabulation import TabulatedPiece
 from gqm_sym.runtime.legs.variations.chain import DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.law import LawRows
@@ -51,6 +53,59 @@ class Switch(NamedTuple):
     margin: float
 
 
+class MarchPoints(NamedTuple):
+    """Some points of a motion with losses: a number for each.
+
+    Attributes
+    ----------
+    half : array of int
+        The halves of runs (`equation`) on which the points lie.
+    w : array
+        The march variables.
+    v : array
+        The velocities.
+    laps : array
+        The laps of a closed curve before them.
+    """
+
+    half: NDArray[np.int64]
+    w: Array
+    v: Array
+    laps: Array
+
+    def part(self, block: slice) -> "MarchPoints":
+        """Return some of the points."""
+        return MarchPoints(self.half[block], self.w[block], self.v[block], self.laps[block])
+
+
+def points_by_record(record: Array, pieces: Sequence[TabulatedPiece], t: Array) -> MarchPoints:
+    """Return the points of a motion at times, from the record of some of its pieces."""
+    number, phi, v = rows = np.empty((3, t.size))
+    phases_along_legs(record, t, rows)
+    of_pieces = np.array([(2 * piece.leg + (piece.sense < 0), piece.last, piece.laps) for piece in pieces])
+    counts = [len(piece.intervals) for piece in pieces]
+    half, last, laps = np.repeat(of_pieces, counts, axis=0)[number.astype(np.intp)].T
+    return MarchPoints(half.astype(np.int64), phi * last, v, laps)
+
+
+def points_of(found: PhasePoints, v: Array) -> MarchPoints:
+    """Return the points of a motion, given the velocities.
+
+    Raises
+    ------
+    SolutionError
+        If one of them lies where the motion tends to an equilibrium.
+    """
+    half, w = np.empty(v.size, dtype=np.int64), np.empty(v.size)
+    for timed, here, phi in found.segments:
+        if timed.segment.speed_series is None:
+            raise SolutionError(
+                "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
+            )
+        half[here], w[here] = 2 * timed.leg + (timed.sense < 0), phi * timed.segment.speed_series[0]
+    return MarchPoints(half, w, v, found.laps)
+
+
 class StateChanges:
     """The changes of the states at points of a motion with losses, at fixed times: a row for each variable.
 
@@ -58,10 +113,8 @@ class StateChanges:
     ----------
     changes : Changes
         The changes of its legs.
-    points : PhasePoints
+    points : MarchPoints
         The points of the motion at the times.
-    v : array
-        The velocities there.
 
     Attributes
     ----------
@@ -75,49 +128,35 @@ class StateChanges:
         The law there.
     """
 
-    def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
-        half, w = _marched(changes, points)
-        parts = [
-            self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
-            for start in range(0, max(v.size, 1), BLOCK)
-        ]
+    def __init__(self, changes: Changes, points: MarchPoints) -> None:
+        starts = range(0, max(points.v.size, 1), BLOCK)
+        parts = [self._part(changes, points.part(slice(start, start + BLOCK))) for start in starts]
         found, self.states, law = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
         self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found
         self.labels, self.law = self.lam, LawRows(law)
 
-    def _part(self, changes: Changes, half: NDArray[np.int64], w: Array, v: Array) -> tuple[Array, Array, Array]:
+    def _part(self, changes: Changes, points: MarchPoints) -> tuple[Array, Array, Array]:
         """Return for some of the points the rows of all attributes, the states, and the law."""
-        along = changes.along(half, w, v)
+        along = changes.along(points.half, points.w, points.v)
         law = changes.law.matrix(along.states)
-        return changes.states(along, law, v), along.states, law
+        return changes.states(along, law, points.v), along.states, law
 
 
-def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.int64], Array]:
-    """Return the halves of legs on which points lie, and their march variables."""
-    half, w = np.empty(points.laps.size, dtype=np.int64), np.empty(points.laps.size)
-    for timed, here, phi in points.segments:
-        last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
-        half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
-    return half, w
-
-
-def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
-    """Return the changes of the places of a motion at times of two doubles each."""
+def places_at(motion: Any, changes: Changes, points: MarchPoints) -> Array:
+    """Return the changes of the places of a motion at points."""
     if changes.law.by_arc_length:  # the change of the arc length is needed too
-        found: Array = states_at(motion, changes, t, low).lam
+        found: Array = states_at(changes, points).lam
         return found
-    points, f = motion._phase_points(t, low), motion.problem.functions
-    v = motion._velocities(points)
-    along = changes.along(*_marched(changes, points), v, whole=False)
+    v, f = points.v, motion.problem.functions
+    along = changes.along(points.half, points.w, v, whole=False)
     ds = path_and_force_at(f.addresses, f.p, along.states[0], v**2)[2]
     places: Array = along.changes[SIGMA] - v / ds * along.changes[DELAY] + points.laps * changes.lap[:, None]
     return places
 
 
-def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
-    """Return the changes of the states of a motion at times of two doubles each."""
-    points = motion._phase_points(t, low)
-    found = StateChanges(changes, points, motion._velocities(points))
+def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
+    """Return the changes of the states of a motion at points."""
+    found = StateChanges(changes, points)
     found.lam = changes.told(found.lam, found.arc, points.laps)
     if changes.law.by_arc_length:
         found.s = found.lam
@@ -255,7 +294,7 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
     """Return the changes of the speed or the contact force at times that change by ``moved``; without it, the places
     stay fixed.
     """
-    at, v = states_at(motion, changes, t, np.zeros_like(t)), motion.state(t).v
+    at, v = states_at(changes, motion._march_points(t)[0]), motion.state(t).v
     if moved is None:
         moved = -at.labels * at.law.ds / v
     if of_speed:
@@ -274,7 +313,7 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tupl
     """
     t = found.t
     for _ in range(NEWTON_STEPS):
-        at = states_at(motion, changes, np.array([t]), np.zeros(1))
+        at = states_at(changes, motion._march_points(np.array([t]))[0])
         law = at.law
         slope, by_place, by_w = law.force if of_speed else changes.law.loads(at.states)
         bend, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, RIGHT, START
@@ -166,20 +165,6 @@ class Changes:
         changed = sigma + arc
         changed[self.law.count] += 1.0  # the change of the launch place itself, from the start point
         return changed
-
-    def half(self, leg: int, is_back: bool) -> int:
-        """Return the number of a half of the run with a given number.
-
-        Raises
-        ------
-        SolutionError
-            If the run tends to an equilibrium.
-        """
-        if leg >= len(self.runs):
-            raise SolutionError(
-                "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
-            )
-        return 2 * leg + is_back
 
     @cached_property
     def _series(self) -> Array:
