@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 11, input a74aedd594f9, body 60bafe5bd6bc
+# interface 11, input a74aedd594f9, body 9bfd8c27c982
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -149,11 +149,11 @@ def exact_effective_potential_slope(op, theta, p):
     return L*(-L*Omega**2*op.cos(theta) + g)*op.sin(theta)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, op.pi
 
 
@@ -314,7 +314,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
     for i in range(n):
         a, b = lows[i], highs[i]
@@ -348,7 +348,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]

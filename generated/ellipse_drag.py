@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 11, input f2717a5ad91f, body a11d4bb88295
+# interface 11, input f2717a5ad91f, body 1bf7e415ed3f
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -154,7 +154,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*_t1*(-_t0*b*g/_t1 - b_air*v*w/m)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

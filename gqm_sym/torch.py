@@ -40,7 +40,7 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Notes
     -----
     The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
-    derivatives by PyTorch are not there.
+    derivatives by PyTorch are not available.
     """
     return _for_torch(module, "half_period")
 
@@ -66,7 +66,9 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
     import torch
 
     class Swept(torch.autograd.Function):  # type: ignore[misc, unused-ignore]
-        """A sweep as one step of PyTorch: the values, or with names ``wrt`` the derivatives by them, an axis more."""
+        """A sweep as one step of PyTorch: the values or, with names ``wrt``, the derivatives by these, with one more
+        axis.
+        """
 
         @staticmethod
         def forward(names: tuple[str, ...], wrt: tuple[str, ...], *given: Any) -> Any:

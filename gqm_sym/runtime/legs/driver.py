@@ -36,6 +36,7 @@ from gqm_sym.runtime.legs.body import (
     HORIZON,
     LAM0,
     LAPS,
+    LEAST_SIZE,
     LOW,
     MAY_REST,
     PANEL_COUNT,
@@ -71,6 +72,9 @@ FEW_PANELS, LEGS_PER_CALL = 12, 8
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
+
+# The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
+PIECE_SHARE = 2.0**-6
 
 # If a body creeps towards an equilibrium and no panel is narrow enough any more, its distance from the equilibrium is
 # at most this share of its place, or of the length of the leg.
@@ -139,6 +143,8 @@ def _conditions(problem: Problem) -> Conditions:
         passes = track.is_kept(f.dissipation)
         given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
         lines = launched((given,), LEGS_PER_CALL if passes else 0)
+        if f.chart.size:
+            lines[0, LEAST_SIZE] = PIECE_SHARE * float(f.chart[3] - f.chart[2]) / float(f.chart[1])
         space = FEW_PANELS + (0 if passes else track.breaks.size)
         known = p.conditions[contact] = Conditions(f.dissipation, track, f.p[None], passes, space, lines)
     return known
@@ -182,6 +188,7 @@ class Driver:
     last_swing = 0.0
     force_error = 0.0
     launch_error: float | None = None
+    _last_record: Array = np.empty(0)
     _frame: Frame | None = None
 
     def __init__(self, problem: Problem, horizon: float) -> None:
@@ -217,6 +224,8 @@ class Driver:
     def go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         if self.at and self.at[PANEL_COUNT] >= MAX_STORED:
+            if self._force_cancels(self._last_record):
+                raise self._lost(self._last_record)
             raise BudgetError(
                 f"motion: {self.at[PANEL_COUNT]:.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
@@ -226,12 +235,13 @@ class Driver:
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
         self.at, count = at, int(at[VALUE]) or 1
+        self._last_record = records[count - 1]
         before = self.body[1 : 1 + count].copy() if self._passes and frame is None else [None] * count
         is_plain = what == TURN and frame is None and not at[STATUS]
         for k in range(count if is_plain else count - 1):
             self.runs.append(Run(records[k], TURN, END_NAMES[TURN], None, before[k]))
         if not is_plain:
-            self._end_run(what, records[count - 1], before[-1])
+            self._end_run(what, self._last_record, before[-1])
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
@@ -242,7 +252,9 @@ class Driver:
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))
             what = drive_along(self.track, self.dissipation, self._parameters, RUN_AGAIN, body, record)
-            if what in PASSED:
+            # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
+            left = abs(float(run.record[END] - record[0, END]))
+            if what in PASSED or (what == PAUSED and left <= ULP * self.problem.period):
                 return run.with_panels([*parts, record[0]], self._horizon)
             if what == FULL:
                 space *= 4
@@ -311,7 +323,7 @@ class Driver:
         elif what == ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame:
-            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * abs(end)
+            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
             creeps = what == PAUSED and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
             if turns_nearby or creeps:
                 self._enter_frame()
@@ -376,7 +388,7 @@ class Driver:
         place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
         reach = min(starting_step(problem), float(ends.min()))
-        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach, float(line[LEAST_SIZE]))
         if frame is None or not (frame.is_stable or lam0):
             return
         if isinstance(problem.formulas.exact, ExactLaw):

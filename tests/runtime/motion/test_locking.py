@@ -52,7 +52,7 @@ def eager_switches() -> Iterator[None]:
 
 
 def answers(motion: Any) -> list[Any]:
-    """What is asked of a motion: alone, in a column, and by place."""
+    """Return answers of a motion: for single times, for a column of times, and by place."""
     end = min(float(motion.t_end), 40.0)
     times = np.minimum(TIMES * (end / 40.0), end)
     state = motion.state(times)
