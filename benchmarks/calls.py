@@ -46,7 +46,6 @@ def conservative() -> list[tuple[str, float]]:
         ("`solve` of a pendulum, released from rest", least(lambda: pendulum.solve(-0.37))),
         ("- reading the parameters, from the cache", least(lambda: model.numbers(given))),
         ("- checking the launch", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
-        ("- binding the functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- compiled code: turning points, kind, half period",
             least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain, True)),
@@ -55,6 +54,7 @@ def conservative() -> list[tuple[str, float]]:
         ("`state` at one time", least(lambda: motion.state(1000.0))),
         ("`solve` and the first `lam`", least(lambda: first("lam"))),
         ("`solve` and the first `state`", least(lambda: first("state"))),
+        ("- binding the functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- panels of the time integral",
             least(
