@@ -12,6 +12,9 @@ export NUMBA_CACHE_DIR ?= $(CURDIR)/$(VENV)/machine_code
 # hundreds of processes, and each would compile thousands of files again.
 export PYTHONDONTWRITEBYTECODE :=
 
+# The tests of what SymPy refuses expect its own integers, also where gmpy2 is installed, which mpmath then uses.
+export SYMPY_GROUND_TYPES ?= python
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test lint types current site generate docs soak fuzz bench coverage mutate
 

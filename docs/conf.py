@@ -9,6 +9,10 @@ ROOT = Path(__file__).parent.parent
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 
 import made  # noqa: E402
+from docutils import nodes  # noqa: E402
+from docutils.utils.math import MathError  # noqa: E402
+from docutils.utils.math.latex2mathml import tex2mathml  # noqa: E402
+from sphinx.util.logging import getLogger  # noqa: E402
 
 import gqm_sym  # noqa: E402
 
@@ -32,6 +36,7 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
 html_theme = "furo"
+html_math_renderer = "mathml"
 html_title = "gqm_sym"
 html_copy_source = False
 
@@ -46,6 +51,11 @@ def _split_names(app: Any, what: str, name: str, obj: Any, options: Any, lines: 
     ]
 
 
+def _link_maths(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Let what docstrings cite as MATHS lead to its page."""
+    lines[:] = [line.replace("MATHS", ":doc:`MATHS </concepts/maths>`") for line in lines]
+
+
 def _link_notebooks(app: Any, page: str, source: list[str]) -> None:
     """Let links between pages and notebooks, which are files of the repository, lead to their pages on the site."""
     if page.startswith("made/"):
@@ -53,7 +63,19 @@ def _link_notebooks(app: Any, page: str, source: list[str]) -> None:
     source[0] = re.sub(r"\]\(\.\./((?:\.\./)*)notebooks/(\w+)\.ipynb\)", r"](\1made/\2.ipynb)", source[0])
 
 
+def _write_formula(writer: Any, node: nodes.Element) -> None:
+    """Write a formula as MathML, which browsers show without a script and without a network."""
+    is_block = isinstance(node, nodes.math_block)
+    try:
+        writer.body.append(tex2mathml(node.astext(), as_block=is_block))
+    except MathError as error:
+        getLogger(__name__).warning("the formula %r has no MathML: %s", node.astext(), error, location=node)
+    raise nodes.SkipNode
+
+
 def setup(app: Any) -> None:
     """Connect the functions above; the first one after napoleon, which writes the lines that it splits."""
+    app.add_html_math_renderer("mathml", (_write_formula, None), (_write_formula, None))
     app.connect("autodoc-process-docstring", _split_names, priority=600)
+    app.connect("autodoc-process-docstring", _link_maths)
     app.connect("source-read", _link_notebooks)

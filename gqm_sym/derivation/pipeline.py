@@ -1,6 +1,7 @@
 """The derivation of a model: from a declared curve and a force law to closed forms, stage by stage."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 
 import sympy as sp
@@ -37,7 +38,7 @@ from gqm_sym.derivation.model import Model, units_of
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.symmetric_orbits import symmetric_orbits
 from gqm_sym.derivation.wells.symmetry import symmetry
-from gqm_sym.errors import ArgumentError, DeclarationError
+from gqm_sym.errors import ArgumentError, DeclarationError, DerivationError
 from gqm_sym.kernels.base import DIRECTION, KAPPA, MASS, Kernel, X, Y, Z
 from gqm_sym.parameters import Given, check_measured, is_positive
 
@@ -45,7 +46,22 @@ LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
 
 
+@contextmanager
+def _within_doubles() -> Iterator[None]:
+    """Refuse a number that SymPy takes as a double and that is none.
+
+    SymPy does so where it computes with the integers of gmpy2, which it uses if that package is installed.
+    """
+    try:
+        yield
+    except OverflowError:
+        raise DerivationError(
+            "derive: a number is beyond the range of doubles, 10**308; declare the curve and the forces in other units"
+        ) from None
+
+
 @checked("derive")
+@_within_doubles()
 @budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
 def derive(
     curve: Curve,

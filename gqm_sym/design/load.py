@@ -1,4 +1,4 @@
-"""Tracks from the contact force that a body without friction feels on them (MATHS: extensions, 1.3 h)."""
+"""Tracks from the contact force that a body without friction feels on them."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple

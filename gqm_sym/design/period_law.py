@@ -1,4 +1,4 @@
-"""Tracks from their period as a function of height, by Abel's inversion (MATHS: extensions, 1.3 g).
+"""Tracks from their period as a function of height, by Abel's inversion.
 
 With w = sqrt(z), z the height above the bottom, the sum of the arc lengths of both sides is
 

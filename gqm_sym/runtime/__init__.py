@@ -1,4 +1,4 @@
-"""The numerical library that generated modules run on: motions and sweeps, and all that they are computed with.
+"""The numerical library that generated modules run on: it computes motions and sweeps.
 
 A generated module imports `compiler` from here, which refuses a module made for another version of the runtime, and
 everything else from `vocabulary`.

@@ -33,28 +33,29 @@ field                  n, x, z, p, out                F, F_x, F_z, F_xx, F_xz, F
 ====================== ============================== ===============================================================
 
 A conservative model has ``effective_potential``, ``potential_divdiff1``, ``potential_divdiff2`` and ``bounds``; a
-dissipative one has ``speed_equation`` and ``static_balance`` instead, and the first and the last of the former for its
-energy and its equilibria, compiled when these are first asked for. On a leg with the signs v = sgn(ds/dt) and
-nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P and Q are its
-linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The contact force is ``N = m*(kappa*W + n0)``.
+dissipative one has ``speed_equation`` and ``static_balance`` instead. For its energy and its equilibria it also has
+``effective_potential`` and ``bounds``, which are compiled when these are first asked for. On a leg with the signs v =
+sgn(ds/dt) and nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P
+and Q are its linearisation at the given ``v2``, where ``P - Q*v2`` is the law itself. The contact force is ``N =
+m*(kappa*W + n0)``.
 
-Only modules of space curves have ``path_in_space``. Where such a curve lies in no vertical plane, the contact force has
-a length and no sign: N is that length, kappa the length of the curvature vector, and n0 that of N/m at rest. With
-friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0; on a banked track whose riders
-have an upward direction they belong to the part of N along that. In a frame that turns it depends
-on the sign of ds/dt too: in ``path_and_contact_force`` and ``load_map`` it then is that of a motion forwards.
+Only modules of space curves have ``path_in_space``. If such a curve lies in no vertical plane, the contact force has a
+length and no sign: N is that length, kappa the length of the curvature vector, and n0 the value of N/m at rest. With
+friction the rows n0 and kappa of ``speed_equation`` are N/m at the given ``v2``, and 0; on a banked track whose riders
+have an upward direction, they belong to the component of N along that direction. In a rotating frame the contact force
+depends on the sign of ds/dt too: in ``path_and_contact_force`` and ``load_map`` it is then that of a forward motion.
 
 Only modules of tracks with a declared roll have ``rider_loads``.
 
-``separated_terms`` belongs to charted curves: U and n0 are sums of its parts times factors (`SeparatedTerms`), and it
-reads no other run-time parameters than those that it holds. Compiled when a sweep first asks for it.
+``separated_terms`` belongs to charted curves: U and n0 are sums of its parts times factors (`SeparatedTerms`). It reads
+only the run-time parameters listed there as ``held``, and is compiled when a sweep first asks for it.
 
-``load_map`` fills all that a load map shows, with V**2 = ``w0`` - 2*(U(lam) - ``level``). A module has it only where
-the size of the terms of U is known.
+``load_map`` fills all rows of a load map, with V**2 = ``w0`` - 2*(U(lam) - ``level``). A module has it only if the size
+of the terms of U is known.
 
-The functions of a batch serve sweeps. Their ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too: every place has a
-launch and run-time parameters of its own, and ``p`` has one row for each parameter. They are compiled when a sweep
-first asks for them.
+The functions of a batch serve sweeps. Their arguments ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too: every
+place belongs to a launch with run-time parameters of its own, and ``p`` has one row for each parameter. They are
+compiled when a sweep first asks for them.
 
 ========================== ======================== =================================================================
 function of a batch        arguments                rows of ``out``
@@ -75,12 +76,12 @@ turning_point_batch        n, offset, v2, p, out    half the orbit's width [[lam
                                                     turning point, above 1 where V**2 never vanishes
 ========================== ======================== =================================================================
 
-Orbits about an axis of symmetry may have ``time_integrand_batch``: their half period is an integral over the angle u,
-in which ``sine2`` = sin(u)**2 is the square of a coordinate as a share of its largest value, and ``cosine2`` =
-cos(u)**2. ``half`` is half of an orbit's width, and ``middle + rest`` the middle of both ends in two doubles. Where
-that integral is a complete elliptic one of the first kind, a module has ``agm_arguments_batch`` instead: pi over the
-half period is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side the turning
-point may have a closed form, ``turning_point_batch``, from the launch's offset from the axis and its V**2.
+``time_integrand_batch`` may exist for orbits about an axis of symmetry. Their half period is an integral over the angle
+u, where ``sine2`` = sin(u)**2 is the square of a coordinate divided by its largest value, and ``cosine2`` = cos(u)**2.
+``half`` is half of an orbit's width, and ``middle + rest`` is the middle of both ends in two doubles. If that integral
+is a complete elliptic integral of the first kind, a module has ``agm_arguments_batch`` instead: pi over the half period
+is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side, the turning point may have a
+closed form, ``turning_point_batch``, in terms of the launch's offset from the axis and its V**2.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -88,7 +89,8 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-# Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
+# This number is raised with every change of a signature here, or of a number that runtime code puts into generated
+# modules.
 INTERFACE = 12
 
 REAL = types.float64
@@ -124,7 +126,7 @@ PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7
 
 
 class Addresses(NamedTuple):
-    """The memory cells with the addresses of one generated module's functions; 0 for missing ones."""
+    """The memory cells with the addresses of one generated module's functions; 0 for missing functions."""
 
     path_and_contact_force: int
     effective_potential: int = 0
@@ -146,7 +148,7 @@ class CompiledFunctions(NamedTuple):
     bounds: Any = None
 
     def addresses(self) -> Addresses:
-        """Where their addresses stand in memory; 0 for one that there is not."""
+        """Return the memory cells with their addresses; 0 for missing functions."""
         return Addresses(*_addresses(self))
 
 
@@ -155,7 +157,9 @@ def _addresses(functions: Iterable[Any]) -> Iterator[int]:
 
 
 class BatchAddresses(NamedTuple):
-    """The memory cells with the addresses of one module's functions for many orbits at once; 0 for missing ones."""
+    """The memory cells with the addresses of one module's functions for many orbits at once; 0 for missing
+    functions.
+    """
 
     potential_divdiff1: int
     potential_divdiff2: int
@@ -170,7 +174,7 @@ class BatchAddresses(NamedTuple):
 class BatchFunctions(NamedTuple):
     """The functions of one module that serve many orbits at once, each a `emitted.Emitted`.
 
-    A function that a module does not have is None. ``orbit_rows`` and ``integrand_rows`` are how many rows
+    A function that a module does not have is None. ``orbit_rows`` and ``integrand_rows`` are the numbers of rows that
     ``orbit_invariants`` and ``integrand_invariants`` fill.
     """
 
@@ -186,7 +190,7 @@ class BatchFunctions(NamedTuple):
     integrand_rows: int = 0
 
     def addresses(self) -> BatchAddresses:
-        """Where their addresses stand in memory; 0 for one that there is not."""
+        """Return the memory cells with their addresses; 0 for missing functions."""
         return BatchAddresses(*_addresses(getattr(self, name) for name in BatchAddresses._fields))
 
 
@@ -198,9 +202,9 @@ class Dissipation(NamedTuple):
     speed_equation, static_balance : int
         The memory cells with the addresses of these functions.
     friction : bool
-        Whether the force depends on the sign of N: then a leg ends where N changes sign.
+        Whether the force depends on the sign of N. A leg then ends where N changes sign.
     kinked : bool
-        Whether it has a kink where the curvature changes sign: a leg is computed in parts there.
+        Whether it has a kink where the curvature changes sign. A leg is then computed in parts.
     linear : bool
         Whether it is linear in V**2.
     """
@@ -222,7 +226,7 @@ class DissipativeFunctions(NamedTuple):
     linear: bool
 
     def addresses(self) -> Dissipation:
-        """The memory cells with their addresses, and the flags."""
+        """Return the memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
 
@@ -233,16 +237,16 @@ class SeparatedTerms(NamedTuple):
     Attributes
     ----------
     function : emitted.Emitted
-        What depends on the place.
+        The function that fills the parts, which depend on the place.
     factors : callable
-        ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
-        the run-time parameters and what stands behind them.
+        ``f(op, p)`` gives the factors, which depend on parameters alone: one for each part of U, then one for each part
+        of n0. ``p`` contains the run-time parameters and the numbers that follow them.
     potentials, loads : int
         The numbers of parts of U and n0.
     held : tuple of int
-        Where in ``p`` the numbers stand that ``function`` reads.
+        The indices in ``p`` of the numbers that ``function`` reads.
     parts : callable or None
-        ``f(op, x, z, p)`` gives the parts of U; None where they depend on more than coordinates.
+        ``f(op, x, z, p)`` gives the parts of U; None if they depend on more than coordinates.
     """
 
     function: Any
@@ -260,7 +264,7 @@ class ExactPotential(NamedTuple):
 
 
 class ExactChartLaw(NamedTuple):
-    """The formulas of a dissipative module along a charted curve, by what is known at a point of it.
+    """The formulas of a dissipative module along a charted curve, in terms of the chart's values at a point.
 
     ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
     V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N).
@@ -273,9 +277,9 @@ class ExactChartLaw(NamedTuple):
 class ExactFormulas(NamedTuple):
     """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``.
 
-    ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. ``y`` is there for a space
-    curve; and ``load_along_curvature``, the product of the vectors whose lengths are kappa and n0 [1/s2], for one in no
-    vertical plane.
+    ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. A space curve has ``y``; one
+    that lies in no vertical plane also has ``load_along_curvature``, the scalar product [1/s2] of the vectors whose
+    lengths are kappa and n0.
     """
 
     x: Callable[..., Any]
@@ -290,7 +294,7 @@ class ExactFormulas(NamedTuple):
 
 
 class ExactLaw(NamedTuple):
-    """The formulas of a dissipative module: those of the path as of `ExactFormulas`, and the law of motion.
+    """The formulas of a dissipative module: those of the path, as in `ExactFormulas`, and the law of motion.
 
     ``speed_slope`` is dW/dlam [m2/s2/[lam]] with W = V**2: ``f(op, lam, w, v, nu, p)`` with v = sgn(ds/dt), nu =
     sgn(N).

@@ -1,4 +1,4 @@
-"""The model of a generated module, which answers for pass 1, single motions and sweeps."""
+"""The model of a generated module, which computes pass 1, single motions and sweeps."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.runtime.sweep.result import Sweep
 
-# The fewest places of a load map for which another thread is started.
+# The smallest number of places of a load map for which another thread is started.
 MIN_PLACES_PER_THREAD = 2**16
 
 NO_LOW_PARTS: Array = np.empty(0)
 
-# What the functions of a module take besides its run-time parameters.
+# The arguments of a module's functions in addition to its run-time parameters.
 ARGUMENTS = {
     "pass1": ("lam", "lam0", "v0", "direction", "out"),
     "solve": LaunchRequest._fields,
@@ -55,7 +55,9 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @cache
 def _solver(dissipative: bool) -> "Callable[[Formulas, ParameterValues, Launch], Motion]":
-    """The function that solves a launch; it is imported when needed, for a process often needs one of the two only."""
+    """Return the function that solves a launch. It is imported when needed, because a process often needs only one of
+    the two.
+    """
     if dissipative:
         from gqm_sym.runtime.legs.dissipative import dissipate
 
@@ -75,7 +77,8 @@ class CompiledModel(Formulas):
     __slots__ = ()
 
     def refuse(self, called: str, unknown: Mapping[str, Any]) -> NoReturn:
-        """Refuse an argument that a function of the module does not have; the message says which was probably meant.
+        """Refuse an argument that a function of the module does not have; the message suggests the one that was
+        probably meant.
 
         Parameters
         ----------
@@ -95,12 +98,12 @@ class CompiledModel(Formulas):
         out: Any = None,
         unknown: Mapping[str, Any] = NOTHING,
     ) -> Pass1 | Pass1InSpace | Pass1OfRider:
-        """Position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
+        """Return position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
 
         Parameters
         ----------
         request : LaunchRequest
-            The launch that V**2 belongs to.
+            The launch that determines V**2.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         lam : number or array_like
@@ -113,7 +116,7 @@ class CompiledModel(Formulas):
 
         Returns
         -------
-        Pass1, or Pass1InSpace of a space curve
+        Pass1, or Pass1InSpace for a space curve
             Arrays of the shape of ``lam``. Formulas are evaluated at any place; beyond the ends of a track that is
             known by points, by pieces or by an equation, all values are NaN.
 
@@ -162,14 +165,14 @@ class CompiledModel(Formulas):
     def _fill_in_space(
         self, p: Array, launch: Launch, places: Array, arrays: Pass1 | Pass1InSpace | Pass1OfRider
     ) -> None:
-        """Fill what only the load map of a space curve has."""
+        """Fill the rows that only the load map of a space curve has."""
         if self.path_in_space is None:
             return
         v2 = arrays.v2.reshape(-1)
         rows, force = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]], arrays.normal_force.reshape(-1)
 
         def fill(part: slice) -> None:
-            # From rest the body goes to either side of the launch.
+            # From rest the body may move to either side of the launch.
             side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
             ahead = np.where(side != 0.0, side, float(launch.direction))
             found = [*path_in_space(self, p, places[part], v2[part], ahead)]
@@ -183,7 +186,9 @@ class CompiledModel(Formulas):
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
 
     def _beyond_ends(self, p: ParameterValues, places: Array) -> NDArray[np.bool_] | None:
-        """Which places lie beyond the ends of a curve without formulas, where there is nothing; None if none does."""
+        """Return which places lie beyond the ends of a curve without formulas, where it does not exist; None if there
+        are none.
+        """
         numbers = self.domain(p).numbers
         if self.chart is None or not places.size or (numbers.low <= places.min() and places.max() <= numbers.high):
             return None
@@ -193,7 +198,7 @@ class CompiledModel(Formulas):
     def solve(
         self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NOTHING
     ) -> "Motion":
-        """The motion that a launch begins.
+        """Compute the motion that begins with a launch.
 
         Parameters
         ----------
@@ -207,14 +212,14 @@ class CompiledModel(Formulas):
         Returns
         -------
         Motion
-            The motion, which computes what it is asked for.
+            The motion, which computes its answers on request.
 
         Raises
         ------
         InputError
             If a number cannot be read or the launch is impossible.
         SolutionError
-            If the motion cannot be computed, or a rolling body comes to where it does not fit into its track.
+            If the motion cannot be computed, or a rolling body reaches a place where it does not fit into its track.
         """
         begin_launch()
         if unknown:
@@ -243,7 +248,7 @@ class CompiledModel(Formulas):
         gradient: Any = None,
         unknown: Mapping[str, Any] = NOTHING,
     ) -> "Sweep":
-        """One quantity over arrays of launches and parameters, on this machine or on a Dask cluster.
+        """Compute one quantity over arrays of launches and parameters, on this machine or on a Dask cluster.
 
         Parameters
         ----------
@@ -265,7 +270,7 @@ class CompiledModel(Formulas):
         Returns
         -------
         Sweep
-            Values of the shape that all arguments broadcast to.
+            The values, in the shape to which all arguments broadcast.
 
         Raises
         ------
@@ -306,7 +311,7 @@ class CompiledModel(Formulas):
     def equilibria(
         self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NOTHING
     ) -> "tuple[Equilibrium, ...]":
-        """Return the places where a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
+        """Return the places at which a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
 
         Parameters
         ----------
@@ -324,11 +329,11 @@ class CompiledModel(Formulas):
         return equilibria(self, self.numbers(parameters), between)
 
     def __deepcopy__(self, memo: Any) -> "CompiledModel":
-        """The same model: it is never changed."""
+        """Return the same model, because it never changes."""
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its module's text, which is imported where the copy is made.
+        """Pickle the model by its module's text, which is imported where the copy is made.
 
         Raises
         ------
@@ -341,5 +346,5 @@ class CompiledModel(Formulas):
 
 
 def _model_of(source: str, text: str, name: str) -> Any:
-    """The model of a generated module that has this text."""
+    """Return the model of a generated module with this text."""
     return load_text(source, text, name).MODEL

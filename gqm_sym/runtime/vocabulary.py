@@ -1,4 +1,4 @@
-"""All that emitted modules import: each name is fetched from its room when a module first needs it.
+"""All names that emitted modules import; each is fetched from its room when a module first needs it.
 
 A room of the runtime may be moved without touching a module that was generated before.
 """

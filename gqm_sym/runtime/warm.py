@@ -1,4 +1,4 @@
-"""Compiling everything beforehand: `gqm warm`, and the tests before they begin.
+"""Compilation of everything in advance, for `gqm warm` and for the tests before they begin.
 
 Several processes may need the same compiled functions at once, and each would compile them for itself. Here every entry
 point is compiled by one process, those that take longest first; functions that several of them call may still be
@@ -21,14 +21,14 @@ from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.stamps import FOLDER, RUNTIME
 
-# numba makes millions of objects, of which little is garbage. To look for it as often as usual takes a tenth of the
+# numba makes millions of objects, of which little is garbage. The usual frequent search for it takes a tenth of the
 # time.
 COLLECTION_THRESHOLDS = (100_000, 20, 50)
 
-# What stands in a file that has an entry point, or a function that is called by its address.
+# Texts that occur in a file with an entry point, or with a function that is called by its address.
 ENTRY = re.compile(r"^(@entry\(|@compiled\(|\w.*= Emitted\()", re.MULTILINE)
 
-# Where the entry points that take longest are: all processes are busy to the end when these come first.
+# The files with the entry points that take longest; if these come first, all processes are busy to the end.
 LONGEST = (
     *(
         "legs.answers",
@@ -42,14 +42,14 @@ LONGEST = (
 
 
 def rooms() -> list[str]:
-    """The files of the runtime that have entry points, by their dotted names, the slow ones first."""
+    """Return the dotted names of the files of the runtime that have entry points, the slow ones first."""
     files = (path for path in sorted(FOLDER.rglob("*.py")) if ENTRY.search(path.read_text(encoding="utf-8")))
     names = [".".join(path.relative_to(FOLDER).with_suffix("").parts) for path in files]
     return sorted(names, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
 
 
 def compile_room(name: str) -> str:
-    """Compile the entry points of a file of the runtime into the cache; returns its name."""
+    """Compile the entry points of a file of the runtime into the cache; return its name."""
     module = import_module(f"{RUNTIME}.{name}")
     for call in vars(module).values():
         if isinstance(call, Emitted):
@@ -63,7 +63,7 @@ def compile_room(name: str) -> str:
 
 
 def compile_module(file: str) -> str:
-    """Compile all functions of a generated module into the cache; returns its path."""
+    """Compile all functions of a generated module into the cache; return its path."""
     module = load(file, Path(file).stem)
     for value in vars(module).values():
         if isinstance(value, Emitted):
@@ -81,7 +81,7 @@ def warm(files: tuple[str, ...] = (), processes: int = 0, progress: Callable[[in
     processes : int
         The number of processes at a time; 0 for one process for each core.
     progress : callable, optional
-        Called with the number of files that are done, and that of all.
+        Called with the number of files that are done, and the number of all files.
 
     Returns
     -------

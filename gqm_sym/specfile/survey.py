@@ -1,6 +1,8 @@
 """Surveyed tracks as files have them: tables of coordinates (CSV), and places on the Earth (GPX) in local metres."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from math import cos, hypot, isfinite, radians, sin, sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -67,17 +69,21 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
     except (OSError, ValueError, RuntimeError):
         raise InputError(f"read_track: path: there is no file {short(str(file))}; give {WANTED}") from None
     found = surveyed(file.name, file.parent)
-    width = len(found.rows[0]) if found.rows else 0
-    rolls = [()] * len(found.rows) if found.roll is None else [(angle,) for angle in found.roll]
-    numbers = []
-    for k, (row, roll) in enumerate(zip(found.rows, rolls, strict=True), found.first_line):
-        where = f"{file.name!r}, row {k}"
-        if len(row) != width or width not in _UNNAMED:
-            raise InputError(f"{where}: must be numbers, x and z, or x, y and z, as many in each row, got {list(row)}")
-        numbers.append([_number(value, where) for value in (*row, *roll)])
-    if not numbers:
+    rows = found.rows
+    if found.roll is not None:
+        rows = [[*row, angle] for row, angle in zip(rows, found.roll, strict=True)]
+    if not rows:
         raise InputError(f"{file.name!r}: has no points; give {WANTED}")
-    return dict(zip(_UNNAMED[len(numbers[0])], zip(*numbers, strict=True), strict=True))
+    width = len(rows[0])
+    for k, row in enumerate(rows, found.first_line):
+        if len(row) != width or width not in _UNNAMED:
+            raise InputError(
+                f"{file.name!r}, row {k}: must be numbers, x and z, or x, y and z, as many in each row, got {list(row)}"
+            )
+    return {
+        name: tuple(_numbers(column, lambda k: f"{file.name!r}, row {k + found.first_line}"))
+        for name, column in zip(_UNNAMED[width], zip(*rows, strict=True), strict=True)
+    }
 
 
 def surveyed(name: str, folder: Path) -> Survey:
@@ -111,12 +117,23 @@ def surveyed(name: str, folder: Path) -> Survey:
     return Survey([[fields[k] for k in places] for fields in rows], roll, 1 + bool(header))
 
 
+def _numbers(values: Sequence[Any], where: Callable[[int], str]) -> list[float]:
+    """Return numbers, or texts as numbers; ``where`` says, for messages, where the one of an index stands."""
+    text = "".join(value for value in values if isinstance(value, str))
+    with suppress(ValueError):
+        if text.isascii() and "_" not in text:  # Python reads others as numbers too
+            numbers = list(map(float, values))
+            if all(map(isfinite, numbers)):
+                return numbers
+    return [_number(value, where(k)) for k, value in enumerate(values)]
+
+
 def _number(value: Any, where: str) -> float:
     try:
         number = float(value)
     except ValueError:
         number = float("nan")
-    if isinstance(value, str) and not (value.isascii() and "_" not in value):  # Python reads these as numbers
+    if isinstance(value, str) and not (value.isascii() and "_" not in value):
         number = float("nan")
     if not isfinite(number):
         raise InputError(f"{where}: {str(value)[:40]!r} is no finite decimal number; leave the row out or mend it")
@@ -124,32 +141,44 @@ def _number(value: Any, where: str) -> float:
 
 
 class _Reader:
-    """Collects latitude, longitude and height of the points of the first track or route of a GPX file.
+    """Collects latitude, longitude and height, as texts, of the points of the first track or route of a GPX file.
 
     Declarations of document types are refused, and entities with them: nothing is expanded or fetched.
     """
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.places: list[list[Any]] = []
+        self.places: list[tuple[str, str]] = []
+        self.heights: list[str] = []
         self.kind = ""
-        self.height: list[str] | None = None
         self.ended = False
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self._refuse
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
 
-    def read(self, text: str) -> list[list[Any]]:
+    def read(self, text: str) -> list[tuple[float, float, float]]:
         """Read a file's text."""
-        parser = expat.ParserCreate("utf-8")
-        parser.StartDoctypeDeclHandler = self._refuse
-        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
-        parser.CharacterDataHandler = self._text
         try:
-            parser.Parse(text.encode(), True)
+            self.parser.Parse(text.encode(), True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise InputError(f"{self.name!r}, line {error.lineno}: is no GPX ({what}); export it again") from None
         if not self.places:
             raise InputError(f"{self.name!r}: has no points of a track (trkpt) or a route (rtept)")
-        return self.places
+        columns = zip(("lat", "lon"), zip(*self.places, strict=True), strict=True)
+        latitudes, longitudes = (_numbers(column, partial(self._where, what=key)) for key, column in columns)
+        for k, (latitude, longitude) in enumerate(zip(latitudes, longitudes, strict=True)):
+            if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
+                where = self._where(k)
+                raise InputError(f"{where}: {latitude!r}, {longitude!r} are no latitude and longitude in degrees")
+        if "" in self.heights:
+            raise InputError(f"{self._where(self.heights.index(''))}: has no height (ele); loads need heights")
+        return list(zip(latitudes, longitudes, _numbers(self.heights, partial(self._where, what="ele")), strict=True))
+
+    def _where(self, k: int, what: str = "") -> str:
+        """Name a point, and what of it, for messages."""
+        return f"{self.name!r}, point {k + 1}" + (what and f": {what}")
 
     def _refuse(self, *_: Any) -> None:
         raise InputError(f"{self.name!r}: has a document type (DOCTYPE), which GPX files do not have; remove it")
@@ -160,31 +189,19 @@ class _Reader:
             self.kind = tag
             if len(self.places) == ROW_LIMIT:
                 raise InputError(f"{self.name!r}: has more than {ROW_LIMIT} points, which are the most")
-            self._check_height()
-            where = f"{self.name!r}, point {len(self.places) + 1}"
-            latitude, longitude = (_number(attributes.get(key, ""), f"{where}: {key}") for key in ("lat", "lon"))
-            if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
-                raise InputError(f"{where}: {latitude!r}, {longitude!r} are no latitude and longitude in degrees")
-            self.places.append([latitude, longitude, None])
+            self.places.append((attributes.get("lat", ""), attributes.get("lon", "")))
+            self.heights.append("")
         elif tag == "ele" and self.kind and not self.ended:
-            self.height = []
+            self.heights[-1] = ""
+            self.parser.CharacterDataHandler = self._height
 
-    def _check_height(self) -> None:
-        """Refuse a last point without height."""
-        if self.places and self.places[-1][2] is None:
-            raise InputError(f"{self.name!r}, point {len(self.places)}: has no height (ele); loads need heights")
-
-    def _text(self, text: str) -> None:
-        if self.height is not None:
-            self.height.append(text)
+    def _height(self, text: str) -> None:
+        self.heights[-1] += text
 
     def _end(self, tag: str) -> None:
         tag = tag.rpartition(":")[2]
-        if tag == "ele" and self.height is not None:
-            self.places[-1][2] = _number("".join(self.height), f"{self.name!r}, point {len(self.places)}: ele")
-            self.height = None
-        elif tag == self.kind and not self.ended:
-            self._check_height()
+        if tag == "ele":
+            self.parser.CharacterDataHandler = None
         elif tag in ("trk", "rte") and self.kind:
             self.ended = True
 

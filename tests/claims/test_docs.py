@@ -81,6 +81,17 @@ def test_the_example_sweep_is_right(tmp_path: Path) -> None:
     assert read_sweep(tmp_path / "periods.yaml").shape == (300, 3)
 
 
+def test_what_is_cited_as_maths_is_a_page() -> None:
+    """Docstrings, comments and generated modules name sections of it that exist."""
+    page = (DOCS / "concepts" / "maths.md").read_text(encoding="utf-8")
+    headings = set(re.findall(r"^## (\d)\. ", page, re.MULTILINE))
+    files = [path for folder in ("gqm_sym", "generated", "tests") for path in (ROOT / folder).rglob("*.py")]
+    cited = "\n".join(path.read_text(encoding="utf-8") for path in files if path != Path(__file__))
+    named = re.findall(r"MATHS,?\s+(?:sections?|s\.)\s+(\d)(?: (?:to|and) (\d))?", cited)
+    assert len(named) == cited.count("MATHS") > 50
+    assert {section for both in named for section in both if section} <= headings
+
+
 EXAMPLES = [path for path in sorted((ROOT / "gqm_sym").rglob("*.py")) if ">>> " in path.read_text(encoding="utf-8")]
 
 

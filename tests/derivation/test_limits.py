@@ -1,6 +1,9 @@
 """What derivation and emission refuse, and what they leave to run time."""
 
 import importlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -165,3 +168,15 @@ def test_templates_of_another_version(monkeypatch: pytest.MonkeyPatch, tmp_path:
     with pytest.raises(EmissionError, match=r"old: wants \['gone', 'name'\], is given \['name'\]"):
         render._fill(environment, "old", {"name": "n"})
     assert render._fill(environment, "old", {"name": "n", "gone": 1}) == "n 1"
+
+
+def test_what_sympy_takes_as_a_double_is_refused() -> None:
+    """With gmpy2's integers SymPy looks for the root of a number by its logarithm as a double."""
+    pytest.importorskip("gmpy2")
+    code = "import gqm_sym as gqm; gqm.derive(gqm.Curve.graph('1e400*u', parameter='u'), gqm.Gravity())"
+    environment = {**os.environ, "SYMPY_GROUND_TYPES": "gmpy"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1] == (
+        "gqm_sym.errors.DerivationError: derive: a number is beyond the range of doubles, 10**308; "
+        "declare the curve and the forces in other units"
+    )

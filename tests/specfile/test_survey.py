@@ -117,6 +117,8 @@ POINT = '<trkpt lat="46" lon="7"><ele>5</ele></trkpt>'
         ("a.csv", "x,z\n1_0,2\n", "'a.csv', row 2: '1_0' is no finite decimal number"),
         ("a.csv", "1,١\n", "'a.csv', row 1: '١' is no finite decimal number"),
         ("a.gpx", gpx('<trkpt lat="1" lon="1">' + POINT + "</trkpt>"), r"'a.gpx', point 1: has no height \(ele\)"),
+        ("a.gpx", gpx('<trkpt lat="1" lon="1"/></trkseg></trk><trk><trkseg><ele>5</ele>'), "'a.gpx', point 1: has no"),
+        ("a.gpx", gpx('<trkpt lat="1" lon="1"><ele>1_0</ele></trkpt>'), "'a.gpx', point 1: ele: '1_0' is no finite"),
         ("b/a.csv", "", "read_track: path: there is no file"),
         ("9" * 300, "", "read_track: path: there is no file"),
     ],

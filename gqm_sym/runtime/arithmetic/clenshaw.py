@@ -20,7 +20,7 @@ MAX_TERMS = 32
 GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(MAX_TERMS)])
 DECAY = np.array([(k + 1) / (k + 2) for k in range(MAX_TERMS)])
 
-# Registers that are computed in parallel, and places in a group of so many registers.
+# The number of registers that are computed in parallel, and the number of places that they hold together.
 ABREAST = 4
 GROUP = LANES * ABREAST
 _COUNT = ir.IntType(64)

@@ -5,7 +5,7 @@ here are polynomials of a reduced argument without branches; LLVM inlines them i
 
 The argument is reduced by a multiple of pi/2 (or log 2) that is held in parts (Cody and Waite, Software Manual for the
 Elementary Functions, 1980), and the rounding error of the reduction is kept in a second double. The error is below one
-unit in the last place; of sin and cos this holds for ``|x|`` < 1e9, and beyond that the result is the sine of
+unit in the last place, for sin and cos if ``|x|`` < 1e9; for larger arguments the result is the sine or cosine of
 ``x*(1 + eps)``, where eps is a few roundings. All functions give NaN for NaN. At infinities sin and cos give NaN, and
 the others their limits.
 """
@@ -16,7 +16,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, from_bits, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
-# Adding this rounds to a whole number, which the lowest bits of the sum then hold.
+# Adding this constant rounds a number to an integer, which the lowest bits of the sum then contain.
 ROUND = 1.5 * 2.0**52
 
 # pi/2 as the sum of three doubles. The first difference of the reduction is exact, since its product is fused.
@@ -88,13 +88,15 @@ MAX_EXPONENT, MAX_HYPERBOLIC = 1000.0, 710.4758600739439
 # Below this argument exp is less than half an ulp of 1.
 NEGLIGIBLE_EXPONENT = -45.0
 
-# (sinh(x) - x)/x**3 in powers of x**2 for |x| <= 1; what is left out is below 1e-19.
+# (sinh(x) - x)/x**3 in powers of x**2 for |x| <= 1; the omitted terms are below 1e-19.
 SINHC = tuple(1.0 / factorial(2 * k + 1) for k in reversed(range(1, 10)))
 
 
 @Inlined
 def reduced(x):  # type: ignore[no-untyped-def]
-    """The number of quarter turns in x, modulo 4; the rest r of x; and the rounding error by which r is too large."""
+    """Return the number of quarter turns in x, modulo 4; the remainder r of x; and the rounding error by which r is too
+    large.
+    """
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
     t = fma(-k, QUARTER[0], x)
@@ -123,7 +125,7 @@ def cosine_kernel(r, over):  # type: ignore[no-untyped-def]
 
 @Inlined
 def sin(x):  # type: ignore[no-untyped-def]
-    """The sine."""
+    """Return the sine."""
     turns, r, over = reduced(x)
     value = choose(turns & 1 == 1, cosine_kernel(r, over), sine_kernel(r, over))
     return choose(turns & 2 == 2, -value, value)
@@ -131,7 +133,7 @@ def sin(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def cos(x):  # type: ignore[no-untyped-def]
-    """The cosine."""
+    """Return the cosine."""
     turns, r, over = reduced(x)
     value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
     return choose((turns + 1) & 2 == 2, -value, value)
@@ -166,7 +168,7 @@ def cos_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-de
 
 @Inlined
 def atan(x):  # type: ignore[no-untyped-def]
-    """The arc tangent, by that of -1/x where x is large and that of (x - 1)/(x + 1) where x is near 1."""
+    """Return the arc tangent, by that of -1/x where x is large and that of (x - 1)/(x + 1) where x is near 1."""
     size = choose(fabs(x) > MAX_ARGUMENT, MAX_ARGUMENT, fabs(x))
     far, near = size > MIN_INVERTED, size <= MAX_DIRECT
     more = size + 1.0
@@ -205,7 +207,7 @@ def power_of_two(k):  # type: ignore[no-untyped-def]
 
 @Inlined
 def exp(x):  # type: ignore[no-untyped-def]
-    """The exponential; subnormal results are rounded twice."""
+    """Return the exponential; subnormal results are rounded twice."""
     below = choose(x > MAX_EXPONENT, MAX_EXPONENT, x)
     lead, low, k = scaled_exp(choose(below < -MAX_EXPONENT, -MAX_EXPONENT, below))
     half = k >> 1
@@ -230,7 +232,7 @@ def half_exp(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def cosh(x):  # type: ignore[no-untyped-def]
-    """The hyperbolic cosine."""
+    """Return the hyperbolic cosine."""
     size = fabs(x)
     up, low, down = half_exp(choose(size > MAX_HYPERBOLIC, MAX_HYPERBOLIC, size))
     return choose(size > MAX_HYPERBOLIC, inf, up + (down + low))
@@ -238,21 +240,23 @@ def cosh(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def sinh(x):  # type: ignore[no-untyped-def]
-    """The hyperbolic sine."""
+    """Return the hyperbolic sine."""
     size = fabs(x)
     up, low, down = half_exp(choose(size > MAX_HYPERBOLIC, MAX_HYPERBOLIC, size))
     far = choose(size > MAX_HYPERBOLIC, inf, up - (down - low))
     return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))
 
 
-# The bits of a number, halved and taken from these, are those of 1/sqrt of it within 4 % (Robertson, A Brief History
-# of InvSqrt, 2012).
+# Half the bits of a number, subtracted from this constant, are the bits of its inverse square root within 4 %
+# (Robertson, A Brief History of InvSqrt, 2012).
 ROOT_BITS = 0x5FE6EB50C7B537A9
 
 
 @Inlined
 def inverse_root(x):  # type: ignore[no-untyped-def]
-    """1/sqrt(x) for normal numbers ``x > 0``, by Halley's and Newton's methods, for divisions and roots take longer."""
+    """Return 1/sqrt(x) for normal numbers ``x > 0`` by Halley's and Newton's methods, because divisions and roots take
+    longer.
+    """
     y = from_bits(ROOT_BITS - (bits(x) >> 1))
     for _ in range(2):
         left = fma(-(x * y), y, 1.0)
@@ -260,8 +264,8 @@ def inverse_root(x):  # type: ignore[no-untyped-def]
     return fma(0.5 * y, fma(-(x * y), y, 1.0), y)
 
 
-# 2 pi as the sum of two doubles, and the Taylor coefficients of sin(2 pi g) from g**3 on. What is left out of the
-# series is below 2e-18 at g = 1/4.
+# 2 pi as the sum of two doubles, and the Taylor coefficients of sin(2 pi g) from g**3 on. The omitted terms are below
+# 2e-18 at g = 1/4.
 ONE_TURN, ONE_TURN_LOW = 2.0 * pi, 2.4492935982947064e-16
 TURN_SINE_SERIES = tuple((-1.0) ** k * ONE_TURN ** (2 * k + 1) / factorial(2 * k + 1) for k in reversed(range(1, 12)))
 
@@ -270,7 +274,7 @@ TURN_SINE_SERIES = tuple((-1.0) ** k * ONE_TURN ** (2 * k + 1) / factorial(2 * k
 def turn_sine(g, low):  # type: ignore[no-untyped-def]
     """sin(2 pi (g + low)) for ``|g|`` <= 1/4 and ``low`` of the size of its rounding error."""
     z = g * g
-    slope = fma(fma(64.9, z, -19.7), z, 1.0)  # of the sine, with enough digits for the effect of a rounding error
+    slope = fma(fma(64.9, z, -19.7), z, 1.0)  # of the sine, accurate enough for a rounding error
     tail = 0.0
     for c in TURN_SINE_SERIES:
         tail = fma(tail, z, c)

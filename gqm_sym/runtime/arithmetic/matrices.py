@@ -17,16 +17,16 @@ from numba.extending import intrinsic
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
 from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
 
-# How many sums run at the same time.
+# The number of sums that run at the same time.
 PARALLEL_SUMS = 6
 
 
 def multiply(table: Any) -> Any:
     """Return the compiled function ``f(values, at, out, to)`` that multiplies a vector with a constant matrix.
 
-    It does ``out[to : to + width] = values[at : at + rows] @ table``, where the rows of the table are filled up with
-    zeros to whole registers. The arrays are read as sequences of numbers from the given indices on, because a slice
-    would take longer than the sums. Nothing is checked.
+    The function computes ``out[to : to + width] = values[at : at + rows] @ table``, where the rows of the table are
+    padded with zeros to whole registers. The arrays are read as sequences of numbers from the given indices on, because
+    a slice would take longer than the sums. Nothing is checked.
     """
     table = np.pad(table, ((0, 0), (0, -table.shape[1] % LANES)))
     rows, width = table.shape
@@ -72,7 +72,7 @@ def multiply(table: Any) -> Any:
 
 
 def _folded(builder: Any, order: str, value: Any) -> Any:
-    """The smallest or the largest of a register's lanes."""
+    """Return the smallest or the largest of a register's lanes."""
     lanes = LANES
     while lanes > 1:
         lanes //= 2
@@ -89,15 +89,16 @@ def _of_two(builder: Any, order: str, one: Any, other: Any) -> Any:
 
 
 def _registers(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
-    """Registers that hold ``count`` numbers of an array, some of them twice."""
+    """Return registers that hold ``count`` numbers of an array, some of them twice."""
     values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
     return [builder.load(register(builder, values, min(at, count - LANES)), align=8) for at in range(0, count, LANES)]
 
 
 def span(count: int) -> Any:
-    """Return the compiled function ``f(values, at)``: the smallest and the largest of ``count`` numbers, eight or more.
+    """Return the compiled function ``f(values, at)`` that returns the smallest and the largest of ``count`` numbers,
+    eight or more.
 
-    NaN among them may be ignored.
+    A NaN among them may be ignored.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -107,7 +108,7 @@ def span(count: int) -> Any:
 
     @intrinsic
     def smallest_and_largest(_, values, at):  # type: ignore[no-untyped-def]
-        """The smallest and the largest."""
+        """Return the smallest and the largest of the numbers."""
         return types.UniTuple(types.float64, 2)(values, types.intp), lower
 
     @in_python(smallest_and_largest)
@@ -119,7 +120,9 @@ def span(count: int) -> Any:
 
 
 def largest(count: int) -> Any:
-    """Return the compiled function ``f(values, at)``: the largest absolute value of ``count`` numbers, as in `span`."""
+    """Return the compiled function ``f(values, at)`` that returns the largest absolute value of ``count`` numbers, as
+    `span` does.
+    """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         found = _registers(context, builder, signature, args, count)
@@ -128,7 +131,7 @@ def largest(count: int) -> Any:
 
     @intrinsic
     def size(_, values, at):  # type: ignore[no-untyped-def]
-        """The largest absolute value."""
+        """Return the largest absolute value of the numbers."""
         return types.float64(values, types.intp), lower
 
     in_python(size)(lambda values, at: np.fmax.reduce(np.abs(values.reshape(-1)[at : at + count])))

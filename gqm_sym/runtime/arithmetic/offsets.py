@@ -7,11 +7,11 @@ from gqm_sym.runtime.compiled.jit import Inlined
 
 @Inlined
 def place_from_ends(a, b, da, db):  # type: ignore[no-untyped-def]
-    """``a + da``, or ``b - db`` where that end is nearer: the rounding is then that of the shorter distance."""
+    """Return ``a + da``, or ``b - db`` if that end is nearer, so that the rounding is that of the shorter distance."""
     return a + da if fabs(da) <= fabs(db) else b - db
 
 
 @Inlined
 def speed_squared_from_potential(w0, potential, level):  # type: ignore[no-untyped-def]
-    """V**2 = w0 - 2*(U - level), where the effective potential is U: w0 to the last bit where it is ``level``."""
+    """Return V**2 = w0 - 2*(U - level) for the effective potential U; if U is ``level``, this is w0 to the last bit."""
     return w0 - 2.0 * (potential - level)

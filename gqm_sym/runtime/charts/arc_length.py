@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.types import Array
 
 # A curve: a function of places (n,) and of offsets from each of them (n, m) that returns x, z, ds/dlam, dx/ds, dz/ds
 # and kappa as an array (6, n, m); of a curve in space x, y, z, ds/dlam and the first and second derivatives of the
-# coordinates by arc length, as an array (10, n, m), perhaps with more rows behind that belong to it.
+# coordinates by arc length, as an array (10, n, m), possibly followed by further rows that belong to the curve.
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.integer[Any]]
@@ -80,7 +80,7 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 def summed(lengths: Array) -> Array:
-    """Return the arc length at the edges of pieces of these lengths; the sums are rounded about once."""
+    """Return the arc length at the edges of pieces of these lengths; each sum has about one rounding error."""
     total: Array = np.concatenate([[0.0], np.cumsum(lengths, dtype=np.longdouble).astype(np.float64)])
     return total
 
@@ -111,9 +111,9 @@ class Division(NamedTuple):
     lengths : (n,) array
         Arc lengths.
     at_nodes : (k, n, TERMS) array
-        What the curve's function returns behind ds/dlam, at the nodes.
+        The rows that the curve's function returns after ds/dlam, at the nodes.
     at_edges : (k, n) array
-        All that it returns at the left edges.
+        All rows that it returns, at the left edges.
     """
 
     places: Array
@@ -220,7 +220,7 @@ def _tail(values: Array, min_size: float = 0.0) -> Array:
 
 @Inner
 def clenshaw(terms, u):  # type: ignore[no-untyped-def]
-    """Return the value of a Chebyshev series; `arithmetic.clenshaw.chebyshev_sum` has other roundings."""
+    """Return the value of a Chebyshev series, rounded otherwise than by `arithmetic.clenshaw.chebyshev_sum`."""
     one, two = 0.0, 0.0
     for j in range(terms.size - 1, 0, -1):
         one, two = 2.0 * u * one - two + terms[j], one
@@ -229,7 +229,9 @@ def clenshaw(terms, u):  # type: ignore[no-untyped-def]
 
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[:, ::1], types.float64[:, ::1]))
 def _invert(lengths, rates, gains):  # type: ignore[no-untyped-def]
-    """Return the places u in [-1, 1] at which the arc length is the share of the nodes, for each piece."""
+    """Return, for each piece, the places u in [-1, 1] whose arc lengths are distributed over the piece like the nodes
+    over [-1, 1].
+    """
     out = np.empty((rates.shape[0], TERMS))
     for k in range(rates.shape[0]):
         half = 0.5 * lengths[k]

@@ -25,8 +25,8 @@ NODES: Array = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
 """Chebyshev points of the first kind on [-1, 1], in decreasing order."""
 
 # The matrix FIT takes values at the nodes to Chebyshev coefficients, AT_NODES takes these back to values, and _POWERS
-# takes them to coefficients of powers of u. Angles are reduced before they are rounded: else noise of several ulp would
-# remain. (The fits of `level_pieces` are not reduced, and differ in last bits.)
+# takes them to coefficients of powers of u. Angles are reduced before they are rounded, because noise of several ulp
+# would remain otherwise. (The fits of `level_pieces` are not reduced, and differ in last bits.)
 _QUARTERS = np.outer(np.arange(TERMS), 2 * np.arange(TERMS) + 1) % (4 * TERMS)
 FIT: Array = (2.0 / TERMS) * np.cos(np.pi * _QUARTERS / (2 * TERMS))
 FIT[0] *= 0.5
@@ -40,17 +40,17 @@ _POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, r
 # Coefficients after the last one above this share of the largest value are rounding noise, and are set to zero.
 MAX_NOISE_RATIO = 2e-16
 
-# By how many units in the last place of their sizes the rows of a chart may be off, and the factor by which they are
-# changed where it is found out what that does.
+# The possible error of a row of a chart, in units in the last place of the row's size, and the factor by which such a
+# change is magnified to find out its effect.
 ROW_ROUNDINGS, MAGNIFIED = 3.0, 2.0**20
 
-# How far from a corner, in units in the last place, a place is the corner: places of points are rounded.
+# A place within so many units in the last place of a corner counts as the corner, because places of points are rounded.
 CORNER_ROUNDINGS = 4.0
 
-# How far from a corner its two tangents are read, as a share of the curve's length.
+# The distance from a corner at which its two tangents are read, as a share of the curve's length.
 _BESIDE_CORNER = 2.0**-40
 
-# Places on each piece among which the search for the nearest point begins.
+# The number of places on each piece among which the search for the nearest point begins.
 _SAMPLES = 8
 
 
@@ -70,11 +70,11 @@ class ChartMaker(Hashable, Protocol):
     def true_pieces(self, p: Any, chart: "Chart") -> Any:
         """Return the curve in double-double arithmetic (`double_double.pieces`), for parameters as exact numbers.
 
-        It is None if there is no such thing.
+        It is None if the curve is known in doubles only.
         """
 
     def is_exact(self, chart: "Chart") -> bool:
-        """Whether the curve can be evaluated in extended precision everywhere on a chart."""
+        """Return whether the curve can be evaluated in extended precision everywhere on a chart."""
 
 
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[::1]))
@@ -106,7 +106,7 @@ class Chart:
         For each piece, the index of the part of the track that it belongs to, and where it begins and ends in that
         part's own parameter; empty if the track has no parts.
     joints : array
-        The arc length at the edges of all charts in the block, where it holds more than those of the curve.
+        The arc length at the edges of all charts in the block, if it holds other charts than those of the curve.
     from_points : bool
         Whether its slopes are those of a spline through points, which have the rounding of the points divided by their
         distance.
@@ -158,9 +158,9 @@ class Chart:
         return signs
 
     def rounded(self) -> Array:
-        """Return copies of the block, in each of which one row of one chart is changed, or its places.
+        """Return copies of the block, in each of which one row of one chart, or its places, are changed.
 
-        The change is `MAGNIFIED` times what rounding may make of it. On a closed chart whole laps are subtracted from
+        The change is `MAGNIFIED` times the possible rounding error. On a closed chart whole laps are subtracted from
         places.
         """
         blocks, begin = [], 0
@@ -168,7 +168,7 @@ class Chart:
             count, first = int(self.block[begin + 1]), begin + EDGES + 3 * int(self.block[begin + 1]) + 2
             records = self.block[first : first + count * RECORD].reshape(count, RECORD)
             sizes = np.abs(records[:, 6:]).reshape(count, ROWS, TERMS).sum(axis=2)
-            # Coordinates are summed along the curve, and have the rounding of the largest of them.
+            # Coordinates are summed along the curve, so that their rounding error is that of the largest of them.
             sizes[:, :2] = (sizes[:, :2] + np.abs(records[:, 2:6:2])).max(axis=0)
             sizes[:, 2] = np.maximum(sizes[:, 2], 1.0)
             if self.from_points:
@@ -214,7 +214,7 @@ class Chart:
 
 
 IN_BLOCK = (2, 0, 1, 3)
-"""The coordinates, and behind them the roll angle, in the order of their charts in the block of a `SpaceChart`."""
+"""The coordinates, followed by the roll angle, in the order of their charts in the block of a `SpaceChart`."""
 
 BY_ORDER = (1, 2, 3, 0)
 """The rows of such a chart that have a coordinate and its derivatives."""
@@ -225,8 +225,8 @@ class SpaceChart(Chart):
     """A curve in space in arc length.
 
     Its block is that of the chart of z, followed by those of x and y, and of the roll angle if there is one. In the
-    chart of a coordinate this is the height; in the places of angle, curvature and x are its first three derivatives by
-    arc length.
+    chart of a coordinate, the row of the height contains this coordinate, and the rows of angle, curvature and x
+    contain its first three derivatives by arc length.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ class SpaceChart(Chart):
         s
             Arc lengths.
         order
-            0 of them themselves, to 3.
+            The order of the derivatives, 0 (the functions themselves) to 3.
         """
         places, size = np.ascontiguousarray(s, dtype=np.float64).reshape(-1), int(self.block[0])
         order_in_block = IN_BLOCK[: 3 + self.banked]
@@ -323,7 +323,7 @@ def assemble(
 def assemble_in_space(
     edges: Array, anchors: Array, derivatives: Sequence[Array], *, period: float = 0.0, breaks: Any = ()
 ) -> "SpaceChart":
-    """Assemble the chart of a track in space: of each coordinate the chart in which it is the height.
+    """Assemble the chart of a track in space from a chart of each coordinate, in which that coordinate is the height.
 
     Parameters
     ----------
@@ -350,10 +350,10 @@ def assemble_in_space(
 
 
 def blocks_of(edges: Array, anchors: tuple[Any, Any], derivatives: Sequence[Array], period: float) -> list[Array]:
-    """Return for each of d functions of arc length the block of a chart in which it is the height.
+    """Return the blocks of d charts, each of which has one of d functions of arc length as its height.
 
-    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles; third derivatives
-    may be left out.
+    The arguments are those of `assemble_in_space`, except that ``anchors`` are pairs of doubles; third derivatives may
+    be omitted.
     """
     half, (slopes, bends, *thirds) = 0.5 * np.diff(edges), derivatives
     constants, powers, turning = _integrated(half, anchors, slopes, half[:, None, None] * bends)
@@ -382,7 +382,8 @@ def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Arr
     left, lows = anchors[0], np.broadcast_to(anchors[1], np.shape(anchors[0]))
     count, rows = left.shape
     constants, powers = np.empty((count, 2 * rows)), np.empty((count, rows, TERMS))
-    # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
+    # Second derivatives are as accurate as first ones: the tangent is integrated from them, and only its mean is
+    # fitted.
     turning = np.asarray(chebint(_fitted(second), axis=2), dtype=np.float64)[:, :, :TERMS]
     turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
     for row in range(rows):
@@ -405,7 +406,7 @@ def _block(
     records[:, 0], records[:, 1], records[:, 2:6] = edges[:-1] + half, 1.0 / half, constants
     powers[:, :2], powers[:, 2], powers[:, 3] = coordinates, angle @ _POWERS, curvature @ _POWERS
     records[:, 6:] = powers.reshape(count, -1)
-    # A bound of how much alpha turns from the start, from bounds of the curvature and jumps between pieces.
+    # A bound on the change of alpha from the start, from bounds on the curvature and from jumps between pieces.
     bounds = np.abs(curvature).sum(axis=1)
     left, right = (powers[:, 2] @ (side ** np.arange(TERMS)) for side in (-1.0, 1.0))
     jumps = np.append(np.abs(left[1:] - right[:-1]), abs(left[0] + turn - right[-1]) if period else 0.0)

@@ -23,7 +23,7 @@ from gqm_sym.runtime.charts.level_pieces import (
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 
-# Pieces that are laid in one direction.
+# The largest number of pieces that are laid in one direction.
 MAX_PIECES = 2000
 
 # An open curve without a limit is followed over this many times the length of its first piece.
@@ -124,7 +124,7 @@ def _close(curve, start, at, length, direction, piece):  # type: ignore[no-untyp
 
 @Inner
 def _step_over(curve, at, last, piece, length):  # type: ignore[no-untyped-def]
-    """Move ``at`` beyond a place where F is not smooth; whether the curve continues there."""
+    """Move ``at`` beyond a place where F is not smooth; return whether the curve continues there."""
     at[0] += length * last[0]
     at[2] += length * last[1]
     piece[:2] = 0.0
@@ -139,7 +139,9 @@ def _step_over(curve, at, last, piece, length):  # type: ignore[no-untyped-def]
 
 @Inner
 def _mark(jumps, edges, at, what, distance):  # type: ignore[no-untyped-def]
-    """Record what is at an edge; of edges closer than ``distance``, only at that with the shortest piece before it."""
+    """Record the kind of an edge; of edges closer than ``distance``, keep the worst, or the one with the shortest piece
+    before it.
+    """
     k = at - 1
     while k > 0 and edges[at] - edges[k] <= distance:
         shorter = edges[k] - edges[k - 1] <= edges[at] - edges[at - 1]
@@ -171,7 +173,7 @@ def _next_edge(s, limit, length, distance):  # type: ignore[no-untyped-def]
 def _try_piece(curve, here, length, piece, after_break):  # type: ignore[no-untyped-def]
     """Solve for a piece from ``here``; return the change of length for the next one, negative if this one is too long.
 
-    Between the beginning and the first node F may not be smooth; that is not checked right after a break.
+    F may fail to be smooth between the beginning and the first node; this is not checked directly after a break.
     """
     if not solve_piece(curve, here, length, piece):
         return -0.5
@@ -203,7 +205,7 @@ class Trace(NamedTuple):
 
 @Inner
 def _pass_break(curve, at, last, piece, trace, count, size):  # type: ignore[no-untyped-def]
-    """Move ``at`` over a place where F is not smooth, with a straight piece; whether the curve continues there."""
+    """Move ``at`` over a place where F is not smooth by a straight piece; return whether the curve continues there."""
     trace.anchors[count] = at
     trace.nodes[count, 0], trace.nodes[count, 1], trace.nodes[count, 2] = last[0], last[1], last[2]
     length = 2.0 * MIN_LENGTH * size
@@ -216,7 +218,9 @@ def _pass_break(curve, at, last, piece, trace, count, size):  # type: ignore[no-
 
 @Inner
 def _append(trace, count, here, last, piece, length, size):  # type: ignore[no-untyped-def]
-    """Store a piece that begins ``here``, and what is at its left edge; ``last`` becomes what is at its right edge."""
+    """Store a piece that begins ``here``, and the kind of its left edge; ``last`` is filled with the values at its
+    right edge.
+    """
     anchors, nodes = trace.anchors, trace.nodes
     anchors[count] = here
     nodes[count, 0], nodes[count, 1], nodes[count, 2] = piece[2, :TERMS], piece[3, :TERMS], piece[4, :TERMS]
@@ -260,7 +264,7 @@ def trace_one_way(field, p, sign, start, limit, may_close):  # type: ignore[no-u
     nodes : (count, 3, TERMS) array
         Tangent and curvature at the nodes.
     jumps : (count + 1,) array
-        What is at the edges: SMOOTH, BREAK or CORNER.
+        The kinds of the edges: SMOOTH, BREAK or CORNER.
     last : (4,) array
         Tangent and curvature at the end, and the distance from there to the singular point.
     """

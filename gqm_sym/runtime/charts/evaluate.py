@@ -31,7 +31,8 @@ ROWS = 4
 EDGES = 6
 RECORD = 6 + ROWS * TERMS
 
-# A jump of a derivative between neighbouring pieces that is smaller than this share of it is rounding.
+# A jump of a derivative between neighbouring pieces that is smaller than this share of the derivative is due to
+# rounding.
 MAX_ROUNDING_JUMP = 1e-11
 
 
@@ -44,7 +45,7 @@ def chart_of(p, count):  # type: ignore[no-untyped-def]
 
 @Inner
 def _piece(chart, s):  # type: ignore[no-untyped-def]
-    """Return the piece of an arc length within the first lap."""
+    """Return the piece on which an arc length within the first lap lies."""
     below, above = 0, int(chart[1])
     while above - below > 1:
         middle = (below + above) // 2
@@ -57,7 +58,7 @@ def _piece(chart, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def _piece_near(chart, s, k):  # type: ignore[no-untyped-def]
-    """Return the piece of an arc length within the first lap, where that is probably ``k`` or one next to it."""
+    """Return the piece on which an arc length within the first lap lies, which is probably ``k`` or one next to it."""
     last = int(chart[1]) - 1
     k += int(s >= chart[EDGES + min(k, last - 1) + 1]) - int(s < chart[EDGES + k])
     k = min(max(k, 0), last)
@@ -67,7 +68,7 @@ def _piece_near(chart, s, k):  # type: ignore[no-untyped-def]
 
 @Inlined
 def _reduced(chart, s):  # type: ignore[no-untyped-def]
-    """Return an arc length within the first lap of a closed curve, and the laps before it."""
+    """Reduce an arc length to the first lap of a closed curve; return it with the number of laps that were removed."""
     period = chart[4]
     laps = floor((s - chart[2]) / period) if period > 0.0 else 0.0
     return s - laps * period, laps
@@ -95,7 +96,7 @@ def _powers(chart, start, row):  # type: ignore[no-untyped-def]
 
 @Inlined
 def _constant(chart, start, row, laps):  # type: ignore[no-untyped-def]
-    """Return what the polynomial of a row is added to, as two numbers."""
+    """Return the constant that is added to the polynomial of a row, as two numbers."""
     if row < 2:
         return chart[start + 2 + 2 * row], chart[start + 3 + 2 * row]
     return (laps * chart[5] if row == 2 else 0.0), 0.0
@@ -114,8 +115,8 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
 def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
     """Fill a register's numbers of ``out``, from ``to`` on, with a row of the chart at the places from ``at`` on.
 
-    Lanes before ``first`` keep what they have. The powers of u are stored at ``terms``; ``numbers`` are the length of
-    all laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
+    Lanes before ``first`` keep their values. The powers of u are stored at ``terms``; ``numbers`` are the length of all
+    laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -157,7 +158,8 @@ def _fill_lanes(chart: Any, terms: int, places: Any, at: int, out: Any, to: int,
 
 @Inner
 def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
-    """Fill the last rows of ``out`` with these rows of the chart at many places, which neighbours share a piece of.
+    """Fill the last rows of ``out`` with these rows of the chart at many places, of which neighbours often lie on the
+    same piece.
 
     Parameters
     ----------
@@ -165,7 +167,7 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
         As in `chart_row`.
     places : (n,) array
     out : (m, n) array
-        With a row for each of ``rows`` at least.
+        Has at least as many rows as ``rows`` names.
     """
     count, closed = int(chart[1]), chart[4] > 0.0
     limit = 1.0 if closed else inf
@@ -188,7 +190,8 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
                     u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
                     out[first + k, j] = whole + (rest + polynomial(_powers(chart, start, row), u))
                 continue
-            # Registers at the end of the places take some before the first one again, and do not store their values.
+            # A register at the end of the places also takes places before the first one, whose values it does not
+            # store.
             for j in range(begin, i, LANES):
                 at = min(j, n - LANES)
                 numbers = (lap, middle, scale, limit, whole, rest)
@@ -203,31 +206,33 @@ def spare_rows(count, n):  # type: ignore[no-untyped-def]
 
 @Inner
 def chart_x(chart, s):  # type: ignore[no-untyped-def]
-    """Horizontal coordinate."""
+    """Return the horizontal coordinate."""
     return chart_row(chart, 0, s)
 
 
 @Inner
 def chart_z(chart, s):  # type: ignore[no-untyped-def]
-    """Height."""
+    """Return the height."""
     return chart_row(chart, 1, s)
 
 
 @Inner
 def chart_alpha(chart, s):  # type: ignore[no-untyped-def]
-    """Angle of the tangent."""
+    """Return the angle of the tangent."""
     return chart_row(chart, 2, s)
 
 
 @Inner
 def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
-    """Signed curvature."""
+    """Return the signed curvature."""
     return chart_row(chart, 3, s)
 
 
 @Inner
 def derivatives_at(chart, k, u, laps):  # type: ignore[no-untyped-def]
-    """Return alpha, kappa and x at a place that `find` has found: in space the derivatives of a coordinate."""
+    """Return alpha, kappa and x at a place that `find` has found; for a curve in space, the derivatives of a
+    coordinate.
+    """
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     first = laps * chart[5] + polynomial(_powers(chart, start, 2), u)
     high, low = _constant(chart, start, 0, laps)
@@ -388,7 +393,7 @@ def divdiff2_chart_alpha(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def
 
 @Inner
 def _turned(chart, s):  # type: ignore[no-untyped-def]
-    """Return a bound of how much alpha turns from the first edge to a place."""
+    """Return a bound on the change of alpha from the first edge to a place."""
     k, u, laps = find(chart, s)
     count = int(chart[1])
     start = EDGES + 3 * count + 2 + k * RECORD
@@ -409,7 +414,9 @@ def ichart_alpha(chart, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def ichart_kappa(chart, s):  # type: ignore[no-untyped-def]
-    """Return an enclosure of the curvature over an interval of arc length, from middle and terms on each piece."""
+    """Return an enclosure of the curvature over an interval of arc length, from the polynomial of each piece about its
+    middle.
+    """
     count = int(chart[1])
     first, left, laps = find(chart, s[0])
     last, right, more = find(chart, s[1])

@@ -1,9 +1,9 @@
 """Charted curves in extended precision: the normal at each place of the chart meets the true curve once.
 
-A chart consists of polynomials close to the true curve. The place ``lam = c - shift`` is where the chart's normal at
-``c`` meets the true curve. There is one shift for each piece of the chart, chosen such that the true curve continues
-from piece to piece without a gap. So ``lam`` is the arc length up to the chart's rounding, ds/dlam is close to 1 and
-known exactly, and between joints everything is an analytic function of ``lam``, at any precision.
+A chart consists of polynomials close to the true curve. The place ``lam = c - shift`` denotes the point at which the
+chart's normal at ``c`` meets the true curve. There is one shift for each piece of the chart, chosen such that the true
+curve continues from piece to piece without a gap. So ``lam`` is the arc length up to the chart's rounding, and ds/dlam
+is close to 1 and known exactly. Between joints everything is an analytic function of ``lam``, at any precision.
 """
 
 from bisect import bisect_right
@@ -23,10 +23,11 @@ from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 # Steps of Newton's method.
 MAX_STEPS = 60
 
-# Bits of a difference quotient beyond those that it loses.
+# The number of bits of a difference quotient beyond those that are lost in it.
 EXTRA_BITS = 24
 
-# A part of a segment is integrated separately unless only this many of the working digits resolve it.
+# A part of a segment is integrated separately unless it is so short that only this many of the working digits resolve
+# it.
 MIN_PART_DIGITS = 10
 
 
@@ -36,7 +37,8 @@ class TrueCurve(Protocol):
     start: tuple[Any, Any]
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
-        """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the unit tangent there.
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the unit
+        tangent there.
 
         Parameters
         ----------
@@ -47,7 +49,7 @@ class TrueCurve(Protocol):
         """
 
     def ends(self, k: int) -> tuple[tuple[Any, Any], tuple[Any, Any]] | None:
-        """Return the points at which piece k must begin and end; None if any two may be chosen."""
+        """Return the points at which piece k must begin and end; None if they may be chosen freely."""
 
     def length(self, k: int) -> Any:
         """Return the arc length between them; None if they are not prescribed."""
@@ -69,11 +71,12 @@ class ChartTrack:
     Parameters
     ----------
     maker, chart
-        What made the curve's chart, and the chart.
+        The maker of the curve's chart, and the chart.
     potential
         ``f(op, x, z, p)``: the effective potential and its derivatives by x and z.
     offset : Number or None
-        How far to the left of the curve the body's path lies, on which x and z are; None if it is the curve.
+        The distance of the body's path to the left of the curve; x and z are coordinates of that path. None if the path
+        is the curve itself.
     launch : (Number, (Number, Number) or None)
         The launch by arc length from the start point, and by its coordinates if it was given so.
     context, values
@@ -113,15 +116,17 @@ class ChartTrack:
     # -- Track (`exact_tracks`) ---------------------------------------------------------------
 
     def place(self, lam: float) -> Any:
-        """Return the place that a double stands for: its distance from the launch is that from the launch's double."""
+        """Return the exact place that a double stands for: it is as far from the launch as the double is from the
+        launch's double.
+        """
         return self.lam0 + (self._context.mpf(lam) - self._near)
 
     def effective_potential(self, lam: Any) -> Any:
-        """U, so that V**2 + 2*U is constant."""
+        """Return U, for which V**2 + 2*U is constant."""
         return self._potential(self._context, *self._beside(self.point(lam)), self._values)[0]
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Its derivative."""
+        """Return the derivative of U."""
         spot = self.point(lam)
         _, by_x, by_z = self._potential(self._context, *self._beside(spot), self._values)
         return (by_x * spot.tx + by_z * spot.tz) * self.ds(lam)
@@ -150,7 +155,8 @@ class ChartTrack:
         """Return the joints of pieces between two places, in their order."""
         if high < low:
             return self.joints(high, low)[::-1]
-        # Joints this close to an end are left out: V**2 may vanish at the end, and is noise on so short a part.
+        # Joints this close to an end are omitted: V**2 may vanish at the end, and is mere rounding noise on so short a
+        # part.
         near = (high - low) * self._context.mpf(10) ** (MIN_PART_DIGITS - self._context.dps)
         out: list[Any] = []
         lap, k = self._lap(low), self._piece(low)
@@ -226,7 +232,7 @@ class ChartTrack:
         return lam
 
     def _lap(self, lam: Any) -> Any:
-        """Return the multiple of the period by which a place on a closed curve lies off the chart."""
+        """Return the multiple of the period by which a place on a closed curve lies outside the chart."""
         low, high = self._edges[0], self._edges[-1]
         if not self._chart.period or low + 1e-9 * (high - low) < lam < high - 1e-9 * (high - low):
             return 0
@@ -268,14 +274,14 @@ class ChartTrack:
         return self._on(k, joint + self._shifts[k])[:2] if ends is None else ends[side]
 
     def _join(self, k: int, side: int) -> None:
-        """Join the piece before (side 0) or after (side 1) a joined one to it."""
+        """Join to a joined piece the one before it (side 0) or after it (side 1)."""
         joint, other = self._joint(k, side), k + 2 * side - 1
         ends = self._curve.ends(other)
         x, z = self._end(k, side, joint) if ends is None else ends[1 - side]
         self._shifts[other] = self._meeting_of(other, x, z, self._context.mpf(self._edges[k + side])) - joint
 
     def _meeting_of(self, k: int, x: Any, z: Any, c: Any) -> Any:
-        """Return the place c on piece k of the chart whose normal goes through a point of the curve."""
+        """Return the place c on piece k at which the chart's normal goes through a point of the curve."""
         tolerance = self._context.ldexp(self._size(k), -self._context.prec // 2)
         for _ in range(MAX_STEPS):
             here = self._on(k, c)

@@ -14,7 +14,7 @@ from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# A part: a function of the part's own parameter that returns x, z and their derivatives by it.
+# The type of a part: a function of the part's own parameter that returns x, z and their derivatives by the parameter.
 Part = Callable[[Any], tuple[Any, Any, Any, Any]]
 
 # Steps of Newton's method.
@@ -22,7 +22,7 @@ MAX_STEPS = 60
 
 
 class Parts:
-    """Parts that follow each other, at one precision; the chart's ``origins`` say which piece belongs to which part."""
+    """Successive parts of a curve at one precision; the chart's ``origins`` say which piece belongs to which part."""
 
     def __init__(self, context: Any, chart: Chart, part: Callable[[int], Part]) -> None:
         self._context, self._part = context, cache(part)
@@ -56,7 +56,9 @@ class Parts:
         return samples, 4.0 * UNIT * float(np.abs(samples).max())
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
-        """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent there."""
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
+        there.
+        """
         context, (part, low, high) = self._context, self._origins[k]
         at, enough = self._part(part), context.ldexp(size, -context.prec // 2)
         place = context.mpf(low + 0.5 * (1.0 + u) * (high - low))
@@ -114,7 +116,7 @@ def spiral(context: Any, pen: tuple[Any, Any, Any], length: Any, first: Any, las
 def _waves(context: Any, angle: Any, kappa: Any, bent: Any) -> tuple[list[Any], list[Any]]:
     """Return the Taylor coefficients in v of cos(a) and sin(a), with a(0) = ``angle`` and a' = kappa + bent*v.
 
-    They come from c' = -a' s and s' = a' c, and are enough for |v| up to 1/2.
+    They follow from c' = -a' s and s' = a' c, and there are enough of them for |v| up to 1/2.
     """
     cosines, sines = [context.mpf(0), context.cos(angle)], [context.mpf(0), context.sin(angle)]
     n = 0

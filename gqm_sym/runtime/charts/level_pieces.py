@@ -1,9 +1,9 @@
-"""One piece of a curve F(x, z) = 0 in arc length: r' = T(r), T the unit tangent across grad F.
+"""One piece of a curve F(x, z) = 0 in arc length: r' = T(r), where T is the unit tangent across grad F.
 
-It is solved at Chebyshev nodes: the tangents there are integrated, and evaluated again at the places that this gives,
-until nothing changes. The tangents have unit length to rounding, so arc length is preserved, and rounding of F enters
-only the direction. Along the exact solution F is constant. The mean of its values at the nodes, in which rounding
-averages out, is the distance of the piece from F = 0, and the piece is moved by that along the gradient.
+This equation is solved at Chebyshev nodes: the tangents there are integrated, and are evaluated again at the resulting
+places, until nothing changes. The tangents have unit length to rounding, so arc length is preserved, and rounding of F
+enters only the direction. Along the exact solution F is constant. The mean of its values at the nodes, in which
+rounding averages out, is the distance of the piece from F = 0, and the piece is moved by that along the gradient.
 """
 
 from math import fabs, inf, isfinite, sqrt
@@ -23,11 +23,11 @@ POINTS = TERMS + 2
 ROWS = 6
 """Rows of ``field``."""
 
-# Iterations; a piece that needs more is too long.
+# The largest number of iterations; a piece that needs more is too long.
 MAX_ITERATIONS = 40
 
 # The iteration has converged when places change by less than the first share of the length, or by less than the second
-# and the changes no longer fall: they are rounding then.
+# and the changes no longer decrease, because they are rounding then.
 MAX_LAST_CHANGE = 4e-16
 MAX_ROUNDING_CHANGE = 1e-8
 
@@ -46,8 +46,8 @@ IDEAL_TERMS = 14
 MAX_GROWTH = 3.0
 MIN_GROWTH = 0.3
 
-# Smaller jumps are taken for rounding: of the tangent at a corner; of the curvature at a break, as a share of its size
-# and as the turn it makes over the piece.
+# Smaller jumps are taken for rounding: the first is that of the tangent at a corner; the others are those of the
+# curvature at a break, as a share of its size and as the resulting turn over the piece.
 MIN_TANGENT_JUMP = 1e-6
 MIN_CURVATURE_JUMP = 1e-5
 MIN_TURN_JUMP = 1e-12
@@ -59,7 +59,7 @@ _FIT[0] *= 0.5
 def _gains() -> np.ndarray:
     """Return the integrals of the Chebyshev polynomials from -1 to the nodes and to 1, accurate near -1 too.
 
-    With x = -cos(phi), that of T_k is (-1)**k (S(k+1) - S(k-1)), S(n) = sin(n phi/2)**2/n.
+    With x = -cos(phi), the integral of T_k is (-1)**k (S(k+1) - S(k-1)), where S(n) = sin(n phi/2)**2/n.
     """
     phi = np.pi * np.append((TERMS - 0.5 - np.arange(TERMS)) / TERMS, 1.0)
     n = np.arange(-1, TERMS + 1)
@@ -97,7 +97,7 @@ class LevelCurve(NamedTuple):
 
 @Inner
 def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
-    """Fill a piece with tangents, curvatures, values and scales of F at all its points; whether all are finite.
+    """Fill a piece with tangents, curvatures, values and scales of F at all its points; return whether all are finite.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
 
 @Inner
 def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
-    """Solve for the piece of a given length from ``at``; whether that succeeds. ``at`` is moved onto F = 0."""
+    """Solve for the piece of a given length from ``at``, which is moved onto F = 0; return whether that succeeds."""
     half, sign = 0.5 * length, curve.sign
     piece[:2] = 0.0
     if not evaluate_points(curve, at, piece):
@@ -224,10 +224,11 @@ def compare(tx, tz, curvature, piece, end, length):  # type: ignore[no-untyped-d
 
 @Inner
 def _growth(values, size, noisy):  # type: ignore[no-untyped-def]
-    """Return the factor by which a piece would be just resolved in this row; negative if this piece is not resolved.
+    """Return the factor by which a piece could be longer and still be resolved in this row; negative if this piece is
+    not resolved.
 
     On a piece longer by this factor, coefficients would fall from ``size`` to the floor within ``IDEAL_TERMS`` terms.
-    ``noisy`` is the size of what the row is computed from.
+    ``noisy`` is the size of the terms from which the row is computed.
     """
     coefficients = np.zeros(TERMS)
     for k in range(TERMS):
@@ -250,10 +251,10 @@ def _growth(values, size, noisy):  # type: ignore[no-untyped-def]
 
 @Inner
 def growth(piece, length):  # type: ignore[no-untyped-def]
-    """Return by which factor the next piece may be longer; negative if this one is not resolved.
+    """Return the factor by which the next piece may be longer; negative if this one is not resolved.
 
     It is judged by the tangent and by the curvature, the least smooth rows of a chart. An error of the curvature counts
-    as the turn it makes over the piece, so that a straight piece is resolved.
+    as the turn that it causes over the piece, so that a straight piece is resolved.
     """
     if compare(piece[2, END], piece[3, END], piece[4, END], piece, 1, length) != SMOOTH:
         return -0.5  # between the last node and the end, F is not smooth

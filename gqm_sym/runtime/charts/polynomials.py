@@ -17,7 +17,7 @@ from gqm_sym.runtime.compiled.types import Array
 
 
 class PiecePolynomials(NamedTuple):
-    """A piece as it is written: the ends of its parameter, and the coefficients of x and z, lowest power first."""
+    """A piece as it is declared: the ends of its parameter, and the coefficients of x and z, lowest power first."""
 
     begin: str
     end: str
@@ -32,8 +32,8 @@ class Polynomials:
     Attributes
     ----------
     pieces : str
-        A line for each piece: both ends of its parameter u, then the coefficients of x and those of z in powers of u,
-        equally many, as decimal numbers separated by blanks. Pieces meet exactly.
+        A line for each piece: both ends of its parameter u, then the coefficients of x and as many of z, in powers of
+        u, as decimal numbers separated by blanks. Pieces meet exactly.
     origin : int
         The number of pieces before the place where arc length is 0.
     breaks : tuple of int
@@ -46,7 +46,7 @@ class Polynomials:
 
     @property
     def shaped_by(self) -> tuple[int, ...]:
-        """No run-time parameter."""
+        """No run-time parameter shapes the track."""
         return ()
 
     def chart(self, p: tuple[float, ...]) -> Chart:
@@ -84,7 +84,7 @@ def read_pieces(text: str) -> list[PiecePolynomials]:
 
 @lru_cache(maxsize=4)
 def _made(track: Polynomials) -> Chart:
-    """Return the chart; each polynomial becomes one or more of its pieces."""
+    """Return the chart, in which each polynomial becomes one or more pieces."""
     found: list[Pieces] = []
     parts: list[Indices] = []
     for number, piece in enumerate(read_pieces(track.pieces)):
@@ -103,7 +103,7 @@ def _made(track: Polynomials) -> Chart:
         angles.append(part.angles + 2.0 * np.pi * np.round(gap / (2.0 * np.pi)))
     which, lengths = np.concatenate(parts), np.concatenate([part.lengths for part in found])
     before = which < track.origin
-    # Arc length is summed from its origin in both directions, so that it has all digits near there.
+    # Arc length is summed from its origin in both directions, so that it is fully accurate near the origin.
     edges = np.append(-summed(lengths[before][::-1])[:0:-1], summed(lengths[~before]))
     joints = np.flatnonzero(np.diff(which)) + 1
     return assemble(

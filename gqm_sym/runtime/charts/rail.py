@@ -31,7 +31,7 @@ MAX_MISMATCH = 1e-9
 # The largest turn on a piece of the chart, in radians: the cosine of the angle is a polynomial there, to rounding.
 MAX_TURN = 1.0
 
-# The largest turn of one line, arc or clothoid, in radians: more is taken for a mistake.
+# The largest turn of one line, arc or clothoid, in radians; a larger one is taken for a mistake.
 MAX_TOTAL_TURN = 1e5
 _GAUSS = leggauss(16)
 
@@ -55,12 +55,12 @@ class Rail:
     Attributes
     ----------
     numbers
-        ``f(op, p)``: x, z and heading at the start where the rail is ``placed``, then for each piece those of
-        `PIECE_NUMBERS`, or the ends of a curve's parameter.
+        ``f(op, p)``: x, z and heading at the start if the rail is ``placed``, then for each piece the numbers that
+        `PIECE_NUMBERS` lists, or the ends of a curve's parameter.
     pieces : tuple of str
         "line", "arc", "clothoid", or "curve".
     placed : bool
-        Whether the start is given; else the first piece is a curve, whose place is known.
+        Whether the start is given; otherwise the first piece is a curve, which has a place of its own.
     segments : tuple of int
         Addresses of the compiled functions of the curves among the pieces, in order.
     formulas

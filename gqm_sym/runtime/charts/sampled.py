@@ -52,8 +52,8 @@ class Sampled:
     Attributes
     ----------
     points : str
-        x and z of the points one after the other, separated by blanks; of a track in space x, y and z, and of one with
-        a roll angle this behind them.
+        x and z of the points one after the other, separated by blanks; for a track in space x, y and z, followed by the
+        roll angle if there is one.
     kind : {"spline", "linear"}
         What lies between the points.
     closed : bool
@@ -72,7 +72,7 @@ class Sampled:
 
     @property
     def shaped_by(self) -> tuple[int, ...]:
-        """No run-time parameter."""
+        """No run-time parameter shapes the track."""
         return ()
 
     def chart(self, p: tuple[float, ...]) -> Chart:
@@ -80,11 +80,11 @@ class Sampled:
         return _made(self)[0]
 
     def is_exact(self, chart: Chart) -> bool:
-        """Return whether the track lies in the plane of x and z: one of polynomials is known exactly."""
+        """Return whether the track lies in the plane of x and z, where its polynomials are known exactly."""
         return not self.in_space
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
-        """Return the track in extended precision, by its points as written or by the coefficients of its spline."""
+        """Return the track in extended precision, from its points as written or from the coefficients of its spline."""
         spline = _made(self)[1]
         if spline is not None:
             return Parts(context, chart, lambda k: _exact_polynomial(context, spline.t, spline.c, k))
@@ -130,7 +130,8 @@ def sample_plane(begin, end, nodes):  # type: ignore[no-untyped-def]
 def sample_spline(t, c, place, nodes):  # type: ignore[no-untyped-def]
     """Return the samples of a piece of a spline with the knots t and the coefficients c, by de Boor's algorithm.
 
-    ``place`` is the index of the piece's first knot, and where it begins and ends in the spline's parameter.
+    ``place`` contains the index of the piece's first knot, and the values of the spline's parameter at which the piece
+    begins and ends.
     """
     k, begin, end = place
     samples, terms = np.empty((2, 2, NODES_OF_PIECES)), np.empty((DEGREE + 1, 2))
@@ -156,7 +157,9 @@ def sample_spline(t, c, place, nodes):  # type: ignore[no-untyped-def]
 
 
 def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
-    """The polynomial of a spline on [t_k, t_(k+1)] in powers of the share of that interval, by de Boor's algorithm."""
+    """Return the polynomial of a spline on [t_k, t_(k+1)] in powers of the share of that interval, by de Boor's
+    algorithm.
+    """
     knots = [context.mpf(float(knot)) for knot in t[k - DEGREE : k + DEGREE + 1]]
     unit = knots[DEGREE + 1] - knots[DEGREE]
     rows = []
@@ -175,11 +178,11 @@ def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
 
 @lru_cache(maxsize=4)
 def _made(track: Sampled) -> tuple[Chart, Any]:
-    """The chart of a track, and its spline; None for stitched planes."""
+    """Return the chart of a track, and its spline; None for stitched planes."""
     points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2 + track.in_space + track.banked)
     if track.closed:
         points = np.concatenate([points, points[:1]])
-    if track.banked:  # from point to point by less than half a turn: after a lap it may be another one by whole turns
+    if track.banked:  # roll changes by less than half a turn from point to point
         points[:, ROLL] = np.unwrap(points[:, ROLL])
     return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
 
@@ -191,7 +194,8 @@ def _planes(points: Array, closed: bool) -> Chart:
     edges = summed(lengths)
     angles = np.repeat(np.arctan2(steps[:, 1], steps[:, 0])[:, None], NODES.size, axis=1)
     angles = unwrapped(angles, float(angles[0, 0]))
-    # The turn at each point, from the plane before it to the one after it. Before the first point is the last plane.
+    # The turn at each point, from the plane before it to the one after it. The plane before the first point is the last
+    # one.
     turns = np.diff(angles[:, 0], prepend=angles[-1, 0])
     turns[0] = np.remainder(turns[0] + np.pi, 2.0 * np.pi) - np.pi
     shorter = np.minimum(np.roll(lengths, 1), lengths)
@@ -217,7 +221,7 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
         knots = summed(lengths)
         if change <= MAX_LAST_CHANGE:
             break
-    # What a lap adds to a roll angle is linear, and the rest is periodic.
+    # The increase of the roll angle over a lap is taken as linear, and the rest is periodic.
     rates = (points[-1] - points[0]) / knots[-1] if closed else np.zeros(points.shape[1])
     points, knots = _thinned(points - rates * knots[:, None], knots, closed)
     terms = _polynomials(points, knots, closed)
@@ -229,7 +233,8 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     edges, turn = summed(pieces.lengths), 0.0
     if closed:
         turn = 2.0 * np.pi * round((pieces.angles[-1, 0] - pieces.angles[0, -1]) / (2.0 * np.pi))
-    # The fifth derivative jumps at the points: panels across them would see noise from 1e-7 of the integrand on.
+    # The fifth derivative jumps at the points; on panels across them, the coefficients would stop decreasing at 1e-7 of
+    # the integrand.
     breaks = edges[:-1] if closed else edges[1:-1]
     spline = _interpolated(points, knots, closed)
     parts = np.searchsorted(spline.t, pieces.places.mean(axis=1), side="right") - 1
@@ -249,7 +254,8 @@ def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
             first = first * place + value
             value = value * place + part[:, :, power].T[:, :, None]
         speed = np.sqrt((first[:ROLL] ** 2).sum(axis=0))
-        # By arc length all columns change as the coordinates do; the speed's own derivatives are gain and growth.
+        # All columns are differentiated with respect to arc length, as the coordinates are; gain and growth are the
+        # derivatives of the speed.
         tangent = first / speed
         gain = (tangent * second)[:ROLL].sum(axis=0)
         bend = (second - tangent * gain) / (speed * speed)
@@ -276,10 +282,10 @@ def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
 
 
 def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
-    """Leave out every second point as long as the spline through the others passes through all points to rounding.
+    """Omit every second point as long as the spline through the others passes through all points to rounding.
 
-    The curvature of a spline has the rounding of its points divided by the square of their distance. So points that are
-    closer than necessary make it worse.
+    The rounding error of a spline's curvature is that of its points divided by the square of their distance. So points
+    that are closer than necessary make it less accurate.
     """
     while len(knots) > MIN_POINTS:
         used = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
@@ -319,7 +325,9 @@ def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
 
 
 def _polynomials(points: Array, knots: Array, closed: bool) -> Array:
-    """Coefficients of all coordinates between the points, in powers of the distance from the one before."""
+    """Return the coefficients of all coordinates between the points, in powers of the distance from the point
+    before.
+    """
     spline = _interpolated(points, knots, closed)
     terms = np.empty((knots.size - 1, points.shape[1], DEGREE + 1))
     share = 1.0
@@ -340,7 +348,7 @@ def velocity(terms, t):  # type: ignore[no-untyped-def]
 
 @entry(types.float64[::1](types.float64[::1], types.float64[:, :, ::1]))
 def _measure(knots, terms):  # type: ignore[no-untyped-def]
-    """The length of each polynomial, by Simpson's rule with one step of Richardson's extrapolation."""
+    """Return the length of each polynomial, by Simpson's rule with one step of Richardson's extrapolation."""
     out = np.empty(knots.size - 1)
     for k in range(out.size):
         width = knots[k + 1] - knots[k]

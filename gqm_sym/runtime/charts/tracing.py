@@ -2,7 +2,7 @@
 
 The parameter is arc length, 0 at the start point, and grows along ±(-F_z, F_x)/|grad F|; for the upper sign the
 curvature is the Hessian form (F_xx F_z**2 - 2 F_xz F_x F_z + F_zz F_x**2)/|grad F|**3, for the lower its negative
-(paper, eq. 36; ERRATA A9). Pieces, and how they are solved, are in `level_pieces`; `continuation` lays them one by one.
+(paper, eq. 36; ERRATA A9). `level_pieces` solves for a piece, and `continuation` lays pieces one by one.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,8 @@ from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
 from gqm_sym.runtime.double_double.recording import bind, record_in_plane
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
-# The largest distance of a start point from the curve, as a share of its larger coordinate; it is moved onto the curve.
+# The largest distance of a start point from the curve, as a share of its larger coordinate; a nearer point is moved
+# onto the curve.
 MAX_DISTANCE = 1e-6
 
 # Newton steps from a start point to the foot of the perpendicular; they have converged below this share.
@@ -47,7 +48,9 @@ MIN_GRADIENT_SCALE = 1e-9
 
 @entry(VECTOR(types.int64, VECTOR, types.float64, VECTOR))
 def _rows_at(field, p, sign, at):  # type: ignore[no-untyped-def]
-    """Return whether all is finite, then what `evaluate_points` fills at a place (x and z as two doubles each)."""
+    """Return whether all values are finite, and the rows that `evaluate_points` fills at a place (x and z as two
+    doubles each).
+    """
     piece = np.zeros((PIECE_ROWS, POINTS))
     found = evaluate_points(LevelCurve(field, p, sign), at, piece)
     out = piece[:, ANCHOR].copy()
@@ -69,9 +72,9 @@ class Side(NamedTuple):
     angles, curvatures : (n, TERMS) arrays
         At the nodes.
     jumps : (n+1,) array
-        What is at the edges, as `continuation.trace_one_way` returns it.
+        The kinds of the edges, as `continuation.trace_one_way` returns them.
     end : int
-        What is at the far end, as `continuation.trace_one_way` returns it.
+        The code for the far end, as `continuation.trace_one_way` returns it.
     """
 
     edges: Array
@@ -128,9 +131,9 @@ class Traced:
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Trace the curve.
 
-        It is followed each way until it closes, to a singular point (grad F = 0), or to the end of its domain. Without
-        a domain it is followed over `continuation.MAX_PIECES` pieces or `continuation.MAX_REACH` times the length of
-        the first. It also ends where F is no longer real.
+        It is followed in each direction until it closes or reaches a singular point (grad F = 0) or the end of its
+        domain. Without a domain it is followed over `continuation.MAX_PIECES` pieces or `continuation.MAX_REACH` times
+        the length of the first. It also ends where F is no longer real.
 
         Raises
         ------
@@ -150,7 +153,7 @@ class Traced:
         return assemble(**both, ends=(_what(behind.end), _what(ahead.end)))
 
     def is_exact(self, chart: Chart) -> bool:
-        """Whether F is smooth everywhere on the chart."""
+        """Return whether F is smooth everywhere on the chart."""
         return chart.breaks.size == 0
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> "Zeros":
@@ -228,7 +231,8 @@ class Traced:
             )
         tangents, curvatures = nodes[:, :2], nodes[:, 2]
         if end == SINGULAR and last[3] > 0.0:
-            # The rest of the way to the singular point, which is far shorter than the radius of curvature.
+            # A straight piece covers the rest of the way to the singular point, which is far shorter than the radius of
+            # curvature.
             edges, jumps = np.append(edges, edges[-1] + last[3]), np.append(jumps, SMOOTH)
             beyond = anchors[-1] + last[3] * np.array([last[0], 0.0, last[1], 0.0])
             anchors = np.append(anchors, [beyond], axis=0)
@@ -271,7 +275,9 @@ class Zeros:
         return
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
-        """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent there."""
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
+        there.
+        """
         context, at_x, at_z = self._context, x, z
         enough = context.ldexp(size, -context.prec // 2)
         for _ in range(MAX_STEPS):
@@ -290,10 +296,10 @@ class Zeros:
 
 @Inner
 def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-def]
-    """Fill the points where the normals of a piece of a chart meet F = 0, by Newton's method; returns their error.
+    """Fill the points at which the normals of a piece of a chart meet F = 0, by Newton's method; return their error.
 
-    The first steps are the rounding of the chart. ``places`` are rows of two doubles each; the rows that are filled are
-    x, z, their low doubles, and the derivatives of the chart's coordinates.
+    The first steps correct the rounding of the chart. ``places`` are rows of two doubles each; the rows that are filled
+    are x, z, their low doubles, and the derivatives of the chart's coordinates.
     """
     address, operations, parts, (_, place, value, by_x, by_z, _) = tape
     start, n = EDGES + 3 * int(block[1]) + 2 + k * RECORD, places.shape[1]
@@ -321,7 +327,7 @@ def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-de
             for row, rate in ((0, dz), (1, -dx)):
                 high, low = product(step, rate)
                 out[row, i], out[2 + row, i] = add(out[row, i], out[2 + row, i], high, low + step_low * rate)
-            # The step was exact except for this share of it.
+            # The relative error of the step is at most this.
             doubt = work[value + ERROR + i] + 1e-14 * fabs(work[value + i])
             error = max(error, doubt / fabs(slope) * sqrt(dx * dx + dz * dz))
     return error
@@ -329,10 +335,11 @@ def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-de
 
 @entry(SAMPLES(INTEGER, INTEGER, VECTOR, TAPE, VECTOR, MATRIX, MATRIX))
 def sample_level(k, following, block, tape, work, p, nodes):  # type: ignore[no-untyped-def]
-    """Return the samples of a piece of a curve F = 0: where the normals of the chart meet it (`pieces.Samples`).
+    """Return the samples of a piece of a curve F = 0, the points at which the normals of the chart meet it
+    (`pieces.Samples`).
 
-    Normals at the common edge of two pieces differ by rounding. So the piece is sampled to where the ``following`` one
-    (negative if there is none) begins.
+    Normals at the common edge of two pieces differ by rounding. So the piece is sampled up to the beginning of the
+    ``following`` one (negative if there is none).
     """
     fill_parameters(tape, p, work)
     places, out = nodes.copy(), np.empty((6, NODES_OF_PIECES))
@@ -364,7 +371,7 @@ def _what(end: int) -> str:
 def _closed(loop: Side) -> Chart:
     """Return the chart of a closed curve, from half a period before the start to half a period after it.
 
-    So places on both sides of the start keep all their digits. The edges are moved without rounding.
+    In this way places on both sides of the start keep all their digits. The edges are moved without rounding.
     """
     period = float(loop.edges[-1])
     turn = 2.0 * pi * round((loop.angles[-1, 0] - loop.angles[0, -1]) / (2.0 * pi))

@@ -1,4 +1,5 @@
-"""The track of a train: its chart is followed by the chart of the mean height of a train with its middle at a place.
+"""The track of a train: its chart is followed by a chart of the train's mean height as a function of the place of its
+middle.
 
 The mean height h(s) of a train of length l is the mean of z over [s - l/2, s + l/2], so that h' and h'' are the divided
 differences of z and dz/ds over its ends. These keep all their digits however short the train is. A piece of the chart
@@ -20,9 +21,9 @@ from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows, divd
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 
-# Edges nearer to each other than this share of the track are one: they differ by rounding.
+# Edges nearer to each other than this share of the track count as one, because they differ by rounding only.
 SAME_EDGE = 1e-13
-# How much wider a piece may be than the next one.
+# The largest ratio of the widths of neighbouring pieces.
 MAX_RATIO = 16.0
 
 
@@ -39,7 +40,7 @@ class TrackOfTrain:
     numbers
         ``f(op, p)``: the length of the train, the acceleration of gravity, and the coefficient of friction.
     length : int
-        The place of the length among the run-time parameters.
+        The index of the length among the run-time parameters.
     """
 
     track: ChartMaker
@@ -90,11 +91,11 @@ class TrackOfTrain:
         return False
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Any:
-        """Return None: there is no such thing."""
+        """Return None, because the mean height is known in doubles only."""
         return None
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> Any:
-        """Return None: there is no such thing."""
+        """Return None, because the mean height is known in doubles only."""
         return None
 
 
@@ -104,7 +105,9 @@ def _inside(places: Array, edges: Array) -> Array:
 
 
 def _merged(places: Array, whole: float) -> Array:
-    """Return places in order, of those that differ by rounding the first; the last one is kept."""
+    """Return places in ascending order, only the first of those that differ by rounding; the last place is always
+    kept.
+    """
     places = np.sort(places)
     kept = np.append(np.diff(places) > SAME_EDGE * whole, True)
     kept[0] = True
@@ -115,7 +118,9 @@ def _merged(places: Array, whole: float) -> Array:
 
 
 def _edges(track: Chart, places: Array, length: float) -> Array:
-    """Return where the middle of the train is when one of its ends passes some places, and the ends of its range."""
+    """Return the places of the train's middle at which one of its ends passes given places, and the ends of the
+    middle's range.
+    """
     ends = np.concatenate([places - 0.5 * length, places + 0.5 * length])
     if track.period:
         low, high = track.low, track.low + track.period
@@ -126,10 +131,10 @@ def _edges(track: Chart, places: Array, length: float) -> Array:
 
 
 def _graded(edges: Array, is_closed: bool) -> Array:
-    """Return edges with more between them, so that no piece is much wider than the next one.
+    """Return edges with further ones between them, so that no piece is much wider than the next one.
 
-    A piece has the digits that its width needs, and a body that turns just behind an edge has not run farther than
-    over the narrow piece before it.
+    The values on a piece are only as accurate as its width requires, and a body that turns just beyond an edge may have
+    moved over no more than the narrow piece before it.
     """
     while True:
         widths = np.diff(edges)
@@ -180,7 +185,7 @@ def _mean_height(track: Chart, edges: Array, length: float) -> Array:
 
 
 def _first_height(track: Chart, block: Array, middle: float, length: float) -> float:
-    """Return the mean height of the train where its chart begins."""
+    """Return the mean height of the train at the beginning of its chart."""
     back, front = middle - 0.5 * length, middle + 0.5 * length
     laps = (-1.0, 0.0, 1.0) if track.period else (0.0,)
     edges = np.concatenate([track.edges + lap * track.period for lap in laps])

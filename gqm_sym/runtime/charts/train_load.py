@@ -1,4 +1,6 @@
-"""The contact force on the cars of a train, by which friction acts on each: what generated modules call."""
+"""The contact force on the cars of a train, which determines the friction on each car. Generated modules call these
+functions.
+"""
 
 from math import fabs, sqrt
 
@@ -15,7 +17,7 @@ def _place_of_car(s, length, cars, car):  # type: ignore[no-untyped-def]
 
 @Inner
 def train_load(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """The mean of |N|/m over the cars of a train with its middle at s, where V**2 = w."""
+    """Return the mean of |N|/m over the cars of a train with its middle at s, where V**2 = w."""
     total = 0.0
     for car in range(cars):
         force, _, _ = _force_on_car((along_x, along_y, along_z), _place_of_car(s, length, cars, car), w, g)
@@ -25,13 +27,13 @@ def train_load(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignor
 
 @Inner
 def train_load_slope(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """The derivative of `train_load` by w."""
+    """Return the derivative of `train_load` by w."""
     return _change_of_load((along_x, along_y, along_z), s, w, length, cars, g, 0)
 
 
 @Inner
 def train_load_rate(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """The derivative of `train_load` by s."""
+    """Return the derivative of `train_load` by s."""
     return _change_of_load((along_x, along_y, along_z), s, w, length, cars, g, 1)
 
 
@@ -49,7 +51,7 @@ def _change_of_load(along, s, w, length, cars, g, which):  # type: ignore[no-unt
 
 @Inlined
 def _force_on_car(along, s, w, g):  # type: ignore[no-untyped-def]
-    """Return N/m at a place, and its derivatives by w and by s but for parts along the track."""
+    """Return N/m at a place, and its derivatives by w and by s without their components along the track."""
     along_x, along_y, along_z = along
     k, u, laps = find(along_z, s)
     tx, kx, cx = derivatives_at(along_x, k, u, laps)
@@ -66,7 +68,7 @@ def _force_on_car(along, s, w, g):  # type: ignore[no-untyped-def]
 
 @Inner
 def train_load_in_plane(chart, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """The mean of |N|/m over the cars of a train on a planar track."""
+    """Return the mean of |N|/m over the cars of a train on a planar track."""
     total = 0.0
     for car in range(cars):
         angle, kappa, _ = derivatives_at(chart, *find(chart, _place_of_car(s, length, cars, car)))
@@ -76,7 +78,7 @@ def train_load_in_plane(chart, s, w, length, cars, g):  # type: ignore[no-untype
 
 @Inner
 def train_load_slope_in_plane(chart, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """The derivative of `train_load_in_plane` by w."""
+    """Return the derivative of `train_load_in_plane` by w."""
     total = 0.0
     for car in range(cars):
         angle, kappa, _ = derivatives_at(chart, *find(chart, _place_of_car(s, length, cars, car)))

@@ -1,7 +1,7 @@
 """Arrays that grow while they are filled.
 
-Elements are copied one by one: for ``out[:n] = array`` numba compiles five seconds of text functions, which say of what
-shape an array was that does not fit.
+Elements are copied one by one, because for ``out[:n] = array`` numba spends five seconds on compiling the message about
+an array of the wrong shape.
 """
 
 import numpy as np

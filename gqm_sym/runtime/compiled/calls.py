@@ -32,7 +32,9 @@ def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
 
 def _caller(function: str) -> Any:
-    """The intrinsic that calls a function of the interface at an address, with as many arguments as that one takes."""
+    """Return the intrinsic that calls a function of the interface at an address, with as many arguments as that
+    function takes.
+    """
 
     def call(_: Any, address: Any, *arguments: Any) -> Any:
         return types.void(address, *arguments), _call
@@ -75,8 +77,8 @@ call_field = _caller("field")
 def call_speed_equation(_, address, n, work, rows, v, nu, p):  # type: ignore[no-untyped-def]
     """Fill ds/dlam, P, Q, n0 and kappa for a leg of signs v and nu.
 
-    ``rows`` are the positions in the array ``work`` at which the places begin, V**2, and the results: numba would count
-    references to views.
+    ``rows`` are the positions in the array ``work`` at which the places, V**2 and the results begin. They replace
+    views, to which numba would count references.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -23,20 +23,20 @@ from gqm_sym.runtime.compiled.numba_internals import GENERATED
 from gqm_sym.runtime.compiled.uncompiled import Trial, go_on, paused, plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
-# The time in seconds that Python may spend on a function of a generated module before it is compiled, which takes some
-# 0.2 s.
+# The time in seconds that Python may spend on running a function of a generated module before the function is compiled.
+# Compiling takes some 0.2 s.
 MAX_PYTHON_TIME = 0.02
 
 
 @cache
 def _c_function(signature: Any) -> Any:
-    """The type of C's functions with numba's signature."""
+    """Return the type of C's functions with numba's signature."""
     kinds: dict[Any, Any] = {types.float64: ctypes.c_double, types.intp: ctypes.c_ssize_t}
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 
-# The memory cells with the addresses of all functions. None of it is freed, so that an address always means one
-# function: what is computed with it may be kept under it.
+# The memory cells with the addresses of all functions. None of them is freed, so that an address always means the same
+# function and results may be stored under it.
 _SLOTS: list[ctypes.c_void_p] = []
 
 # The functions that may be called by address, by the cells of their addresses.
@@ -50,7 +50,7 @@ def run_at(address: int, *arguments: Any) -> None:
 
 
 class Emitted:
-    """A function of a generated module, which compiled code calls by the address in the cell ``address``.
+    """A function of a generated module that compiled code calls by the address in the cell ``address``.
 
     Python runs it at first, unless its compiled code is in the cache; it is compiled when that has taken some time. The
     results are the same to the last bit (`uncompiled`).
@@ -62,7 +62,7 @@ class Emitted:
     signature
         numba's signature: it returns nothing, and takes numbers and pointers to numbers.
     text : str, optional
-        The text of the function, if it may contain powers.
+        The source text of the function, needed if it may contain powers.
     alias : str, optional
         The name under which numba sees its module, if it is another one.
     """
@@ -79,19 +79,19 @@ class Emitted:
 
     @property
     def address(self) -> int:
-        """Return the cell with the address of the code, which exists from now on."""
+        """Make code for the function if there is none yet, and return the cell with its address."""
         self._begin()
         return ctypes.addressof(self._slot)
 
     @property
     def call(self) -> Callable[..., None]:
-        """The function for callers in Python, who pass pointers of `ctypes`."""
+        """The function for callers in Python, which pass pointers of `ctypes`."""
         self._begin()
         function: Callable[..., None] = _c_function(self.signature)(self._slot.value)
         return function
 
     def compile(self) -> None:
-        """Compile the function, if it is not compiled yet; callers take the compiled one from now on."""
+        """Compile the function if it is not compiled yet; from now on callers use the compiled function."""
         with jit.COMPILING:
             if self._compiled is not None:
                 return
@@ -109,7 +109,7 @@ class Emitted:
         return self.function
 
     def _begin(self) -> None:
-        """Find code for the function, unless there is some: that of the cache, or Python's."""
+        """Provide code for the function if there is none yet: compiled code from the cache, or Python's."""
         if self._slot.value:
             return
         record = jit.COMPILER.record(self._as_numba_sees_it(), self.signature)
@@ -123,7 +123,7 @@ class Emitted:
         self._slot.value = ctypes.cast(self._called_from_c, ctypes.c_void_p).value
 
     def run(self, *arguments: Any) -> None:
-        """Run the function in Python, or what is compiled in its place by now; pointers are given as integers."""
+        """Run the function in Python, or its compiled code if there is some by now; pointers are given as integers."""
         self._begin()
         if self._compiled is None:
             if not self._trial.is_over():
@@ -132,7 +132,7 @@ class Emitted:
                     self._plain(*arguments)
                     self._trial.left -= time.perf_counter() - started
                     return
-                except (ArithmeticError, ValueError):  # where compiled code goes on
+                except (ArithmeticError, ValueError):  # compiled code has no exceptions and goes on here
                     pass
             self.compile()
         self.call(*arguments)
@@ -144,22 +144,26 @@ class Emitted:
             jit.RAISED[threading.get_ident()] = error
 
 
-# The functions of generated modules that are in use, by their text: modules with the same function share it.
+# The functions of generated modules that are in use, by their text, so that modules with the same function share it.
 _IN_USE: WeakValueDictionary[str, Emitted] = WeakValueDictionary()
 
-# Where a function of a generated module finds what other functions of the runtime's stamp are made of.
+# Modules whose contents are covered by the stamp of compiled code, or never change.
 _KNOWN = ("gqm_sym.runtime.", "numba.", "math.", "builtins.")
 
 
 def _is_known(function: Any, name: str) -> bool:
-    """Whether a function uses a name for what the stamp of its code knows, or what never changes."""
+    """Return whether a name in a function refers to something that is covered by the stamp of its code, or that never
+    changes.
+    """
     found = vars(builtins).get(name, function.__globals__.get(name))
     home = getattr(getattr(found, "py_func", found), "__module__", None)
     return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
 
 
 def _text(function: Any, lines: list[str]) -> list[str]:
-    """The lines of a function with its decorators; all lines if the function uses anything else of the module."""
+    """Return the lines of a function with its decorators; all lines of the module if the function uses anything else of
+    it.
+    """
     if not all(_is_known(function, name) for name in function.__code__.co_names):
         return lines
     begin = function.__code__.co_firstlineno - 1
@@ -171,11 +175,11 @@ def _text(function: Any, lines: list[str]) -> list[str]:
 def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Emitted]]:
     """Return a decorator factory for the functions of one generated module: ``compiled(signature)``.
 
-    Each function becomes an `Emitted`: Python runs it until it is worth compiling.
+    Each function becomes an `Emitted`, which Python runs until it is worth compiling.
 
     numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
-    it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
-    that is made from the function's own text. Other changes of the module cause no compilation.
+    it. A generated module may be imported under any name and from any folder. So numba sees each function under a name
+    that is made from the function's own text, and other changes of the module cause no compilation.
 
     Parameters
     ----------

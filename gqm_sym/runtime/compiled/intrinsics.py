@@ -62,7 +62,9 @@ def from_bits(_, n):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def item_at(_, array, index):  # type: ignore[no-untyped-def]
-    """Return ``array[index]`` of a contiguous array and an index that is not negative, which numba would test for."""
+    """Return ``array[index]`` for a contiguous array and an index that is not negative, without numba's test of its
+    sign.
+    """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         data = context.make_array(signature.args[0])(context, builder, args[0]).data
@@ -73,7 +75,9 @@ def item_at(_, array, index):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
-    """Return ``x if condition else y``, both computed: a branch would keep a loop from being vectorised."""
+    """Return ``x if condition else y``, where both are computed, because a branch would keep a loop from being
+    vectorised.
+    """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.select(*args)

@@ -1,6 +1,6 @@
 """Decorators that compile functions, and the compiler options of all of them.
 
-No fast-math: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here.
+Fast-math is off: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here.
 Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
@@ -33,7 +33,7 @@ def stamp_for(function: Any) -> str:
 
 
 class Announcer:
-    """Says on standard error that something is compiled for this machine, if that takes long.
+    """An object that says on standard error that something is being compiled for this machine, if that takes long.
 
     Parameters
     ----------
@@ -46,7 +46,9 @@ class Announcer:
         self._own = threading.local()
 
     def begin(self, function: Any) -> None:
-        """Note that a function is compiled; those that are compiled for it belong to it."""
+        """Note that the compilation of a function begins; functions that are compiled on its behalf count as part of
+        it.
+        """
         if getattr(self._own, "done", None) is None:
             self._own.done = threading.Event()
             room = function.__module__.removeprefix(f"{RUNTIME}.")
@@ -54,7 +56,7 @@ class Announcer:
             threading.Thread(target=self._watch, args=(what, self._own.done), daemon=True).start()
 
     def end(self) -> None:
-        """Note that nothing is compiled in this thread any more."""
+        """Note that the compilation in this thread has ended."""
         done = getattr(self._own, "done", None)
         if done is not None:
             done.set()
@@ -73,16 +75,17 @@ ANNOUNCER = Announcer()
 COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), ANNOUNCER.begin)
 
 
-# Held while a function is compiled: threads that need the same one wait for it. What has been compiled once must stay,
-# for other threads may be running it.
+# This lock is held while a function is compiled, and threads that need the same function wait for it. A compiled
+# function must not be replaced, because other threads may be running it.
 COMPILING = threading.RLock()
 
-# What was raised where compiled code had called Python, by thread: Python has no way to raise it through compiled code.
+# Exceptions raised in Python code that compiled code had called, by thread. Python cannot pass them through compiled
+# code.
 RAISED: dict[int, BaseException] = {}
 
 
 def raise_raised() -> None:
-    """Raise what was raised while compiled code ran in this thread."""
+    """Raise the exception that was raised while compiled code ran in this thread, if there is one."""
     raised = RAISED.pop(threading.get_ident(), None)
     if raised is not None:
         raise raised
@@ -91,8 +94,8 @@ def raise_raised() -> None:
 class Inner:
     """A function that other compiled functions call.
 
-    Its numba dispatcher is made when such a function is compiled, or when Python calls it: code from the cache never
-    needs it.
+    Its numba dispatcher is made only when one of its callers is compiled or when Python calls it; code from the cache
+    never needs it.
     """
 
     forceinline = False
@@ -106,7 +109,7 @@ class Inner:
 
     @property
     def dispatcher(self) -> Any:
-        """The function as numba's dispatcher, for compiled callers."""
+        """The function as a dispatcher of numba, for compiled callers."""
         if self._dispatcher is None:
             self._dispatcher = COMPILER.inner(self.py_func, forceinline=self.forceinline)
         return self._dispatcher
@@ -140,12 +143,13 @@ def _type_of_inner(value: Inner, _: Any) -> Any:
     return types.Dispatcher(value.dispatcher)
 
 
-# The time in seconds that Python may spend on an entry point before it is compiled, which takes some seconds.
+# The time in seconds that Python may spend on running an entry point before it is compiled. Compiling takes some
+# seconds.
 MAX_PYTHON_TIME = 2.0
 
 
 def _plain_entry(function: Any, signature: Any) -> PlainEntry:
-    """An entry point as plain Python, unless its compiled code is in the cache."""
+    """Return an entry point as plain Python; None if its compiled code is in the cache or it must be compiled."""
     record = COMPILER.record(function, signature)
     if record is None:
         raise NotPlainError
@@ -165,8 +169,8 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
     nogil : bool
         Whether other threads of Python may run while the function does.
     checked : bool
-        Whether numba checks that arrays are contiguous and of doubles, which takes half a microsecond. It is switched
-        off for the functions that every launch calls, each of which is called in a single place.
+        Whether numba checks that arrays are contiguous and of doubles, which takes half a microsecond. The check is
+        switched off for the functions that every launch calls, each of which is called in a single place.
     """
 
     def decorate(function: Any) -> Callable[..., Any]:

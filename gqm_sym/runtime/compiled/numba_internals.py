@@ -131,10 +131,10 @@ class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
                 manager.run(function, builder)
 
     def _optimize_final_module(self) -> None:
-        """Optimise all functions together, as far as LLVM goes where nobody else can call those that were linked.
+        """Optimise all functions together, as thoroughly as LLVM does if no other code can call the linked ones.
 
-        They take other arguments then, so that they must not have a symbol either: code that is compiled later, such as
-        a function of a user's own that calls the same ones, would find and call them by it.
+        LLVM may change the arguments of these functions. So they must not keep a symbol either: code that is compiled
+        later, such as a user's own function that calls the same ones, would find them by it.
         """
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
@@ -151,7 +151,7 @@ class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 class _NoEnvironments:
-    """Takes the place of a code generator if no code could read an environment."""
+    """A stand-in for a code generator, used if no code could read an environment."""
 
     def set_env(self, name: str, environment: Any) -> None:
         """Do nothing."""
@@ -229,7 +229,7 @@ class LinkedPipeline(CallbackPipeline):
 
 
 class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
-    """Files of one function's compiled code: one for each key, which is named by the key and holds it.
+    """The files of one function's compiled code: one for each key, which is named by the key and contains it.
 
     numba's own scheme numbers the files in an index that is written before the code. Processes that compile versions of
     a function at the same time may give both the same number, and a process that is killed in between leaves the number
@@ -241,7 +241,7 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
         self._base, self._stamp = base, source_stamp
 
     def file_name(self, key: Any) -> str:
-        """Name of the file that belongs to a key."""
+        """Return the name of the file that belongs to a key."""
         digest = hashlib.sha256(repr((numba.__version__, self._stamp, key)).encode()).hexdigest()[:16]
         return f"{self._base}.{digest}.nbc"
 
@@ -254,12 +254,14 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
             record.unlink(missing_ok=True)
 
     def record(self, key: Any) -> Path | None:
-        """The file with one byte for each launch in which Python has run the function; None if its code is stored."""
+        """Return the file with one byte for each launch in which Python ran the function; None if its code is
+        stored.
+        """
         code = Path(self._data_path(self.file_name(key)))
         return None if code.exists() else code.with_suffix(".launches")
 
     def load(self, key: Any) -> Any:
-        """Read the compiled code that was stored under a key; None where there is none."""
+        """Read the compiled code that was stored under a key; return None if there is none."""
         try:
             with Path(self._data_path(self.file_name(key))).open("rb") as file:
                 stamp, stored_key, data = _Reader(file).load()
@@ -276,8 +278,8 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
     compiled code contains functions of several files: the key holds ``stamp``, the digest of the files that it may come
     from (`stamps`), and the name of the function's module. For a function of a generated module that name is made from
     its text (`jit.compiler`), which alone identifies it: where all machine code is in one folder (``NUMBA_CACHE_DIR``),
-    modules with the same function share it. A file that cannot be read is compiled again, and a file that cannot be
-    written is left out.
+    modules with the same function share it. A function whose file cannot be read is compiled again, and a file that
+    cannot be written is not stored.
 
     Parameters
     ----------
@@ -305,7 +307,9 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
         return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp, self._linked)
 
     def record(self, sig: Any) -> Path | None:
-        """The file with one byte for each launch in which Python has run the function; None if its code is stored."""
+        """Return the file with one byte for each launch in which Python ran the function; None if its code is
+        stored.
+        """
         target: Any = ccallback.CFunc._targetdescr  # type: ignore[attr-defined]
         found: Path | None = self._cache_file.record(self._index_key(sig, target.target_context.codegen()))
         return found
@@ -328,7 +332,7 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
                 return load(sig, target_context)
             with _libraries(target_context.codegen(), LinkedLibrary if self._linked else JITCodeLibrary):
                 return load(sig, target_context)
-        except Exception:  # whatever unpickling does with a file that was cut off or overwritten
+        except Exception:  # unpickling a truncated or overwritten file may raise anything
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -338,12 +342,12 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
 
 
 def _steps(pipeline: type[Any]) -> dict[str, Any]:
-    """Return the option that has numba compile by these steps, where it has what they need."""
+    """Return the option that makes numba compile by these steps, if numba has the names that they need."""
     return {"pipeline_class": pipeline} if HAS_LIBRARIES else {}
 
 
 class Compiler:
-    """The way in which functions are compiled and cached; `jit` has the only one.
+    """The way in which functions are compiled and cached; `jit` has the only instance.
 
     Parameters
     ----------
@@ -359,7 +363,9 @@ class Compiler:
         self._options, self._stamp, self._on_miss = options, stamp, on_miss
 
     def cache_of(self, function: Any, *, linked: bool = False) -> Any:
-        """Return the disk cache of a function; None where no folder can be written, or numba lacks what it needs."""
+        """Return the disk cache of a function; None if no folder can be written or numba lacks the names that it
+        needs.
+        """
         if not HAS_CACHE:
             return None
         with suppress(RuntimeError, AttributeError):
@@ -387,7 +393,7 @@ class Compiler:
     def entry(self, function: Any, signature: Any, *, nogil: bool, checked: bool) -> Callable[..., Any]:
         """Compile a function that Python calls, for one signature.
 
-        Unless ``checked``, numba does not look whether arrays are of doubles and contiguous.
+        Unless ``checked``, numba does not check that arrays are contiguous and of doubles.
         """
         dispatcher = njit(nogil=nogil, **self._options, **_steps(EntryPipeline))(function)
         if self._attach(dispatcher, function):
@@ -404,7 +410,7 @@ class Compiler:
     def record(self, function: Any, signature: Any) -> Path | None:
         """Return the file with one byte for each launch in which Python has run a function, in all processes.
 
-        The function is called from Python or by address. None means that the cache has its code, as far as is known.
+        The function is called from Python or by address. The result is None if the cache is known to have its code.
         """
         cache = self.cache_of(function) if HAS_CALLBACKS else None
         return None if cache is None else cache.record(signature)
@@ -422,7 +428,7 @@ class Compiler:
         )
 
     def _attach(self, target: Any, function: Any, *, linked: bool = False) -> bool:
-        """Give numba's object a disk cache of ours; whether that was possible."""
+        """Give numba's object our disk cache; return whether that was possible."""
         cache = self.cache_of(function, linked=linked)
         possible = cache is not None and _has(target, "_cache")
         if possible:
@@ -432,20 +438,23 @@ class Compiler:
     def _by_public_cache(self, function: Any, make: Callable[[bool], Any]) -> Any:
         """Compile a function by numba's documented ways alone.
 
-        numba numbers the files of a function, and looks only whether the function's own file has changed. So the folder
-        is named by everything else that the code depends on, the processor included: in it there is one version only.
+        numba numbers the files of a function, and only notices changes of the function's own file. So the name of the
+        folder contains a digest of everything else that the code depends on, including the processor; each folder then
+        has one version only.
         """
         parts = (numba.__version__, self._stamp(function), function.__module__, llvmlite.binding.get_host_cpu_name())
         name = hashlib.sha256("\n".join((*parts, str(llvmlite.binding.get_host_cpu_features()))).encode()).hexdigest()
         with self._folder(Path(getfile(function)).parent, name[:16]) as usable:
             if usable:
-                with suppress(Exception):  # a damaged file; whatever else is wrong comes again below
+                with suppress(Exception):  # a damaged file; other errors are raised again below
                     return make(True)
             return make(False)
 
     @contextmanager
     def _folder(self, beside: Path, name: str) -> Iterator[bool]:
-        """Have numba cache in a folder of this name meanwhile; whether it can be written."""
+        """Make numba cache in a folder of this name during the ``with`` block, which gets whether the folder can be
+        written.
+        """
         with _CONFIG:
             before = numba.config.CACHE_DIR
             folder = Path(before or beside / "__pycache__") / f"gqm_sym_{name}"

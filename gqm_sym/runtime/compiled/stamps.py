@@ -1,7 +1,8 @@
 """The sources of compiled code: the files of the runtime whose code it may contain.
 
 A compiled function contains code of the functions that it calls, which are in its own file or in files that it imports,
-directly or through others. So an edit of one file compiles what imports it anew, and nothing else.
+directly or through others. So after an edit of one file, the functions of all files that import it are compiled again,
+and no others.
 """
 
 import hashlib
@@ -9,8 +10,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-# An import anywhere in a file: of names from another file, or of files from a room or from the runtime. What else is
-# found does no harm. A pattern that begins with plain text is found eight times as fast.
+# An import anywhere in a file: of names from another file, or of files from a room or from the runtime. Other matches
+# do no harm. A pattern that begins with plain text is found eight times as fast.
 _IMPORT = re.compile(rb"gqm_sym\.runtime(?:\.([\w.]+)| import (\w+))")
 
 RUNTIME = "gqm_sym.runtime"
@@ -51,7 +52,7 @@ class Stamps:
         return self._known[begin]
 
     def files(self, begin: tuple[str, ...]) -> set[str]:
-        """The files that some files import, directly or through others, and these themselves."""
+        """Return the given files and all files that they import, directly or through others."""
         found: set[str] = set()
         waiting = list(begin)
         while waiting:

@@ -1,4 +1,5 @@
-"""Columns of a sweep as compiled code reads them: an address and a step each, 0 if one number stands for all.
+"""Columns of a sweep as compiled code reads them: each is given by an address and a step, which is 0 if one number
+stands for all launches.
 
 Their order is that of the constants below: the launch (place, speed, direction); the target of ``time_at``; both ends
 of the curve's domain and its period; an axis of symmetry as two doubles (NaN if there is none that can be used) and the

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 REAL: Any = types.float64
 INTEGER: Any = types.int64
-# Contiguous arrays of doubles: one axis, two axes.
+# Contiguous arrays of doubles with one axis and with two axes.
 VECTOR: Any = types.float64[::1]
 MATRIX: Any = types.float64[:, ::1]
 # Addresses of a model's compiled functions: for one orbit, and for a batch of them.

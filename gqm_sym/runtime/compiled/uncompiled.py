@@ -1,11 +1,11 @@
-"""Functions that are compiled otherwise as plain Python, which gives the same bits.
+"""Functions that would otherwise be compiled, run as plain Python, which gives the same bits.
 
 Compiling a function of a generated module takes some 0.2 s, and Python runs it in some 20 microseconds a place.
 Compiling an entry point takes seconds, and Python runs it in milliseconds. So first answers come sooner if Python runs
-what is not in the cache of compiled code (`emitted.Emitted`, `jit.entry`).
+the functions that are not in the cache of compiled code (`emitted.Emitted`, `jit.entry`).
 
 Python's numbers are NumPy's here, which divide by zero as compiled code does, and elementary functions are those of the
-C library that compiled code calls. Functions that cannot be run so are left to the compiler.
+C library that compiled code calls. Functions that cannot be run in this way are left to the compiler.
 """
 
 import ast
@@ -36,7 +36,7 @@ _ELEMENTARY = {
     2: "atan2 hypot pow",
 }
 
-# What else a function may use, which means the same in Python.
+# Other names that a function may use because they mean the same in Python.
 _SAME = (abs, bool, enumerate, int, len, max, min, range, round, slice, math.copysign)
 _OF_NUMPY = "abs array empty floor full int64 maximum ones rint searchsorted zeros"
 _NUMPY = SimpleNamespace(
@@ -45,23 +45,23 @@ _NUMPY = SimpleNamespace(
 )
 
 
-# A function is compiled in the next launch that uses it after so many, which may have been in other processes.
+# A function is compiled in the first launch after so many launches that have used it, in this process or in others.
 MAX_LAUNCHES = 2
 
-# The time in seconds that one call of an entry point may take in Python, where the compiler takes some seconds.
+# The time in seconds that one call of an entry point may take in Python. The compiler takes some seconds.
 MAX_CALL = 1.5
 
 
 class NotPlainError(Exception):
-    """A function uses what Python cannot run to the same bits."""
+    """A function uses something that Python cannot run to the same bits."""
 
 
 class TooSlowError(Exception):
-    """Python has had all the time that it was given."""
+    """Python has used up the time that it was given."""
 
 
 class _Deadline(threading.local):
-    """When Python must have ended in this thread."""
+    """The time by which plain Python must end in this thread."""
 
     at = math.inf
 
@@ -102,14 +102,14 @@ class Trial:
         self._launch, self._launches, self._record = -1, 0, record
 
     def is_over(self) -> bool:
-        """Whether the function is to be compiled: after this time, or in the third launch that it is used for."""
+        """Return whether the function is to be compiled: after the given time, or in the third launch that uses it."""
         if self._launch != _LAUNCHES.count:
             self._launch = _LAUNCHES.count
             self._launches = max(self._launches, self._recorded()) + 1
         return self.left <= 0.0 or self._launches > MAX_LAUNCHES
 
     def _recorded(self) -> int:
-        """The number of launches in the record before this one."""
+        """Return the number of launches in the record before this one."""
         with suppress(OSError), self._record.open("ab") as file:
             return file.write(b".") and file.tell() - 1
         return 0
@@ -117,7 +117,7 @@ class Trial:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Let functions run as plain Python for so long, and no longer."""
+    """Let functions run as plain Python for at most this time."""
     before, _DEADLINE.at = _DEADLINE.at, time.perf_counter() + seconds
     try:
         yield
@@ -127,7 +127,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """Do not count the time meanwhile, in which something is compiled."""
+    """Exclude the time of the ``with`` block, in which something is compiled, from the time that Python may take."""
     started = time.perf_counter()
     try:
         yield
@@ -137,9 +137,10 @@ def paused() -> Iterator[None]:
 
 @contextmanager
 def sharing_arrays() -> Iterator[None]:
-    """Let no entry point run as plain Python in this thread, for others write into parts of the same arrays.
+    """Keep entry points from running as plain Python in this thread, because other threads write into parts of the same
+    arrays.
 
-    If plain Python gives up, its writes are undone, and so would be those of other threads.
+    If plain Python gives up, its writes are undone; those of other threads would be undone as well.
     """
     before, _SHARING.on = _SHARING.on, True
     try:
@@ -149,14 +150,14 @@ def sharing_arrays() -> Iterator[None]:
 
 
 def go_on() -> None:
-    """Raise TooSlowError if Python has had all the time that it was given."""
+    """Raise TooSlowError if Python has used up the time that it was given."""
     if time.perf_counter() > _DEADLINE.at:
         raise TooSlowError
 
 
 @cache
 def _of_library(name: str, arguments: int) -> Callable[..., float]:
-    """A function of the C library that returns and takes doubles."""
+    """Return a function of the C library that returns and takes doubles."""
     function: Any = getattr(ctypes.CDLL(None), name)
     function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * arguments
     return function  # type: ignore[no-any-return]
@@ -175,12 +176,14 @@ def _integer_power(x: Any, n: int) -> Any:
     return 1.0 / result if n < 0 else result
 
 
-# What runs in Python in place of an operation of compiled code; a room adds those that are its own.
+# Python functions that run in place of operations of compiled code; other rooms add their own.
 _IN_PYTHON: dict[Any, Callable[..., Any]] = {}
 
 
 def in_python(operation: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declare, as a decorator, what runs in Python in place of an operation of compiled code, to the same bits."""
+    """Return a decorator for the Python function that runs in place of an operation of compiled code and gives the same
+    bits.
+    """
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
         _IN_PYTHON[operation] = function
@@ -198,7 +201,7 @@ def fma(x: Any, y: Any, z: Any) -> Any:
 
 @cache
 def fma_of_arrays() -> Callable[..., Any]:
-    """Return what gives x * y + z for arrays, each rounded once."""
+    """Return a function that computes x * y + z for arrays, with one rounding for each element."""
     made: Callable[..., Any] = np.frompyfunc(_of_library("fma", 3), 3, 1)
     return made
 
@@ -223,11 +226,11 @@ def _polynomial(coefficients: Any, t: Any) -> Any:
 
 
 class _AddressOfIntegers(int):
-    """The address of integers, where others are those of floats."""
+    """An address of integers; all other addresses are those of floats."""
 
 
 def _array(address: Any, shape: Any) -> Any:
-    """The array at an address, as `numba.carray` gives it; or the first numbers of an array."""
+    """Return the array at an address, as `numba.carray` does; or, given an array, its first numbers."""
     count = math.prod(shape) if isinstance(shape, tuple) else shape
     if isinstance(address, np.ndarray):
         return address.reshape(-1)[:count].reshape(shape)
@@ -238,7 +241,7 @@ def _array(address: Any, shape: Any) -> Any:
 
 @cache
 def _operations() -> dict[Any, Callable[..., Any]]:
-    """For each operation of compiled code what gives the same in Python."""
+    """Return, for each operation of compiled code, the Python function that gives the same result."""
     names = [(name, count) for count, names in _ELEMENTARY.items() for name in names.split()]
     operations = {getattr(math, name): _over_numpy(_of_library(name, count)) for name, count in names}
     return operations | {
@@ -266,7 +269,7 @@ def _is_integer(node: ast.expr) -> bool:
 
 
 def _powers_as_calls(node: Any) -> Any:
-    """Write powers as calls, for Python's own are rounded otherwise."""
+    """Rewrite powers as calls, because Python rounds its own powers otherwise."""
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
             setattr(node, name, [_powers_as_calls(one) if isinstance(one, ast.AST) else one for one in value])
@@ -284,7 +287,7 @@ def _power(x: Any, y: Any) -> Any:
     return _operations()[math.pow](x, y)
 
 
-# What is called in place of powers; no function has such a name.
+# The functions that are called in place of powers; no other function can have such a name.
 _POWERS = {"x**n": _integer_power, "x**y": _power}
 
 
@@ -315,12 +318,12 @@ def _plain_value(value: Any) -> Any:
 
 
 def _like(value: Any, items: Iterable[Any]) -> Any:
-    """A tuple of the same class, which may be a named one."""
+    """Return a tuple of the same class, which may be a named one."""
     return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
 
 
 def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., Any]:
-    """The same code over plain names, its numbers NumPy's."""
+    """Return a function with the same code in which names have their plain meanings and numbers are NumPy's."""
     given = vars(builtins) | given
     names = {name: _plain_value(given[name]) for name in code.co_names if name in given}
     numbers = tuple(_plain_value(number) if type(number) in (float, tuple) else number for number in code.co_consts)
@@ -329,7 +332,7 @@ def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., An
 
 
 def _binary_operations(code: CodeType) -> set[int]:
-    """The numbers that Python gives to the binary operations in a function's code."""
+    """Return Python's numbers of the binary operations in a function's code."""
     pairs = zip(code.co_code[::2], code.co_code[1::2], strict=True)
     return {which for operation, which in pairs if operation == dis.opmap["BINARY_OP"]}
 
@@ -343,7 +346,7 @@ _POWER = _binary_operations(_raised.__code__)
 
 
 def plain_function(function: Any, text: str | None = None) -> Callable[..., Any]:
-    """The function as plain Python over NumPy's numbers.
+    """Return the function as plain Python over NumPy's numbers.
 
     Parameters
     ----------
@@ -355,19 +358,19 @@ def plain_function(function: Any, text: str | None = None) -> Callable[..., Any]
     Raises
     ------
     NotPlainError
-        If the compiler must run it.
+        If it must be compiled.
     """
     code = function.__code__
     try:
         if _binary_operations(code) & _POWER:
             code = _of_text(text or inspect.getsource(function), code)
         return _over_plain_names(code, function.__globals__ | _POWERS)
-    except (AttributeError, OSError, SyntaxError, TypeError):  # TypeError: a name for what cannot be hashed
+    except (AttributeError, OSError, SyntaxError, TypeError):  # TypeError: an object cannot be hashed
         raise NotPlainError from None
 
 
 def _of_text(text: str, original: CodeType) -> CodeType:
-    """The code of a function from its text, with powers as calls."""
+    """Return the code of a function made from its text, with powers as calls."""
     definition = ast.parse(text).body[0]
     if not isinstance(definition, ast.FunctionDef):
         raise NotPlainError
@@ -379,7 +382,7 @@ def _of_text(text: str, original: CodeType) -> CodeType:
 
 
 def plain_by_address(function: Any, signature: Any, text: str | None) -> Callable[..., None] | None:
-    """Return a function that is called by its address as plain Python; None where the compiler must run it.
+    """Return a function that is called by its address as plain Python; None if it must be compiled.
 
     Parameters
     ----------
@@ -410,7 +413,7 @@ def plain_by_address(function: Any, signature: Any, text: str | None) -> Callabl
 
 
 def _given(kind: Any, value: Any) -> Any:
-    """An argument of numba's type as plain Python takes it."""
+    """Return an argument of one of numba's types as plain Python takes it."""
     if isinstance(kind, numba.types.Float):
         return np.float64(value)
     if isinstance(kind, numba.types.BaseTuple):
@@ -422,14 +425,14 @@ def _given(kind: Any, value: Any) -> Any:
 
 
 def _result(value: Any) -> Any:
-    """Python's own numbers, as compiled functions return them."""
+    """Return a result with Python's own numbers, as compiled functions return them."""
     if isinstance(value, tuple):
         return _like(value, map(_result, value))
     return value.item() if isinstance(value, np.generic) else value
 
 
 def _arrays(value: Any) -> Iterator[Any]:
-    """The arrays that a function may write into."""
+    """Return the arrays that a function may write into."""
     if isinstance(value, tuple):
         for item in value:
             yield from _arrays(item)
@@ -447,7 +450,7 @@ class PlainEntry:
     kinds : sequence
         numba's types of its arguments.
     trial : Trial
-        What decides when Python does not run it any more.
+        The object that decides when Python stops running it.
     """
 
     def __init__(self, function: Any, kinds: Sequence[Any], trial: Trial) -> None:
@@ -460,8 +463,8 @@ class PlainEntry:
         Raises
         ------
         NotPlainError
-            If the compiler must run it, it is worth compiling, or other threads write into the same arrays; then all
-            arrays are as they were.
+            If the function must be compiled, is worth compiling, or shares arrays with other threads that write into
+            them. All arrays are then as they were before the call.
         """
         if _SHARING.on or self._trial.is_over():
             raise NotPlainError

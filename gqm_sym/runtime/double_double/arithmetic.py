@@ -5,7 +5,7 @@ vectorise. The low double is at most half a unit in the last place of the high o
 of ``UNIT`` = 2**-104.
 
 The sums and products are those of Dekker (Numerische Mathematik 18, 1971) with fused products. They need numbers
-between about 1e-290 and 1e290; beyond, results are not numbers or lose their low digits.
+between about 1e-290 and 1e290; outside this range, results are not numbers or lose their low digits.
 """
 
 from fractions import Fraction
@@ -29,7 +29,7 @@ UNIT = 2.0**-104
 # log 2 as three doubles.
 LOG2 = (0.6931471805599453, 2.3190468138462996e-17, 5.707708438416212e-34)
 
-# An argument of exp is divided by 2**SQUARINGS; so often is the result then squared.
+# An argument of exp is divided by 2**SQUARINGS, and the result is squared SQUARINGS times.
 SQUARINGS = 5
 SHARE = 0.5**SQUARINGS
 MAX_EXPONENT = 700.0
@@ -49,9 +49,9 @@ def _coefficients(first: int, step: int, precise: int, count: int) -> tuple[tupl
     Returns
     -------
     low_powers : tuple of float
-        The first ``precise`` of them, as two doubles each.
+        The first ``precise`` coefficients, as two doubles each.
     high_powers : tuple of float
-        The others, in doubles, of ``count`` in all.
+        The others of ``count`` in all, as doubles.
     """
     sign = -1 if step == 2 else 1
     terms = [Fraction(sign**k, factorial(first + step * k)) for k in range(count)]
@@ -115,7 +115,7 @@ def series(_, coefficients, z, z_low, start):  # type: ignore[no-untyped-def]
     """Return the value at z of a polynomial by Horner's scheme.
 
     ``coefficients`` are two doubles each, highest power first, and ``start`` stands for the powers above them. The
-    terms must fall.
+    terms must decrease.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -147,7 +147,9 @@ def _series(coefficients: Any, z: Any, z_low: Any, start: Any) -> tuple[Any, Any
 
 @Inlined
 def remainder(x, x_low, k, unit):  # type: ignore[no-untyped-def]
-    """Return x - k*unit, of a unit that is three doubles; the first product is nearly x, so that one is exact."""
+    """Return x - k*unit for a unit that is three doubles. The first product is nearly x, so that its subtraction is
+    exact.
+    """
     p, e = product(k, unit[1])
     s, t = two_sum(fma(-k, unit[0], x), -p)
     s, f = two_sum(s, x_low)
@@ -156,7 +158,7 @@ def remainder(x, x_low, k, unit):  # type: ignore[no-untyped-def]
 
 @Inlined
 def sine_and_cosine(x, x_low):  # type: ignore[no-untyped-def]
-    """Return the sine and the cosine, of |x| below 1e6 within 1 UNIT of one."""
+    """Return the sine and the cosine with an absolute error of at most UNIT, for |x| below 1e6."""
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
     turns = bits(shifted)
@@ -184,7 +186,7 @@ def exponential(x, x_low):  # type: ignore[no-untyped-def]
     r, r_low = remainder(x, x_low, k, LOG2)
     r, r_low = r * SHARE, r_low * SHARE
     f, f_low = series(EXPONENTIAL, r, r_low, polynomial(EXPONENTIAL_TAIL, r))
-    # exp(r) - 1, of which (1 + f)**2 - 1 = 2 f + f**2 keeps the digits.
+    # f is exp(r) - 1, whose digits are kept by squaring as (1 + f)**2 - 1 = 2 f + f**2.
     f, f_low = multiply(f, f_low, r, r_low)
     for _ in range(SQUARINGS):
         g, g_low = multiply(f, f_low, f, f_low)
@@ -198,7 +200,9 @@ def exponential(x, x_low):  # type: ignore[no-untyped-def]
 
 @Inlined
 def improved_logarithm(x, x_low, guess, e, e_low):  # type: ignore[no-untyped-def]
-    """Return log(x) within 2 UNIT of max(1, |log(x)|), from the double nearest to it, and exp of minus that."""
+    """Return log(x) with an error of at most 2 UNIT max(1, |log(x)|), from the double nearest to it and exp of minus
+    that double.
+    """
     p, p_low = multiply(x, x_low, e, e_low)
     rest = (p - 1.0) + p_low
     return fast_sum(guess, rest - 0.5 * rest * rest)
@@ -206,7 +210,9 @@ def improved_logarithm(x, x_low, guess, e, e_low):  # type: ignore[no-untyped-de
 
 @Inlined
 def improved_arc_tangent(x, x_low, guess, sine, cosine):  # type: ignore[no-untyped-def]
-    """Return the arc tangent within 2 UNIT of one, from the double nearest to it with its sine and cosine."""
+    """Return the arc tangent with an absolute error of at most 2 UNIT, from the double nearest to it and its sine and
+    cosine.
+    """
     p, p_low = multiply(x, x_low, cosine[0], cosine[1])
     rest, rest_low = add(p, p_low, -sine[0], -sine[1])
     return fast_sum(guess, (rest + rest_low) / (cosine[0] + x * sine[0]))

@@ -29,7 +29,7 @@ from gqm_sym.runtime.double_double.arithmetic import (
     square_root,
 )
 
-# Places that are evaluated together, and the doubles of a register.
+# The number of places that are evaluated together, and the number of doubles of a register.
 BLOCK = 64
 LOW, ERROR, ROW = BLOCK, 2 * BLOCK, 3 * BLOCK
 
@@ -128,11 +128,12 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     operations : (m, 4) array of int
-        Each operation, and where in the work space the registers of its result and of its operands begin.
+        Each operation, with the positions in the work space at which the registers of its result and of its operands
+        begin.
     work : array
-        The registers. That of a result is none of the operands.
+        The registers. The register of a result is none of those of its operands.
     n : int
-        Places, at most BLOCK.
+        The number of places, at most BLOCK.
     """
     rows, scratch = carray(operations, (last, 4)), stacked_scratch()
     for k in range(first, last):
@@ -160,8 +161,8 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
             fill_absolute_values(n, a, out)
 
 
-# The interpreter, which other compiled functions call by its address: as a part of them it would be optimised anew with
-# each, which takes seconds.
+# The interpreter, which other compiled functions call by its address. As a part of them it would be optimised again
+# with each, which takes seconds.
 INTERPRETER = Emitted(
     evaluate,
     types.void(types.CPointer(types.int64), types.intp, types.intp, types.CPointer(types.float64), types.intp),

@@ -1,4 +1,4 @@
-"""Nodes of quadrature rules in double-double arithmetic, made by compiled code when they are first needed."""
+"""Nodes of quadrature rules in double-double arithmetic, computed by compiled code when they are first needed."""
 
 from functools import cache
 from math import cos, pi
@@ -11,23 +11,24 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply, sine_and_cosine
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
-# Where the nodes of each level of the trapezoidal rule end, of which each has twice as many as the one before.
+# The indices at which the levels of the trapezoidal rule begin and end; with each level the number of nodes doubles.
 LEVELS = (0, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
 
-# Nodes of a Gauss-Legendre rule, and the iterations of Newton's method that find them from three digits.
+# The number of nodes of a Gauss-Legendre rule, and the number of Newton iterations that find them from starting values
+# of three digits.
 RULE, NEWTON_STEPS = 16, 6
 
 
 @entry(MATRIX(INTEGER))
 def node_tables(kind):  # type: ignore[no-untyped-def]
-    """Return the nodes of all levels of the rule: those of the first level, then what each doubling adds.
+    """Return the nodes of all levels of the rule: those of the first level, then those that each doubling adds.
 
     Returns
     -------
     rows : (4, n) array
         The share of the way from ``a`` to ``b`` at each node, as two doubles, and the factor of the integrand there.
         These are the square of the sine of phi/2, and sin(phi)/2; for a lap, the phase angle itself and 1. The first
-        node of a libration would be one of the ends; it is in the middle instead, with the factor zero.
+        node of a libration would be one of the ends; the node in the middle takes its place, with the factor zero.
     """
     rows = np.empty((4, LEVELS[-1]))
     for k in range(LEVELS[-1]):
@@ -80,13 +81,13 @@ def legendre_rule():  # type: ignore[no-untyped-def]
 
 @cache
 def trapezoidal_nodes(kind: int) -> Array:
-    """Return the table of `node_tables`, which is made once."""
+    """Return the table of `node_tables`, which is computed once."""
     table: Array = node_tables(kind)
     return table
 
 
 @cache
 def panel_rule() -> Array:
-    """Return the rule of `legendre_rule`, which is made once."""
+    """Return the rule of `legendre_rule`, which is computed once."""
     rule: Array = legendre_rule()
     return rule

@@ -1,7 +1,7 @@
 """Half periods and lap times in double-double arithmetic by the trapezoidal rule, with turning points and a bound.
 
-V**2 is the plain difference of effective potentials, for of 31 digits many may be lost; how many is computed along
-with it. The nodes are phase angles (MATHS, section 4), whose sines are tabulated.
+V**2 is the plain difference of effective potentials, because many of the 31 digits may be lost; a bound on the loss is
+computed along with it. The nodes are phase angles (MATHS, section 4), whose sines are tabulated.
 """
 
 from math import copysign, fabs, inf, nan
@@ -30,22 +30,23 @@ from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # The trapezoidal rule has converged if two successive changes have shrunk by this factor and the next one would be
-# smaller than a share of the value, which is this one where all digits are wanted, or if the last is rounding only and
-# the one before was below the third number.
+# smaller than a share of the value, which is the second number if all digits are wanted, or if the last change is
+# rounding only and the one before was below the third number.
 MAX_RATIO, MAX_NEXT_CHANGE, MAX_CHANGE_BEFORE = 1e-3, 1e-27, 1e-20
 
-# Places that are evaluated together at the ends: both turning points, the launch, and the launch again.
+# The number of places that are evaluated together at the ends: both turning points, the launch, and the launch again to
+# fill a register.
 ENDS = 8
 
-# The panels of an interval are doubled from MIN_PANELS to MAX_PANELS, until the next change would be smaller than this
-# share of the time, or than its rounding.
+# The number of panels of an interval is doubled from MIN_PANELS to MAX_PANELS at most, until the next change would be
+# smaller than this share of the time, or than its rounding.
 MIN_PANELS, MAX_PANELS, MAX_PANEL_CHANGE = 2, 128, 1e-24
 
-# The largest relative error of a time for which it is of any use.
+# The largest relative error of a time; a less accurate one is not used.
 MAX_ERROR = 1e-17
 
-# Iterations of Newton's method, of which each doubles the digits: from those of a double. A step may be this share of
-# the orbit's width at most.
+# The number of Newton iterations, each of which doubles the digits, starting with those of a double. A step may be at
+# most this share of the orbit's width.
 NEWTON_STEPS, MAX_STEP = 2, 1e-6
 
 # Types of what compiled functions take: a tape behind the interpreter's address, a number with its error, and an orbit.
@@ -118,12 +119,12 @@ def energy_level(work, registers, launch, i):  # type: ignore[no-untyped-def]
 def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
     """Find both turning points by Newton's method from the doubles next to them.
 
-    They are left in the register of places, and what the formulas are there in the others.
+    They are left in the register of places, and the values of the formulas there in the other registers.
 
     Returns
     -------
     level : (high, low, error)
-        The energy level. The error contains how far half V**2 may be from zero at the turning points.
+        The energy level. Its error includes a bound on half V**2 at the turning points.
     errors : (float, float)
         Bounds on the errors of the turning points.
     """
@@ -143,7 +144,7 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
             half, half_low = add(level[0], level[1], -work[u], -work[u + LOW])
             move, move_low = divide(half, half_low, work[up], work[up + LOW])
             work[at], work[at + LOW] = add(work[at], work[at + LOW], move, move_low)
-            # Each step leaves V**2 smaller by the square of the ratio of the steps.
+            # Each step reduces V**2 by the square of the ratio of the steps.
             ratio = fabs(move) / step[i] if step[i] > 0.0 else 0.0
             if not fabs(move) <= MAX_STEP * fabs(offsets[1] - offsets[0]):
                 ratio = nan
@@ -180,7 +181,7 @@ def fill_places(n, start, width, nodes, first, place):  # type: ignore[no-untype
 
 @Inner
 def fill_integrand(n, level, nodes, first, potential, ds, out):  # type: ignore[no-untyped-def]
-    """Fill a register with the time per share of the interval and per width of the segment."""
+    """Fill a register with the time per share of the interval, divided by the width of the segment."""
     factor, factor_low = nodes[2, first : first + n], nodes[3, first : first + n]
     for i in range(n):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
@@ -216,7 +217,7 @@ def add_nodes(integrand, nodes, first, stop, total):  # type: ignore[no-untyped-
 
 @Inner
 def mean_by_trapezoid(integrand, nodes, ends, tolerance):  # type: ignore[no-untyped-def]
-    """Return the mean of the integrand with its error by the trapezoidal rule; NaN where that does not converge."""
+    """Return the mean of the integrand with its error by the trapezoidal rule; NaN if that does not converge."""
     total, before, value, value_low = ends, inf, inf, 0.0
     for level in range(len(LEVELS) - 1):
         n = LEVELS[level + 1]
@@ -234,7 +235,7 @@ def mean_by_trapezoid(integrand, nodes, ends, tolerance):  # type: ignore[no-unt
 
 @Inner
 def fill_panel(kind, left, step, panel, rule, nodes):  # type: ignore[no-untyped-def]
-    """Fill the nodes, as `node_tables` does, of one of the panels of the width ``step`` from an angle on."""
+    """Fill the nodes, in the form of `node_tables`, of one of the panels of width ``step`` that follow an angle."""
     for k in range(RULE):
         i = panel * RULE + k
         share, share_low = add(rule[0, k], rule[1, k], float(panel), 0.0)
@@ -250,7 +251,7 @@ def fill_panel(kind, left, step, panel, rule, nodes):  # type: ignore[no-untyped
 
 @Inner
 def time_between(integrand, kind, left, right, rule):  # type: ignore[no-untyped-def]
-    """Return the time from one phase angle to another and its error; NaN where Gauss's rules do not converge."""
+    """Return the time from one phase angle to another and its error; NaN if Gauss's rules do not converge."""
     width = add(right[0], right[1], -left[0], -left[1])
     scale, scale_low = multiply(width[0], width[1], integrand.width[0], integrand.width[1])
     nodes = np.empty((4, RULE * MAX_PANELS))
@@ -327,7 +328,7 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
             times[1, 0], times[2, 0] = add(high, low, part, part_low)
             is_thrown, of_launch = False, error + of_part
         if not is_last:
-            # The upper turning point is at pi itself.
+            # The upper turning point is at the angle pi itself.
             angle = (times[0, k], 2.0 * QUARTER[1] if times[0, k] == 2.0 * QUARTER[0] else 0.0)
             part, part_low, of_part = time_between(integrand, kind, at, angle, rule)
             high, low = add(high, low, part, part_low)
@@ -337,7 +338,7 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
 
 @Inner
 def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance):  # type: ignore[no-untyped-def]
-    """Return the duration and the turning points of an orbit, NaN where they are not found.
+    """Return the duration and the turning points of an orbit, which are NaN if they are not found.
 
     Parameters
     ----------
@@ -363,7 +364,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
     duration, low, high : (high, low, error)
         Half period or lap time, and both turning points, as two doubles each with a bound on the error.
     orbit : (level, start, width)
-        What `fill_times` needs of the orbit.
+        The arguments of `fill_times` that describe the orbit.
     """
     address, operations, parts, registers = tape
     fill_parameters(tape, p, work)
@@ -438,7 +439,7 @@ def time_orbit(
     offsets: tuple[float, float],
     times: Array = NO_TIMES,
 ) -> Orbit | None:
-    """Return duration and turning points of an orbit; None where double-double arithmetic does not suffice.
+    """Return duration and turning points of an orbit; None if double-double arithmetic does not suffice.
 
     Parameters
     ----------
@@ -449,7 +450,7 @@ def time_orbit(
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     offsets : (float, float)
-        The distances of the lower and the upper turning point from the launch, as doubles know them.
+        The distances of the lower and the upper turning point from the launch, to the accuracy of doubles.
     times : (3, n) array
         Phase angles, and room for the times there (`fill_times`). If there are any besides that of the launch, they are
         the edges of panels up to the end of the orbit, and the duration is found by panels, not by the trapezoidal

@@ -25,7 +25,7 @@ from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
 
 Pair = tuple[float, float]
 
-# The largest relative error of a rate that is as good as an exact one once it is rounded to a double.
+# The largest relative error of a rate. Rounded to a double, such a rate is as good as an exact one.
 MAX_RATE_ERROR = 2.0**-54
 
 PAIR = types.UniTuple(REAL, 2)
@@ -45,8 +45,8 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     kind : int
         The segment's kind (`quadrature.substitution`).
     panel : four pairs of float
-        Where the segment begins and how much the curve's parameter grows over it; the phase angles in the middle of
-        the panel, and from there to its end.
+        The beginning of the segment, the increase of the curve's parameter over it, the phase angle in the middle of
+        the panel, and the angle from there to its end; two doubles each.
     nodes : (n,) array
         Nodes between -1 and 1.
 
@@ -71,7 +71,7 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     for i in range(n):
         phi, low = multiply(reach[0], reach[1], nodes[i], 0.0)
         phi, low = add(middle[0], middle[1], phi, low)
-        # The share of the way, and its derivative by phi.
+        # The share of the segment at each node, and its derivative by phi.
         rows[0, i], rows[1, i], rows[2, i], rows[3, i] = phi, low, 1.0, 0.0
         if kind == TURN_TURN:
             s, s_low, c, c_low = sine_and_cosine(0.5 * phi, 0.5 * low)
@@ -97,7 +97,7 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
 def panel_rates(
     formulas: BoundTape, launch: tuple[Number, Number], kind: int, panel: tuple[Pair, Pair, Pair, Pair], nodes: Array
 ) -> Array | None:
-    """Return dt/dphi in s and ds/dphi in m at the nodes of a panel; None where their errors are too large.
+    """Return dt/dphi in s and ds/dphi in m at the nodes of a panel; None if their errors are too large.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def panel_rates(
     panel : four pairs of float
         As for `fill_rates`.
     nodes : (n,) array
-        At most as many nodes between -1 and 1 as are evaluated together (`interpreter.BLOCK`).
+        Nodes between -1 and 1, at most as many as are evaluated together (`interpreter.BLOCK`).
     """
     lam0, v0 = launch
     given: Any = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)

@@ -1,8 +1,8 @@
 """Tapes of the exact formulas of a module, recorded when they are first needed.
 
-A module contains its formulas as plain Python over a namespace of operations. Called with numbers that write down what
-is done to them, a formula becomes a tape for the interpreter, which takes less than a millisecond, and the module needs
-to contain nothing but the formula.
+A module contains its formulas as plain Python over a namespace of operations. Called with numbers that record the
+operations on them, a formula becomes a tape for the interpreter. This takes less than a millisecond, and the module
+needs to contain nothing but the formula.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ from gqm_sym.runtime.interface import ExactFormulas
 # pi and e as two doubles each.
 PI, E = (2.0 * QUARTER[0], 2.0 * QUARTER[1]), (2.718281828459045, 1.4456468917292502e-16)
 
-# The register of what there is not.
+# In place of a register that does not exist.
 NOWHERE = -1
 
 # A tape with more registers is not used: its work space would not fit into the processor's caches.
@@ -38,13 +38,13 @@ class Tape(NamedTuple):
     Attributes
     ----------
     operations : (m, 4) array of int
-        What `interpreter.evaluate` carries out: first what does not depend on the place, then what the effective
-        potential and ds/dlam need, then what only the potential's slope needs.
+        The operations that `interpreter.evaluate` carries out: first those that do not depend on the place, then those
+        for the effective potential and ds/dlam, then those for the potential's slope alone.
     parts : tuple of int
         The ends of these three parts.
     registers : tuple of int
-        Where in the work space the registers begin of: the first run-time parameter, the place, the effective
-        potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative where there is none). For a
+        The positions in the work space of the registers of the first run-time parameter, the place, the effective
+        potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative if there is none). For a
         function of the plane (`record_in_plane`): the first run-time parameter, x (z follows), the function, its
         derivatives by x and z, and nothing.
     """
@@ -55,15 +55,15 @@ class Tape(NamedTuple):
 
 
 class BoundTape(NamedTuple):
-    """A tape with the space that it is carried out in, and the run-time parameters.
+    """A tape with its work space and the values of the run-time parameters.
 
     Attributes
     ----------
     tape : Tape
         The operations.
     work : array
-        The registers, of which those of constants are filled. Compiled code changes the others while no other thread
-        runs.
+        The registers, of which those of constants are filled. Compiled code changes the others; no other thread runs at
+        the same time.
     parameters : (2, n) array
         The run-time parameters as two doubles each.
     """
@@ -79,7 +79,7 @@ class BoundTape(NamedTuple):
 
 
 Recorded = tuple[Tape, Array]
-"""A tape, and registers with its constants."""
+"""The type of a tape together with registers that contain its constants."""
 
 
 class TapeNumber:
@@ -141,7 +141,7 @@ class TapeNumber:
         return self._tape.number(other) ** self
 
     def to(self, count: int) -> "TapeNumber":
-        """Return the product of so many factors."""
+        """Return the power with a positive integer exponent, as a product of so many factors."""
         if count < 2:
             return self if count else self._tape.number(1)
         half = self.to(count // 2)
@@ -149,10 +149,10 @@ class TapeNumber:
 
 
 class _Recorder:
-    """The namespace of operations that formulas are recorded over: the functions have the names that mpmath has."""
+    """The namespace of operations with which formulas are recorded. Its functions have the names that mpmath uses."""
 
     def __init__(self, parameters: int, coordinates: int = 1) -> None:
-        # Each entry is what is done and to which registers. A constant is its doubles.
+        # Each entry is an operation and the registers of its operands. The entry of a constant has its doubles.
         self.entries: list[tuple[Any, ...]] = [
             *(("parameter", k) for k in range(parameters)),
             *(("place", k) for k in range(coordinates)),
@@ -235,7 +235,7 @@ class _Recorder:
         return self.log((1 + x) / (1 - x)) / 2
 
     def depend_on_place(self) -> list[bool]:
-        """Return of each entry whether it depends on the place."""
+        """Return, for each entry, whether it depends on the place."""
         depends: list[bool] = []
         for code, *operands in self.entries:
             is_operation = not isinstance(code, str) or code == "cosine"
@@ -243,7 +243,7 @@ class _Recorder:
         return depends
 
     def needed_by(self, registers: Sequence[int]) -> set[int]:
-        """Return the entries that some registers are computed from, and these themselves."""
+        """Return the given registers and all entries that they are computed from."""
         needed, pending = set[int](), list(registers)
         while pending:
             k = pending.pop()
@@ -252,18 +252,18 @@ class _Recorder:
             needed.add(k)
             code, *operands = self.entries[k]
             if code == "cosine":
-                pending.append(k - 1)  # the sine, with which it is computed
+                pending.append(k - 1)  # a cosine is computed together with the sine before it
             elif not isinstance(code, str):
                 pending.extend(operands)
         return needed
 
     def finished(self, values: Sequence[int], others: Sequence[int], period: int = NOWHERE) -> Recorded | None:
-        """Return the tape and registers with its constants; None where it is too long.
+        """Return the tape and registers with its constants; None if it is too long.
 
         Parameters
         ----------
         values, others : sequences of int
-            Registers of what is needed at each place, and of what is needed at few places only.
+            Registers of the values that are needed at each place, and of those that are needed at few places only.
         period : int
             The register of the period, if there is one.
         """
@@ -299,7 +299,7 @@ class Recorder(_Recorder):
     Attributes
     ----------
     exact : dict
-        For the register of each constant the number that it is, or the name of it.
+        For the register of each constant, its value or its name.
     """
 
     def __init__(self, parameters: int, coordinates: int = 1) -> None:
@@ -320,7 +320,7 @@ class Recorder(_Recorder):
 
 @lru_cache(maxsize=64)
 def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int) -> Recorded | None:
-    """Return the tape of a module's formulas and registers with its constants; None where they are too long.
+    """Return the tape of a module's formulas and registers with its constants; None if they are too long.
 
     Parameters
     ----------
@@ -344,7 +344,7 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
 def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded | None:
     """Return the tape of a function ``f(op, x, z, p)`` that gives a value and its derivatives by x and z.
 
-    It is None where it is too long.
+    It is None if it is too long.
     """
     op = _Recorder(parameters, coordinates=2)
     value, *slopes = map(op.register, function(op, *op.places, op.values))
@@ -353,9 +353,9 @@ def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded |
 
 @lru_cache(maxsize=64)
 def record_values_in_plane(function: Callable[..., Any], parameters: int, count: int) -> Recorded | None:
-    """Return the tape of the first values that a function ``f(op, x, z, p)`` gives; None where it is too long.
+    """Return the tape of the first values that a function ``f(op, x, z, p)`` gives; None if it is too long.
 
-    Its registers are those of the first run-time parameter, of x, of these values, and nothing.
+    Its registers are those of the first run-time parameter, of x and of these values; the rest are empty.
     """
     op = _Recorder(parameters, coordinates=2)
     found = function(op, *op.places, op.values)
@@ -364,7 +364,7 @@ def record_values_in_plane(function: Callable[..., Any], parameters: int, count:
 
 
 def bind(found: Recorded | None, parameters: Sequence[Number]) -> BoundTape | None:
-    """Return a recorded tape with values of its parameters; None where there is no tape."""
+    """Return a recorded tape with values of its parameters; None if there is no tape."""
     if found is None:
         return None
     return BoundTape(*found, np.array([[p.value for p in parameters], [p.low for p in parameters]]).reshape(2, -1))

@@ -1,8 +1,8 @@
 """The derivatives of a formula on a tape, recorded as formulas on the same tape (reverse differentiation).
 
-The adjoint of an operation is the derivative of the result by the operation's own. Each hands its adjoint, times its
-partial derivatives, to its operands. So all first derivatives of a formula take a few times as many operations as the
-formula itself, however many they are.
+The adjoint of an operation is the derivative of the formula with respect to the operation's result. Each operation
+passes its adjoint, times its partial derivatives, to its operands. So all first derivatives of a formula together take
+a few times as many operations as the formula itself, however many they are.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +13,7 @@ from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 
 
 def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> list[TapeNumber]:
-    """Return the derivatives of a formula by variables that are parameters or the place of the tape.
+    """Return the derivatives of a formula with respect to parameters or the place of its tape.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> lis
     formula : TapeNumber
         The formula.
     variables : sequence of TapeNumber
-        What is differentiated by.
+        The variables of differentiation.
     """
     result = op.number(formula)
     adjoints: dict[int, TapeNumber] = {}
@@ -37,7 +37,7 @@ def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> lis
 
 
 def _times(a: TapeNumber, b: TapeNumber) -> TapeNumber:
-    """Return the product, where a factor of 1 is not an operation."""
+    """Return the product; a factor of 1 takes no operation."""
     if a.known == 1:
         return b
     return a if b.known == 1 else a * b
@@ -65,7 +65,7 @@ def _partials(op: Recorder, k: int) -> Iterator[tuple[int, TapeNumber]]:
 
 
 def _slope(op: Recorder, code: int, a: TapeNumber, out: TapeNumber, k: int) -> TapeNumber:
-    """Return the derivative of a function of one number ``a``, whose value is ``out``, in register ``k``."""
+    """Return the derivative of a function of one number ``a``, whose value is ``out`` and is in register ``k``."""
     if code == interpreter.SQUARE_ROOT:
         return 1 / (2 * out)
     if code == interpreter.SINE_COSINE:

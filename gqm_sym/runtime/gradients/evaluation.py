@@ -2,7 +2,7 @@
 
 The means are those of the midpoint rule in phase angles, which converges as fast as the trapezoidal rule and needs no
 values at turning points, where V**2 and the divided differences of the potential vanish together. Near a separatrix it
-would need too many nodes; Gauss's rules on the panels of the motion do there.
+would need too many nodes; there Gauss's rules on the panels of the motion are used.
 """
 
 from math import fabs, inf
@@ -13,28 +13,31 @@ from numba import types
 from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS, RULE
 from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fill_panel
+from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
-# by this factor and the next one would be smaller than the second number. Errors fall geometrically: the first change,
-# from 16 to 32 nodes, is about the square root of the next one.
+# by this factor and the next one would be smaller than the second number. Errors decrease geometrically: the first
+# change, from 16 to 32 nodes, is about the square root of the next one.
 MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
 
-# The change of an integral over a panel when it is halved, as a share of that of the absolute values.
+# The largest change of an integral over a panel when the panel is halved, as a share of the integral of the absolute
+# values.
 MAX_PANEL_CHANGE = 1e-20
 
 # The codes in place of the number of nodes: digits were lost, or the nodes are too few with any number of digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
 
-# What there is of each mean: the high and the low double, a bound on the error, and the mean of the absolute values.
+# The number of values for each mean: the high and the low double, a bound on the error, and the mean of the absolute
+# values.
 MEAN = 4
 
 # A program as compiled code takes it (`programs.Program.operands`), with its work space.
@@ -44,7 +47,7 @@ CUBE = types.float64[:, :, ::1]
 
 @Inner
 def begin(program, work, inputs):  # type: ignore[no-untyped-def]
-    """Fill the registers of the inputs, and of all that does not depend on the place."""
+    """Fill the registers of the inputs, and all that do not depend on the place."""
     address, operations, first, count, _ = program
     for k in range(count):
         for i in range(BLOCK):
@@ -71,7 +74,9 @@ def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
 
 @Inner
 def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def]
-    """Fill the sums over n nodes of each result: the high and the low double, the error, and of absolute values."""
+    """Fill the sums of each result over n nodes (high and low double, and error), and the sums of the absolute
+    values.
+    """
     outputs = program[4]
     sums[:, :] = 0.0
     for start in range(n, 2 * n, BLOCK):
@@ -89,7 +94,7 @@ def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def
 
 @Inner
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results, as `fill_means`."""
+    """Fill the means of all results, as `fill_means` does."""
     begin(program, work, inputs)
     sums, before, rounding = np.empty((found.shape[0], MEAN)), 1.0, inf
     for level in range(1, len(LEVELS) - 1):
@@ -99,7 +104,7 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
         for j in range(found.shape[0]):
             size = sums[j, 3] / n
             high, low = sums[j, 0] / n, sums[j, 1] / n
-            if not size <= sums[j, 2] / n:  # otherwise it is zero within rounding
+            if not size <= sums[j, 2] / n:  # a smaller mean is zero within rounding
                 step = fabs(add(high, low, -found[j, 0], -found[j, 1])[0]) / size
                 change = step if not step <= change else change
                 rounding = max(rounding, sums[j, 2] / (n * size))
@@ -156,7 +161,7 @@ def integrate(program, work, kind, left, width, panels, rule, found):  # type: i
 
 @entry(INTEGER(PROGRAM, VECTOR, MATRIX, INTEGER, VECTOR, MATRIX, MATRIX), checked=False)
 def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results as `fill_means`, where the motion passes near an equilibrium.
+    """Fill the means of all results, as `fill_means` does, for a motion that passes near an equilibrium.
 
     Parameters
     ----------
@@ -172,13 +177,13 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
     Returns
     -------
     int
-        The number of intervals, or why there are no means.
+        The number of intervals, or a code of failure.
     """
     begin(program, work, inputs)
     now, before = np.empty((found.shape[0], MEAN)), np.empty((found.shape[0], MEAN))
     found[:, :] = 0.0
     for k in range(edges.size - 1):
-        # The upper turning point is at pi itself.
+        # The upper turning point is at the angle pi itself.
         right = edges[k + 1], 2.0 * QUARTER[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
         left, panels, change = (edges[k], 0.0), MIN_PANELS, inf
         width = add(right[0], right[1], -left[0], 0.0)
@@ -216,8 +221,8 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
         As for `fill_means`.
     places : (2*k, n) array
         The k coordinates of the places, as two doubles each.
-    found : (k, 3, n) array
-        For each result and place the value as two doubles, and a bound on its error.
+    found : (k, 3, n) or (k, 1, n) array
+        For each result and place the value as two doubles and a bound on its error, or the value alone.
     """
     begin(program, work, inputs)
     (address, operations, first, count, outputs), n = program, places.shape[1]
@@ -227,6 +232,54 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
             set_coordinate(work, count + k, places[2 * k, start:stop], places[2 * k + 1, start:stop])
         call_interpreter(address, operations, first, operations.shape[0], work, stop - start)
         for j in range(outputs.size):
-            for part in range(3):
+            for part in range(found.shape[1]):
                 for i in range(stop - start):
                     found[j, part, start + i] = work[outputs[j] + part * BLOCK + i]
+
+
+@entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX, CUBE), checked=False)
+def fill_signed_values(program, work, inputs, places, states, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program as `fill_values` does, for signs of dlam/dt and of N at each place.
+
+    These signs are the last two inputs of the program, and the last two rows of ``states``.
+
+    The places of the same signs are evaluated together.
+    """
+    (address, operations, first, count, outputs), n = program, places.shape[1]
+    coordinates, headings, signs = places.shape[0] // 2, states[states.shape[0] - 2], states[states.shape[0] - 1]
+    chosen, some = np.empty(n, dtype=np.int64), np.empty((2, BLOCK))
+    for pair in range(4):
+        heading, sign, total = 1.0 if pair < 2 else -1.0, 1.0 if pair % 2 == 0 else -1.0, 0
+        for i in range(n):
+            if headings[i] == heading and signs[i] == sign:
+                chosen[total] = i
+                total += 1
+        if total > 0:
+            inputs[0, count - 2], inputs[0, count - 1] = heading, sign
+            begin(program, work, inputs)
+        for start in range(0, total, BLOCK):
+            size = min(BLOCK, total - start)
+            for k in range(coordinates):
+                for i in range(size):
+                    at = chosen[start + i]
+                    some[0, i], some[1, i] = places[2 * k, at], places[2 * k + 1, at]
+                set_coordinate(work, count + k, some[0, :size], some[1, :size])
+            call_interpreter(address, operations, first, operations.shape[0], work, size)
+            for j in range(outputs.size):
+                for part in range(found.shape[1]):
+                    for i in range(size):
+                        found[j, part, chosen[start + i]] = work[outputs[j] + part * BLOCK + i]
+
+
+def values(
+    program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array, parts: int = 3
+) -> Array:
+    """Return the results of a program at places: ``parts`` rows for each, as in `fill_values`.
+
+    ``others`` are coordinates after the first, as doubles.
+    """
+    zero = np.zeros_like(high)
+    places = np.array([high, zero if low is None else low, *(row for other in others for row in (other, zero))])
+    found = np.empty((program.outputs.size, parts, high.size))
+    fill_values(program.operands, program.work, inputs, places, found)
+    return found

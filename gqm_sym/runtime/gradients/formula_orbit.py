@@ -1,5 +1,6 @@
 """A periodic orbit along a curve with formulas, with its derivatives: means over equal steps of the phase angle."""
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -15,17 +16,16 @@ from gqm_sym.runtime.gradients.evaluation import (
     NOT_SMOOTH,
     fill_means,
     fill_panel_means,
+    values,
 )
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.orbit import (
     OrbitDerivatives,
-    PathRows,
     SeriesOf,
     pairs,
-    path_rows,
-    values,
     without_formulas,
 )
+from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
     Source,
@@ -46,7 +46,7 @@ PI, PI_LOW = np.pi, 1.2246467991473532e-16
 
 
 def source_of(formulas: Formulas) -> Source:
-    """The formulas from which the programs of a module are recorded.
+    """Return the formulas from which the programs of a module are recorded.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def source_of(formulas: Formulas) -> Source:
 
 
 def variables_of(problem: Problem) -> Array:
-    """The variables of a launch as inputs of programs; the change of the energy is zero."""
+    """Return the variables of a launch as inputs of programs; the change of the energy is zero."""
     numbers = (*problem.p, problem.launch.lam0, problem.launch.v0)
     return pairs(*((n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in numbers), (0.0, 0.0, 0.0))
 
@@ -75,19 +75,24 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     problem : Problem
         The launch with its module.
     orbit : Orbit or None
-        Duration and turning points in double-double arithmetic, if that suffices.
+        Duration and turning points in double-double arithmetic; None if that does not suffice.
     direction : int
         0 for a libration, else the sign of ds/dt.
     offsets : (float, float)
         The distances of both turning points from the launch, for a libration.
-    edges : array
-        Phase angles between which the speed changes smoothly, from the first to the last.
+    edges : callable
+        It returns the phase angles between which the speed changes smoothly, from the first to the last.
     """
 
     source: Source
 
     def __init__(
-        self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float], edges: Array
+        self,
+        problem: Problem,
+        orbit: Orbit | None,
+        direction: int,
+        offsets: tuple[float, float],
+        edges: Callable[[], Array],
     ) -> None:
         self.direction, self._edges = direction, edges
         self.source = source_of(problem.formulas)
@@ -138,7 +143,9 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return self._rule_with(np.empty(0) if self.direction else self._end_rows)
 
     def _rule_with(self, ends: Array) -> tuple[Array, Array]:
-        """The inputs of a program and the table of nodes, with what it takes of the turning points of a libration."""
+        """Return the inputs of a program, including the derivatives of a libration's turning points, and the table of
+        nodes.
+        """
         if self.direction:
             inputs = np.hstack([self.variables, self.variables[:, [self.source.parameters]]])
             return np.ascontiguousarray(inputs), trapezoidal_nodes(CIRCULATION)
@@ -151,25 +158,25 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     def _means(self) -> tuple[Array, int, bool]:
         """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them.
 
-        The number is 0 if they are those of panels.
+        The number is 0 if the means were found on panels.
         """
         found = None if self._orbit is None else self._means_of(self._program, *self._rule)
         return found or (*self._multiprecision.means[:2], False)
 
     def _means_of(self, program: Program, inputs: Array, nodes: Array) -> tuple[Array, int, bool] | None:
-        """`_means` of any program in double-double arithmetic; None where digits are lost."""
+        """Return `_means` of any program in double-double arithmetic; None if digits are lost."""
         found = np.zeros((program.outputs.size, MEAN))
         n = fill_means(program.operands, program.work, inputs, nodes, found)
         if n == NOT_SMOOTH:
             kind = CIRCULATION if self.direction else LIBRATION
-            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges, panel_rule(), found)
+            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found)
             if n > 0:
                 return found, 0, True
             raise SolutionError(UNDECIDED)
         return None if n == LOST_DIGITS else (found, n, True)
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
-        """As `OrbitDerivatives.second_durations`."""
+        """Return the derivatives that `OrbitDerivatives.second_durations` describes."""
         turns = turning_point_seconds(self.source, rows)
         if self.direction:
             program = circulation_seconds(self.source, self.direction, rows)
@@ -181,11 +188,11 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return self._over_phase(found[0] if found else self._in_multiprecision(program, turns).means[0])
 
     def _integrals(self, first: int, count: int) -> Array:
-        """The integrals of results over a half period, or over a lap."""
+        """Return the integrals of results over a half period, or over a lap."""
         return self._over_phase(self._means[0][first : first + count])
 
     def _over_phase(self, found: Array) -> Array:
-        """The integrals over a half period, or over a lap, from means."""
+        """Return the integrals over a half period, or over a lap, from means."""
         is_zero = np.abs(found[:, 0]) <= found[:, 2]  # within the rounding of double-double arithmetic
         high, low = np.where(is_zero, 0.0, found[:, :2].T)
         integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)
@@ -196,9 +203,9 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         """The results of the orbit's program at equal steps of the phase angle, over a whole turn of it.
 
         They are the midpoints of N intervals of [0, 2 pi], or of the share of a lap. In the second half of a libration
-        the values return.
+        the values occur again in reverse order.
         """
-        # The means at n nodes are exact as soon as terms of order 2n vanish: twice the nodes show these terms.
+        # The means at n nodes are exact as soon as terms of order 2n vanish; twice as many nodes resolve these terms.
         means, count, is_double_double = self._means
         if not count:
             raise SolutionError(UNDECIDED)
@@ -220,21 +227,23 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return high - low
 
     @property
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """As `OrbitDerivatives.series`."""
         n, samples = self.source.variables, self.samples
         rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
         if self.direction:
-            return Series(rates), Series(arcs[1 : 1 + n]), arcs[2 + n :, :1]
+            return Series(np.vstack([rates, arcs[1 : 1 + n]])), arcs[2 + n :, 0]
         count = samples.shape[1]
         rise = 0.5 * self.width * np.sin(2.0 * np.pi * (np.arange(count) + 0.5) / count)
         others = np.zeros((n - self.source.parameters, count))
-        return Series(rates), Series(np.vstack([rise * arcs, others])), np.zeros((n, 1))
+        return Series(np.vstack([rates, rise * arcs, others])), np.zeros(n)
 
     def at_places(self, lam: Array) -> PathRows:
-        """`path_rows` at places."""
+        """Return `path_rows` at places."""
         return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Half of V**2, or the contact force, at places: with two derivatives by the place, and those by variables."""
+        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
+        variables.
+        """
         return values(extreme_program(self.source, of_speed), self.variables, place)[:, 0]

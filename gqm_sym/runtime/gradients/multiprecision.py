@@ -1,4 +1,6 @@
-"""The means of an orbit's program in mpmath, where double-double arithmetic does not have digits enough."""
+"""The means of an orbit's program in mpmath, for orbits on which double-double arithmetic does not have enough
+digits.
+"""
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
@@ -17,26 +19,28 @@ from gqm_sym.runtime.double_double.nodes import LEVELS
 from gqm_sym.runtime.gradients.evaluation import MAX_NEXT_CHANGE, MAX_RATIO
 from gqm_sym.runtime.gradients.programs import Program, Source
 
-# Why an orbit has no derivatives.
+# The message for an orbit without derivatives.
 UNDECIDED = (
     "gradients: the motion comes too near to an equilibrium, or bends too sharply along its orbit; "
     "launch a little farther from there"
 )
 
-# Digits to compute with, and by what they are multiplied until two precisions agree to the share AGREEMENT of the means
-# of absolute values. On a small orbit V**2 loses as many as the square of its width, and its derivatives as many again.
+# The number of digits, and the factors by which it is multiplied until two precisions agree to the share AGREEMENT of
+# the means of absolute values. On a small orbit V**2 loses as many digits as the square of the orbit's width, and its
+# derivatives lose as many again.
 DIGITS, MORE, AGREEMENT = 60, (1, 2, 4), 1e-19
 
-# With so many nodes the changes must be below the second number, or the largest number of nodes will not suffice.
+# With this number of nodes, changes must be below the second number; otherwise the largest number of nodes will not
+# suffice.
 SLOW = (256, 1e-2)
 
-# The share of the digits below which a number is zero.
+# A number counts as zero if it vanishes to this share of the digits.
 ZERO_DIGITS = 0.6
 
-# A change that is rounding, as a share of the mean of the absolute values.
+# The largest change that counts as rounding, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-30
 
-# Steps of Newton's method to the turning points, of which each doubles the digits, from those of doubles.
+# The number of Newton steps to the turning points, each of which doubles the digits, starting with those of doubles.
 NEWTON_STEPS = 6
 
 
@@ -88,7 +92,8 @@ class MultiprecisionOrbit:
     source : Source
         The formulas.
     program, turns : Program
-        What is integrated along the orbit, and the step of Newton's method to a turning point with its derivatives.
+        The program of the integrands along the orbit, and that of the Newton step to a turning point with its
+        derivatives.
     numbers : sequence of Number
         The run-time parameters, the launch place and the launch speed.
     direction : int
@@ -113,7 +118,7 @@ class MultiprecisionOrbit:
         self._context = MPContext()
 
     def _inputs(self) -> list[Any]:
-        """The inputs of the program, as exactly as the context has them."""
+        """Return the inputs of the program in the precision of the context."""
         context = self._context
         variables = [*(number.at(context) for number in self._numbers), context.mpf(0)]
         lam0 = variables[self._source.parameters]
@@ -131,14 +136,16 @@ class MultiprecisionOrbit:
         return [*variables, *ends, *rows]
 
     def _values(self, inputs: Sequence[Any], n: int) -> list[list[Any]]:
-        """The results at n midpoints."""
+        """Return the results at n midpoints."""
         shares = [(self._context.mpf(2 * k) + 1) / (2 * n) for k in range(n)]
         if not self._direction:
             shares = [self._context.sin(self._context.pi * share / 2) ** 2 for share in shares]
         return list(carried_out(self._context, self._program, inputs, shares))
 
     def _means(self, inputs: Sequence[Any]) -> tuple[list[Any], Array, int]:
-        """The means of the results and of their absolute values, and the number of nodes; 0 if they do not converge."""
+        """Return the means of the results and of their absolute values, and the number of nodes; 0 if they do not
+        converge.
+        """
         before, last = np.inf, None
         for n in LEVELS[1:-1]:
             columns = list(zip(*self._values(inputs, n), strict=True))
@@ -174,17 +181,17 @@ class MultiprecisionOrbit:
                     low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
                     return np.stack([high, low, np.full_like(sizes, self._zero), sizes], axis=1), n, inputs
                 last = means if n else None
-        except (ArithmeticError, TypeError, ValueError):  # a root of what must be positive, or a division by zero
+        except (ArithmeticError, TypeError, ValueError):  # a root of a negative number, or a division by zero
             pass
         raise SolutionError(UNDECIDED)
 
     @property
     def _zero(self) -> float:
-        """Smaller values are rounding."""
+        """The size below which values are rounding."""
         return float(10.0 ** (-ZERO_DIGITS * self._context.dps))
 
     def _share_of_change(self, means: list[Any], last: list[Any], sizes: Array) -> float:
-        """The largest change of a mean, as a share of the mean of the absolute values."""
+        """Return the largest change of a mean, as a share of the mean of the absolute values."""
         if len(means) != len(last):
             return np.inf
         rows = zip(means, last, sizes.tolist(), strict=True)
@@ -198,5 +205,5 @@ class MultiprecisionOrbit:
         return np.column_stack([[numbers[k], *numbers[2 + k * n : 2 + (k + 1) * n]] for k in range(2)])
 
     def samples(self, n: int) -> Array:
-        """The results at n midpoints as doubles, a row for each result."""
+        """Return the results at n midpoints as doubles, a row for each result."""
         return np.array([[float(value) for value in row] for row in self._values(self.means[2], n)]).T

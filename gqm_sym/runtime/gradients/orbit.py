@@ -1,26 +1,18 @@
-"""A periodic orbit with its derivatives: turning points, duration, action, and how they come about along the orbit."""
+"""A periodic orbit with its derivatives: those of turning points, duration and action, and of the path and the time
+along the orbit.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.evaluation import (
-    fill_values,
-)
-from gqm_sym.runtime.gradients.programs import (
-    AnySource,
-    Program,
-    path_program,
-)
-from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
+from gqm_sym.runtime.gradients.path import PathRows
+from gqm_sym.runtime.gradients.programs import AnySource
 from gqm_sym.runtime.launch.formulas import Formulas
-
-# Pi as two doubles.
 
 
 @contextmanager
@@ -40,12 +32,12 @@ def without_formulas() -> SolutionError:
 
 
 def check_force(formulas: Formulas, quantity: str) -> None:
-    """Refuse derivatives that hold a contact force without a sign.
+    """Refuse derivatives of a contact force that has neither a sign nor a formula.
 
     Raises
     ------
     SolutionError
-        Unless the quantity has nothing to do with the contact force, or that has a formula.
+        If the quantity depends on the contact force, and that has neither a sign nor a formula.
     """
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
@@ -56,70 +48,13 @@ def check_force(formulas: Formulas, quantity: str) -> None:
 
 
 def pairs(*numbers: tuple[float, float, float]) -> Array:
-    """Numbers, as two doubles each with a bound on the error, as inputs of a program."""
+    """Return numbers, each given as two doubles and a bound on the error, as inputs of a program."""
     return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
 
 
-def values(program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array) -> Array:
-    """The results of a program at places, one row for each; ``others`` are coordinates after the first, as doubles."""
-    zero = np.zeros_like(high)
-    places = np.array([high, zero if low is None else low, *(row for other in others for row in (other, zero))])
-    found = np.empty((program.outputs.size, 3, high.size))
-    fill_values(program.operands, program.work, inputs, places, found)
-    return found
-
-
-class PathRows(NamedTuple):
-    """What `path_program` gives at n places, each an (m + 2, n) array: the values, and the derivatives by m parameters
-    and by the place.
-
-    Attributes
-    ----------
-    x, z, ds, curvature, load : array
-        x, z, ds/dlam, m*kappa and m*n0.
-    potential : array or None
-        U; None of a motion with losses.
-    y, product : array or None
-        y of a space curve, and m**2 times ``load_along_curvature`` of one in no vertical plane; None of others.
-    """
-
-    x: Array
-    z: Array
-    ds: Array
-    curvature: Array
-    load: Array
-    potential: Array | None = None
-    y: Array | None = None
-    product: Array | None = None
-
-    def force_changes(self, v: Array, faster: Array, changed: Callable[[Array], Array]) -> Array:
-        """Return the change of the contact force with the velocity's, ``faster``; ``changed`` gives that of rows."""
-        curvature, load = changed(self.curvature), changed(self.load)
-        if self.product is None:
-            force: Array = load + v**2 * curvature + 2.0 * v * self.curvature[0] * faster
-            return force
-        w, kappa, product = v**2, self.curvature[0], self.product[0]
-        half_square = kappa * w * w * curvature + w * changed(self.product) + self.load[0] * load
-        half_square += 2.0 * v * (kappa * kappa * w + product) * faster
-        with np.errstate(divide="ignore", invalid="ignore"):  # |N| has a kink where it vanishes
-            force = half_square / np.sqrt((kappa * w) ** 2 + 2.0 * product * w + self.load[0] ** 2)
-        return force
-
-
-def path_rows(
-    formulas: ExactFormulas | ExactLaw, parameters: Array, mass: int, high: Array, low: Array | None = None
-) -> PathRows:
-    """The path at places, with derivatives."""
-    count = parameters.shape[1]
-    found = values(path_program(formulas, count, mass), parameters, high, low)[:, 0]
-    rows: list[Any] = list(found.reshape(len(found) // (count + 2), count + 2, high.size))
-    if isinstance(formulas, ExactLaw):
-        rows.insert(5, None)  # no potential
-    return PathRows(*rows)
-
-
-# Values of functions at shares of the phase, and their integrals from the beginning of it: a row for each function.
-SeriesOf = Callable[[Array], tuple[Array, Array]]
+# The type of a function that returns, for shares of the phase, the values of functions and their integrals from the
+# beginning of the phase: a row for each function.
+SeriesOf = Callable[[Array], Array]
 
 
 class OrbitDerivatives(ABC):
@@ -134,8 +69,8 @@ class OrbitDerivatives(ABC):
     source : AnySource
         What programs are recorded from.
     by_arc_length : bool
-        Whether the parameter of the curve is its arc length. Then parameters may move the curve's points, and
-        derivatives at the points of the curve are not those at given arc lengths.
+        Whether the parameter of the curve is its arc length. In that case run-time parameters may move the curve's
+        points, and derivatives at the points of the curve differ from those at given arc lengths.
     """
 
     direction: int
@@ -159,29 +94,33 @@ class OrbitDerivatives(ABC):
 
     @property
     @abstractmethod
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """The series of the time per phase and its derivatives and then of those of arc length per share; and the
+        derivatives of the lap.
+        """
 
     @abstractmethod
     def at_places(self, lam: Array) -> PathRows:
-        """`path_rows` at places."""
+        """Return `path_rows` at places."""
 
     @abstractmethod
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Half of V**2, or the contact force, at places: with two derivatives by the place, and those by variables."""
+        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
+        variables.
+        """
 
     @abstractmethod
     def _integrals(self, first: int, count: int) -> Array:
-        """The integrals of results over a half period, or over a lap."""
+        """Return the integrals of results over a half period, or over a lap."""
 
     @property
     def moved_ends(self) -> Array:
-        """The derivatives of the turning points of a libration at the points of the curve, which do not move."""
+        """The derivatives of the turning points of a libration, relative to the points of the curve."""
         return self.ends
 
     @property
     def launch_moves(self) -> Array:
-        """How the place of the launch changes, at the points of the curve, which do not move."""
+        """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
         return moves
@@ -192,12 +131,12 @@ class OrbitDerivatives(ABC):
         return self._integrals(1, self.source.variables)
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
-        """The second derivatives of the half period of a libration, or of the time of a lap.
+        """Return the second derivatives of the half period of a libration, or of the time of a lap.
 
         Parameters
         ----------
         rows : tuple of int
-            The variables, of which each pair has one, as `programs.pairs_of` them.
+            The variables; there is a derivative for each of their pairs, in the order of `second_programs.pairs_of`.
         """
         raise SolutionError("gradient: second derivatives along curves without formulas are not there yet")
 
@@ -219,9 +158,9 @@ class OrbitDerivatives(ABC):
 
     @property
     def _period_share(self) -> float:
-        """How many of what is integrated over make a period."""
+        """The number of half periods, or of laps, in a period."""
         return 1.0 if self.direction else 2.0
 
     def without_shift(self, moved: Array, lam: Array) -> Array:
-        """Return the change of a place among the fixed points of the curve from the change of its parameter."""
+        """Convert the change of a place's parameter to the change of the place relative to the points of the curve."""
         return moved

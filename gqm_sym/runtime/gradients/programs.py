@@ -1,8 +1,8 @@
 """The programs of gradients: formulas of a motion with their derivatives, recorded as tapes.
 
 ``half`` below is half of V**2, as a function of a place, the run-time parameters, the launch place lam0, its speed v0,
-and a change of the energy, which is zero: ``half = v0**2/2 + energy + U(lam0) - U(lam)``. The variables are what
-derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in this order.
+and a change of the energy, which is zero: ``half = v0**2/2 + energy + U(lam0) - U(lam)``. The variables of
+differentiation are the run-time parameters, lam0, v0 and the energy, in this order.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 
-# What the variables have besides the run-time parameters: launch place, its speed, and the energy.
+# The number of variables besides the run-time parameters: the launch place, the launch speed, and the energy.
 LAUNCH_VARIABLES = 3
 
 # A program with more registers is not used: its work space would take tens of megabytes.
@@ -29,12 +29,12 @@ MAX_REGISTERS = 8000
 
 
 class Program(NamedTuple):
-    """Formulas as operations, with the space that they are carried out in.
+    """Formulas as operations, with their work space.
 
     Attributes
     ----------
     operations : (m, 4) array of int
-        What the interpreter carries out: first what does not depend on the place.
+        The operations that the interpreter carries out; those that do not depend on the place come first.
     first : int
         The number of operations that do not depend on the place.
     inputs : int
@@ -44,7 +44,7 @@ class Program(NamedTuple):
     work : array
         The registers, of which those of constants are filled.
     constants : tuple
-        The numbers of these registers, and what they are exactly: a number, or "pi" or "e".
+        The positions of these registers, and their exact values: a number, or "pi" or "e".
     """
 
     operations: NDArray[np.int64]
@@ -91,7 +91,7 @@ class Source(NamedTuple):
     inertia : callable or None
         ``f(op, p)`` gives 1 + beta; None where it is 1.
     parameters, mass : int
-        The number of run-time parameters, and which of them is the mass.
+        The number of run-time parameters, and the index of the mass among them.
     """
 
     formulas: ExactFormulas
@@ -102,17 +102,17 @@ class Source(NamedTuple):
 
     @property
     def variables(self) -> int:
-        """How many variables derivatives are taken by."""
+        """The number of variables of differentiation."""
         return self.parameters + LAUNCH_VARIABLES
 
     @property
     def inputs(self) -> int:
-        """How many numbers a motion at a place depends on."""
+        """The number of inputs on which a motion at a place depends."""
         return self.variables
 
     @property
     def coordinates(self) -> int:
-        """How many coordinates a place has."""
+        """The number of coordinates of a place."""
         return 1
 
     def half(self, op: Recorder, lam: TapeNumber) -> TapeNumber:
@@ -124,7 +124,7 @@ class Source(NamedTuple):
         return found
 
     def local(self, op: Recorder, lam: TapeNumber) -> Local:
-        """Record the motion at a place that no variable changes."""
+        """Record the motion at a place that does not depend on the variables."""
         half, ds = self.half(op, lam), op.number(self.formulas.ds(op, lam, op.values[: self.parameters]))
         half_slope, *half_partials = gradient(op, half, [lam, *op.values[: self.variables]])
         ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[: self.parameters]])
@@ -136,7 +136,9 @@ class Source(NamedTuple):
 
 
 class AnySource(Protocol):
-    """Where programs get a motion at a place from: formulas of the curve, or its coordinates along a chart."""
+    """The source from which programs get a motion at a place: formulas of the curve, or its coordinates along a
+    chart.
+    """
 
     @property
     def parameters(self) -> int:
@@ -144,15 +146,15 @@ class AnySource(Protocol):
 
     @property
     def variables(self) -> int:
-        """How many variables derivatives are taken by."""
+        """The number of variables of differentiation."""
 
     @property
     def inputs(self) -> int:
-        """How many numbers a motion at a place depends on, of which the variables come first."""
+        """The number of inputs on which a motion at a place depends; the variables come first among them."""
 
     @property
     def coordinates(self) -> int:
-        """How many coordinates a place has."""
+        """The number of coordinates of a place."""
 
     def local(self, op: Recorder, lam: TapeNumber) -> Local:
         """Record the motion at a place."""
@@ -164,7 +166,7 @@ class AnySource(Protocol):
 
 
 def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
-    """Return the operations that results need, with registers for nothing else."""
+    """Return the program of the given results, with no registers for other operations."""
     wanted = [op.register(output) for output in outputs]
     inputs = len(op.values)
     live, pending = set(range(inputs + len(op.places))), list(wanted)
@@ -202,7 +204,9 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 
 @lru_cache(maxsize=64)
 def turning_point_program(source: AnySource) -> Program:
-    """The step of Newton's method to a turning point from the place, and its derivatives by all variables."""
+    """Return the program of the Newton step from the place to a turning point, and of the turning point's derivatives
+    by all variables.
+    """
     op = Recorder(source.inputs, source.coordinates)
     here = source.local(op, op.place)
     return assemble(op, [-(part / here.half_slope) for part in (here.half, *here.half_partials)])
@@ -210,12 +214,13 @@ def turning_point_program(source: AnySource) -> Program:
 
 @lru_cache(maxsize=64)
 def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
-    """Return the integrand over the phase angle of a libration, with its derivatives at the same phase angle.
+    """Return the program of the integrand over the phase angle of a libration, with its derivatives at the same phase
+    angle.
 
-    The place is the square of the sine of half the phase angle. The inputs behind those of the source are both turning
-    points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi
-    (1+beta) with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some
-    variables are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
+    The coordinate of a place is the square of the sine of half the phase angle. The inputs after those of the source
+    are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables,
+    V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same
+    place. If variables are ``wanted``, the results are the derivatives of dt/dphi by these alone.
     """
     n, share = source.variables, (op := Recorder(source.inputs + 2 * source.variables + 2, source.coordinates)).place
     a, b, *ends = op.values[source.inputs :]
@@ -228,7 +233,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     for k, by in enumerate(gradient(op, inertia, op.values[:n])):
         low, high, stretch = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
         moved = low + (high - low) * share
-        # First the small change of V**2 as a whole, for near the turning points the parts of it are large.
+        # The small change of V**2 is computed as a whole first, because its parts are large near the turning points.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
         longer = (high - low) / width + (stretch + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
@@ -239,7 +244,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
 
 
 def lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, TapeNumber, TapeNumber, TapeNumber]:
-    """A tape with the length of a lap in lam, and ds/dlam, V**2 and dt/dshare at a share of it."""
+    """Return a tape with the length of a lap in lam, and with ds/dlam, V**2 and dt/dshare at a share of the lap."""
     op = Recorder(source.variables + 1)
     p = op.values[: source.parameters]
     lap = direction * op.number(source.domain(op, p)[2])
@@ -250,12 +255,13 @@ def lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, Tape
 
 @lru_cache(maxsize=64)
 def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] | None = None) -> Program:
-    """Return the integrand over a lap, with the place as a share of the lap, and its derivatives at the same share.
+    """Return the program of the integrand over a lap, with the place as a share of the lap, and of its derivatives at
+    the same share.
 
-    The inputs are the variables, and the place where the lap begins: it is that of the launch, but does not change with
-    it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
-    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as for a
-    libration.
+    The inputs are the variables and the place where the lap begins, which is that of the launch but does not change
+    with it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
+    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as in
+    `libration_program`.
     """
     op, lap, ds, v2, rate = lap_rate(source, direction)
     if wanted is not None:
@@ -271,7 +277,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
-    ds/dlam, m*kappa, m*n0, U without losses, y of a space curve, and m**2 times ``load_along_curvature`` of one in no
+    ds/dlam, m*kappa, m*n0, U (0 with losses), y of a space curve, and m**2 times ``load_along_curvature`` of one in no
     vertical plane.
     """
     op = Recorder(parameters)
@@ -279,8 +285,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     quantities = [formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)]
     for formula in (formulas.kappa, formulas.static_normal_load):
         quantities.append(m * formula(*arguments))
-    if isinstance(formulas, ExactFormulas):
-        quantities.append(formulas.effective_potential(*arguments))
+    quantities.append(formulas.effective_potential(*arguments) if isinstance(formulas, ExactFormulas) else op.number(0))
     if formulas.y is not None:
         quantities.append(formulas.y(*arguments))
     if formulas.load_along_curvature is not None:
@@ -289,7 +294,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
 
 
 def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, w: Any) -> Any:
-    """Record N/m where V**2 is ``w``; of a curve in no vertical plane ``|N|/m``."""
+    """Record N/m for V**2 = ``w``; for a curve that lies in no vertical plane, ``|N|/m``."""
     curvature, load = (f(op, lam, op.values) for f in (formulas.kappa, formulas.static_normal_load))
     if formulas.load_along_curvature is None:
         return curvature * w + load
@@ -299,7 +304,8 @@ def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNum
 
 @lru_cache(maxsize=64)
 def extreme_program(source: Source, of_speed: bool) -> Program:
-    """Half of V**2, or the contact force, at a place, with its first and second derivative by the place.
+    """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative by
+    the place.
 
     The inputs are the variables; the derivatives by them follow.
     """

@@ -13,16 +13,16 @@ from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.second_programs import pairs_of
 from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 
-# What has second derivatives.
+# The quantities that have second derivatives.
 PERIODS = ("half_period", "period")
 
-# An extreme this near to a turning point is there, as a share of the width of the orbit. The place of another one is
-# improved by Newton's method, whose steps may be this share of the width.
+# An extreme that is nearer to a turning point than this share of the orbit's width counts as being there. The place of
+# any other extreme is improved by Newton's method, whose steps may be at most this share of the width.
 AT_TURN, MAX_STEP, NEWTON_STEPS = 1e-12, 1e-5, 3
 
 
 def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
-    """The names that derivatives are wanted by, each with its row among the variables.
+    """Return the names of the variables of differentiation, each with its row among all variables.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
 
 
 def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, Any]:
-    """The derivatives of a quantity of a motion, by names.
+    """Return the derivatives of a quantity of a motion, by the names of the variables.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
     quantity : str
         One of `launch.kinds.QUANTITIES`.
     wrt : name, sequence of names, or None
-        What they are by.
+        The variables of differentiation.
     """
     rows = selected(motion.problem.formulas.parameters, wrt)
     if quantity in ("half_period", "turning_points") and motion.kind != "libration":
@@ -72,7 +72,7 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
 
 
 def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
-    """The second derivatives of a half period or a period, by two names.
+    """Return the second derivatives of a half period or a period, by two names.
 
     Parameters
     ----------
@@ -91,10 +91,10 @@ def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, w
 
 
 def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) -> Array:
-    """The derivatives of an extreme along the motion, by all variables.
+    """Return the derivatives of an extreme along the motion, by all variables.
 
-    Inside the orbit it changes as the quantity does at a fixed place, since it is stationary there (envelope theorem).
-    At a turning point, or where a horizon cuts the motion, the place changes too.
+    Inside the orbit the extreme changes as the quantity does at a fixed place, because the quantity is stationary there
+    (envelope theorem). At a turning point, or where a horizon cuts the motion, the place changes too.
     """
     extreme, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     found = np.zeros(derivatives.source.variables)
@@ -119,9 +119,9 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
 
 
 def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width: float) -> tuple[Array, bool]:
-    """The place of an extreme inside an orbit by Newton's method, and whether the quantity is stationary there.
+    """Return the place of an extreme inside an orbit by Newton's method, and whether the quantity is stationary there.
 
-    Where the quantity is constant, or all but constant, the place does not matter and is left.
+    If the quantity is constant, or nearly so, the place does not matter and is not changed.
     """
     found = place
     for _ in range(NEWTON_STEPS):

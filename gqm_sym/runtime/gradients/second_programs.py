@@ -10,7 +10,9 @@ from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, Source
 
 @lru_cache(maxsize=16)
 def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """As `turning_point_program`, and then the second derivatives by the variables in ``rows``, as `pairs_of` them."""
+    """Return the program of `turning_point_program` with the second derivatives by the pairs of variables (`pairs_of`)
+    in ``rows``.
+    """
     op = Recorder(source.variables)
     here = source.local(op, op.place)
     step, *moves = [-(part / here.half_slope) for part in (here.half, *here.half_partials)]
@@ -20,15 +22,17 @@ def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
 
 
 def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
-    """The pairs of variables of which there are second derivatives: each with itself and those behind it."""
+    """Return the pairs of variables that have second derivatives: each variable with itself and with those after it."""
     return list(combinations_with_replacement(rows, 2))
 
 
 @lru_cache(maxsize=16)
 def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """The second derivatives of dt/dphi at the same phase angle, as `pairs_of` the variables in ``rows``.
+    """Return the program of the second derivatives of dt/dphi at the same phase angle, by the pairs of variables in
+    ``rows``.
 
-    The inputs are as of `libration_program`, with the second derivatives of each turning point behind its first ones.
+    The inputs are those of `libration_program`, where the first derivatives of each turning point are followed by the
+    second ones.
     """
     n, pairs = source.variables, pairs_of(rows)
     op = Recorder(n + 2 * (1 + n + len(pairs)))
@@ -41,7 +45,8 @@ def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
     by_launch = [op.number(0)] * LAUNCH_VARIABLES
     moved = [at_low + (at_high - at_low) * share for at_low, at_high in zip(low, high, strict=True)]
     wider = [(at_high - at_low) / width for at_low, at_high in zip(low, high, strict=True)]
-    # The changes of half of V**2 and of ds/dlam as a whole, for near the turning points the parts of them are large.
+    # The changes of half of V**2 and of ds/dlam are computed as a whole, because their parts are large near the turning
+    # points.
     faster = [part + half_slope * move for part, move in zip(half_partials, moved, strict=False)]
     longer = [part + ds_slope * move for part, move in zip([*ds_partials, *by_launch], moved, strict=False)]
     log_rates = [wider[k] + longer[k] / ds - faster[k] / (2 * half) for k in range(n)]
@@ -58,7 +63,9 @@ def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
 
 @lru_cache(maxsize=16)
 def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
-    """The second derivatives of dt/dshare at the same share of a lap, as `pairs_of` the variables in ``rows``."""
+    """Return the program of the second derivatives of dt/dshare at the same share of a lap, by the pairs of variables
+    in ``rows``.
+    """
     op, *_, rate = lap_rate(source, direction)
     first = gradient(op, rate, op.values[: source.variables])
     second = {i: gradient(op, first[i], op.values[: source.variables]) for i in rows}

@@ -1,19 +1,40 @@
 """Derivatives of states at given times with respect to launch and parameters, after any number of periods.
 
-At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
-``delay`` is how much further on, in time, the body is along the changed orbit.
+At a fixed phase angle everything changes smoothly. When a variable changes, the body reaches a phase angle earlier or
+later, by the changes of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is the time by which the body is further along the changed orbit.
 """
 
+from collections.abc import Sequence
+from math import pi, sin
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
-from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, Array
+from gqm_sym.runtime.gradients.evaluation import CUBE
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed, path_changes
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
+
+# The rows of points on an orbit (`records.phases_along`): the phase angle, the velocity, the sign of the change of the
+# phase angle with time, the numbers of half periods (or laps) and of laps before the point, and the place in the lap.
+PHASE, SPEED, SENSE, TURNS, LAPS, PLACE, POINT_ROWS = range(7)
+
+# The rows of the constants of an orbit, with a number for each variable: the changes of the half period (or the time of
+# a lap), of the time at which the phase begins, of the arc length from launch at that time, of the arc length of a lap,
+# of the length of a lap in lam, and of both turning points; and the relative change of the width.
+DURATION, LAUNCH_DELAY, LAUNCH_ARC, LAP_ARC, LAP, LOWER, UPPER, WIDENING, CONSTANTS = range(9)
+
+# The number of points that are evaluated together; for more of them the system would provide memory anew each time.
+BLOCK = 2048
+
+# The rows of changes of states.
+LAM, S, X, V, N, Y, STATE_ROWS = 0, 1, 2, 4, 5, 6, 7
 
 
 class Sensitivity(NamedTuple):
@@ -24,7 +45,7 @@ class Sensitivity(NamedTuple):
     Attributes
     ----------
     wrt : tuple of str
-        What the derivatives are by: run-time parameters, the launch place ``lam0`` and speed ``v0``.
+        The variables of differentiation: run-time parameters, the launch place ``lam0`` and the launch speed ``v0``.
     lam, s, x, z, v, normal_force, y : array
         Derivatives of the curve parameter, of arc length from launch, of the coordinates, of the velocity ds/dt and of
         the contact force, at fixed times. That of y is 0 along a planar curve.
@@ -40,32 +61,73 @@ class Sensitivity(NamedTuple):
     y: Array
 
 
-class _Along(NamedTuple):
-    """The changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
+@entry(types.void(MATRIX, MATRIX, CUBE, CUBE, REAL, CUBE), checked=False)
+def fill_changes(points, orbit, series, path, scale, found):  # type: ignore[no-untyped-def]
+    """Fill the changes of states at fixed times.
 
-    Attributes
+    Parameters
     ----------
-    times : array
-        The change of the time from where the phase begins.
-    places : array
-        The change of the place within the lap.
-    speeds : array
-        The relative change of the velocity.
-    arcs : array
-        The change of arc length from where the phase begins: for a libration between fixed places, for a circulation
-        at a fixed share.
-    acceleration : array
-        The acceleration along the curve in m/s2, without row.
-    path : PathRows
-        The path there.
+    points : (POINT_ROWS, n) array
+        The points of the orbit.
+    orbit : (CONSTANTS, variables) array
+        The constants of the orbit.
+    series : (2, functions, n) array
+        `OrbitDerivatives.series` there.
+    path : (k, m + 2, n) array
+        The path there (`path.PathRows`).
+    scale : float
+        The phase angle of a whole turn of a libration, or 1 for a circulation.
+    found : (STATE_ROWS, variables, n) array
+        The changes of lam within the lap, s, x, z, v, N and y, which are filled.
     """
+    variables, n, swings = orbit.shape[1], points.shape[1], scale != 1.0
+    share, upper, acceleration = np.empty(n), np.empty(n), np.empty(n)
+    ds, fall, v, sense = path[DS, 0], path[POTENTIAL, path.shape[1] - 1], points[SPEED], points[SENSE]
+    turns, laps, rate = points[TURNS], points[LAPS], series[0, 0]
+    for i in range(n):
+        share[i] = points[PHASE, i] / scale
+        upper[i], acceleration[i] = sin(pi * share[i]) ** 2, -fall[i] / ds[i]
+    for j in range(variables):
+        lap, lower, high = orbit[LAP, j], orbit[LOWER, j], orbit[UPPER, j]
+        launch, duration, widening = orbit[LAUNCH_DELAY, j], orbit[DURATION, j], orbit[WIDENING, j]
+        launch_arc, lap_arc = orbit[LAUNCH_ARC, j], orbit[LAP_ARC, j]
+        place, arc, faster = found[LAM, j], found[S, j], found[V, j]
+        slower, later, longer = series[0, 1 + j], series[1, 1 + j], series[1, 1 + variables + j]
+        for i in range(n):
+            place[i] = lap * share[i] + lower * (1.0 - upper[i]) + high * upper[i]
+        fill_changed(path[DS], j, place, faster)
+        for i in range(n):
+            delay = launch - turns[i] * duration - sense[i] * scale * later[i]
+            faster[i] = v[i] * (widening + faster[i] / ds[i] - slower[i] / rate[i]) + acceleration[i] * delay
+            arc[i] = launch_arc + laps[i] * lap_arc + scale * longer[i] + v[i] * delay
+            if swings:
+                arc[i] += ds[i] * place[i]
+            place[i] += v[i] / ds[i] * delay
+    path_changes(path, points[SPEED], found[LAM], found[X:STATE_ROWS])
 
-    times: Array
-    places: Array
-    speeds: Array
-    arcs: Array
-    acceleration: Array
-    path: PathRows
+
+def points_of(found: Any, lam: Array, v: Array) -> Array:
+    """Return points on an orbit in the form that `fill_changes` takes.
+
+    Parameters
+    ----------
+    found : motion.trajectory.PhasePoints
+        The points.
+    lam, v : array
+        The places within the lap, and the velocities.
+    """
+    points, laps = np.zeros((POINT_ROWS, lam.size)), found.laps
+    points[SPEED], points[LAPS], points[PLACE] = v, laps, lam
+    points[SENSE], points[TURNS] = 1.0, laps
+    first, period = found.trajectory.segments[0], found.trajectory.period
+    swings = len(found.trajectory.segments) > 1
+    for timed, mask, phi in found.segments:
+        points[PHASE, mask] = phi
+        if swings:
+            before = timed.t_start[0] - timed.sense * timed.r_start[0] + first.sense * first.r_start[0]
+            points[SENSE, mask] = timed.sense
+            points[TURNS, mask] = 2.0 * laps[mask] + round(before / (0.5 * period[0]))
+    return points
 
 
 class OrbitSensitivity:
@@ -80,133 +142,106 @@ class OrbitSensitivity:
     def __init__(self, derivatives: OrbitDerivatives) -> None:
         self._derivatives = derivatives
         self._scale, self._width = 1.0 if derivatives.direction else 2.0 * np.pi, derivatives.width
-        self._rates, self._arcs, self._lap_gradient = derivatives.series
-        self._launches: dict[float, _Along] = {}
+        self._series, self._lap = derivatives.series
+        self._orbits: dict[float, Array] = {}
 
-    def _by_all(self, rows: Array) -> Array:
-        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
-        return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
+    def _orbit(self, motion: Any, phi: float) -> Array:
+        """Return the constants of the orbit; the launch's phase angle gains digits once the period is known exactly."""
+        if phi not in self._orbits:
+            self._orbits[phi] = self._constants(motion, phi)
+        return self._orbits[phi]
 
-    def _places(self, share: Array) -> Array:
-        """Return the changes of places at shares of the phase, within the lap."""
-        if self._derivatives.direction:
-            return self._lap_gradient * share
-        upper = np.sin(np.pi * share) ** 2
-        low, high = (end[:, None] for end in self._derivatives.moved_ends.T)
-        places: Array = low * (1.0 - upper) + high * upper
-        return places
-
-    def _along(self, share: Array, lam: Array, v: Array) -> _Along:
-        """Return the changes at shares of the phase, at which the places and velocities are known."""
-        derivatives = self._derivatives
-        (rates, times), arcs = self._rates(share), self._arcs(share)[1]
-        path, places = derivatives.at_places(lam), self._places(share)
+    def _constants(self, motion: Any, phi: float) -> Array:
+        derivatives, variables = self._derivatives, self._derivatives.source.variables
+        orbit = np.zeros((CONSTANTS, variables))
+        orbit[DURATION], orbit[LAP] = derivatives.duration_gradient, self._lap
         if derivatives.direction:
-            widening = self._lap_gradient / self._width
+            orbit[WIDENING] = self._lap / self._width
+            orbit[LAP_ARC] = self._series(np.ones(1))[1, 1 + variables :, 0]
         else:
-            low, high = (end[:, None] for end in derivatives.moved_ends.T)
-            widening = (high - low) / self._width
-        ds, potential = path.ds, path.potential
-        assert potential is not None
-        stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
-        return _Along(
-            times=self._scale * times[1:],
-            places=places,
-            speeds=v * (widening + stretch - rates[1:] / rates[0]),
-            arcs=self._scale * arcs,
-            acceleration=-potential[-1] / ds[0],
-            path=path,
+            orbit[LOWER], orbit[UPPER] = derivatives.moved_ends.T
+            orbit[WIDENING] = (orbit[UPPER] - orbit[LOWER]) / self._width
+        # Without a delay of the launch, these are the changes at a fixed phase angle.
+        speed = motion.direction * motion.problem.launch.v0.value
+        still = np.array([[phi], [speed], [0.0], [0.0], [0.0], [motion.problem.lam0]])
+        series, found = self._series(still[PHASE] / self._scale), np.empty((STATE_ROWS, variables, 1))
+        path = derivatives.at_places(still[PLACE])
+        fill_changes(still, orbit, series, path.rows, self._scale, found)
+        orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_moves
+        orbit[LAUNCH_DELAY] = self._launch_delay(
+            motion, path, self._scale * series[1, 1 : 1 + variables, 0], found[:, :, 0]
         )
+        return orbit
 
-    def _at_launch(self, motion: Any, points: Any) -> _Along:
-        """Return the changes at the launch, whose phase angle has more digits once the period is known exactly."""
-        phi = points.trajectory.segments[0].phi_start
-        if phi not in self._launches:
-            v0 = motion.direction * motion.problem.launch.v0.value
-            places = np.array([phi / self._scale]), np.array([motion.problem.lam0]), np.array([v0])
-            self._launches[phi] = self._along(*places)
-        return self._launches[phi]
-
-    def _launch_delay(self, launch: _Along, motion: Any) -> Array:
-        """Return the derivatives of the time from the lower turning point to the launch of a libration.
-
-        The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
-        """
-        direction, given = motion.direction, motion.problem.launch
-        v0, ds, acceleration = given.v0.value, launch.path.ds[0], launch.acceleration
-        own: Array = np.zeros_like(launch.times)
-        if v0**2 < abs(acceleration[0]) * ds[0] * self._width:
-            own[V0] = given.direction  # at rest, the direction in which a speed would be
-            passed: Array = direction * (own - launch.speeds) / acceleration
-        else:
-            own[:] = self._derivatives.launch_moves[:, None]
-            passed = ds / v0 * (own - launch.places)
-        passed += launch.times
-        return passed
-
-    def at(self, motion: Any, points: Any, lam: Array, v: Array) -> list[Array]:
-        """The derivatives of lam, s, x, z, v, N and y at times: a row for each variable.
+    def _launch_delay(self, motion: Any, path: PathRows, times: Array, at_launch: Array) -> Array:
+        """Return the change of the time at which the phase begins.
 
         Parameters
         ----------
         motion : motion.periodic.PeriodicMotion
             The motion.
-        points : motion.trajectory.PhasePoints
-            Where it is at the times.
-        lam, v : array
-            The places within the lap, and the velocities.
+        path : PathRows
+            The path at the launch.
+        times : array
+            The change of the time to there.
+        at_launch : array
+            The changes of the state there at a fixed phase angle (`fill_changes`).
         """
-        along, launch, laps = self._along(self._share(points), lam, v), self._at_launch(motion, points), points.laps
-        delay = self._delay(along.times, launch, motion, points)
-        arcs = along.arcs - launch.arcs + v * delay
-        launched = self._derivatives.launch_moves[:, None]
-        arcs -= launch.path.ds[0] * launched
+        given, direction, ds = motion.problem.launch, motion.direction, path.ds[0, 0]
+        v0, moves = given.v0.value, self._derivatives.launch_moves
         if self._derivatives.direction:
-            arcs += laps * self._arcs(np.ones(1))[1]
+            circulating: Array = direction * ds / v0 * moves
+            return circulating
+        # It follows from the launch place and also from the launch speed; the speed is used near turning points, the
+        # place elsewhere.
+        acceleration = -path.rows[POTENTIAL, -1, 0] / ds
+        if v0**2 < abs(acceleration) * ds * self._width:
+            own: Array = np.zeros_like(times)
+            own[V0] = given.direction  # at rest, the direction that a speed would have
+            passed: Array = direction * (own - at_launch[V]) / acceleration
         else:
-            arcs += along.path.ds[0] * along.places
-        places = along.places + v / along.path.ds[0] * delay
-        speeds = along.speeds + along.acceleration * delay
-        path = along.path
+            passed = ds / v0 * (moves - at_launch[LAM])
+        delay: Array = direction * (passed + times)
+        return delay
 
-        def changed(rows: Array) -> Array:
-            found: Array = self._by_all(rows[1:-1]) + rows[-1] * places
-            return found
+    def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
+        """Return the derivatives of lam, s, x, z, v, N and y at times by some of the variables.
 
-        y = np.zeros_like(places) if path.y is None else changed(path.y)
-        others = [changed(path.x), changed(path.z), speeds, path.force_changes(v, speeds, changed), y]
-        if not self._derivatives.by_arc_length:
-            return [places + laps * self._lap_gradient, arcs, *others]
-        arcs[LAM0] += 1.0  # from the start point of the curve
-        return [arcs, arcs, *others]
+        Parameters
+        ----------
+        motion : motion.periodic.PeriodicMotion
+            The motion.
+        points : (POINT_ROWS, n) array
+            The points of the orbit at the times.
+        phi : float
+            The phase angle of the launch.
+        rows : sequence of int
+            The variables.
+        """
+        orbit, out = self._orbit(motion, phi), np.empty((STATE_ROWS, len(rows), points.shape[1]))
+        for start in range(0, points.shape[1], BLOCK):
+            block = slice(start, start + BLOCK)
+            out[:, :, block] = self._part(orbit, np.ascontiguousarray(points[:, block]))[:, rows]
+        return out
 
-    def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
-        """The derivatives of lam alone, as in `at`, where v and ds/dlam are known."""
-        share, launch = self._share(points), self._at_launch(motion, points)
-        delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
-        found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
+    def _part(self, orbit: Array, points: Array) -> Array:
+        """Return the derivatives at some of the points by all variables."""
+        found = np.empty((STATE_ROWS, orbit.shape[1], points.shape[1]))
+        path, series = self._derivatives.at_places(points[PLACE]).rows, self._series(points[PHASE] / self._scale)
+        fill_changes(points, orbit, series, path, self._scale, found)
+        if self._derivatives.by_arc_length:
+            found[S, LAM0] += 1.0  # from the start point of the curve
+            found[LAM] = found[S]
+        elif self._derivatives.direction:
+            found[LAM] += points[LAPS] * self._lap[:, None]
         return found
 
-    def _share(self, points: Any) -> Array:
-        """The shares of the phase at points."""
-        share: Array = np.zeros_like(points.laps)
-        for _, mask, phi in points.segments:
-            share[mask] = phi / self._scale
-        return share
-
-    def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
-        """Return the changes of time along the orbit at the times of points."""
-        gradient = self._derivatives.duration_gradient[:, None]
-        if self._derivatives.direction:
-            delay: Array = -times - points.laps * gradient
-            moves = self._derivatives.launch_moves[:, None]
-            delay += motion.direction * launch.path.ds[0] / motion.problem.launch.v0.value * moves
-            return delay
-        sense, swings = np.ones_like(points.laps), 2.0 * points.laps
-        first, half_period = points.trajectory.segments[0], 0.5 * points.trajectory.period[0]
-        for timed, mask, _ in points.segments:
-            before = timed.t_start[0] - timed.sense * timed.r_start[0] + motion.direction * first.r_start[0]
-            sense[mask] = timed.sense
-            swings[mask] += round(before / half_period)
-        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * times
-        return delay
+    def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
+        """Return the derivatives of lam alone, by all variables, given ds/dlam."""
+        orbit, share = self._orbit(motion, phi)[:, :, None], points[PHASE] / self._scale
+        times = self._scale * self._series(share)[1, 1 : 1 + orbit.shape[1]]
+        delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times
+        upper = np.sin(np.pi * share) ** 2
+        places = orbit[LAP] * (share + points[LAPS]) + orbit[LOWER] * (1.0 - upper) + orbit[UPPER] * upper
+        found: Array = places + points[SPEED] / ds * delay
+        return found

@@ -1,22 +1,24 @@
-"""The changes along an orbit as a series with its integrals: of Fourier, or of Legendre on panels."""
+"""The changes along an orbit as a series with its integrals: a Fourier series, or Legendre series on panels."""
+
+from math import cos, pi, sin
 
 import numpy as np
+from numba import types
 from numpy.polynomial.legendre import legint, legvander
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
+from gqm_sym.runtime.gradients.evaluation import CUBE
 
-# Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
-# number at most.
+# Terms below this share of the largest one are rounding if at least so many follow each other; the last terms may be at
+# most the third number.
 MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
-
-# Places that are evaluated together.
-BLOCK = 2048
 
 
 class Series:
-    """Functions of a share u, periodic with period 1, by their values at the midpoints of N equal intervals.
+    """Functions of a share u, periodic with period 1, given by their values at the midpoints of N equal intervals.
 
     Parameters
     ----------
@@ -36,38 +38,43 @@ class Series:
             raise SolutionError("gradients: the motion bends too sharply along its orbit for its Fourier series")
         counts = (shares > MIN_TERM).any(axis=0)
         used = next((k for k in range(1, counts.size) if not counts[k : k + TERMS_IN_A_ROW].any()), counts.size)
-        self._terms, self._order = terms[:, :used], order[:used]
+        turns = np.divide(1.0, 2j * np.pi * order[:used], where=order[:used] > 0, out=np.zeros(used, complex))
+        values, integrals = terms[:, :used], terms[:, :used] * turns
+        # The factors of all cosines, of all sines, and of the share; integrals vanish at 0.
+        self._table = np.zeros((2, len(samples), 2 * used + 1))
+        self._table[:, :, :used], self._table[:, :, used:-1] = (
+            (values.real, integrals.real),
+            (-values.imag, -integrals.imag),
+        )
+        self._table[1, :, 0] -= integrals.real.sum(axis=1)
+        self._table[1, :, -1] = values[:, 0].real
 
-    def __call__(self, share: Array) -> tuple[Array, Array]:
-        """The values at shares, and the integrals from 0 to there: a row for each function."""
-        count = self._order.size
-        found = np.empty((2, self._terms.shape[0], share.size))
-        factor = np.divide(1.0, 2j * np.pi * self._order, where=self._order > 0, out=np.zeros(count, complex))
-        values, integrals = (np.hstack([terms.real, -terms.imag]) for terms in (self._terms, self._terms * factor))
-        for start in range(0, share.size, BLOCK):
-            part = slice(start, start + BLOCK)
-            powers = _powers(np.exp(2j * np.pi * share[part]), count)
-            waves = np.vstack([powers.real, powers.imag])
-            found[0, :, part] = values @ waves
-            waves[:count] -= 1.0
-            found[1, :, part] = self._terms[:, :1].real * share[part] + integrals @ waves
-        return found[0], found[1]
+    def __call__(self, share: Array) -> Array:
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
+        waves = np.empty((self._table.shape[2], share.size))
+        fill_waves(share, waves)
+        found: Array = self._table @ waves
+        return found
 
 
-def _powers(bases: Array, count: int) -> Array:
-    """The powers 0 to count - 1 of complex numbers, a row for each; rounding grows with the logarithm of the power."""
-    powers = np.ones((count, bases.size), dtype=complex)
-    powers[1:2] = bases
-    done = 2
-    while done < count:
-        more = min(done, count - done)
-        powers[done : done + more] = powers[:more] * (powers[done - 1] * bases)
-        done += more
-    return powers
+@entry(types.void(VECTOR, MATRIX), checked=False)
+def fill_waves(shares, waves):  # type: ignore[no-untyped-def]
+    """Fill rows of the cosines of multiples of the phase, from the multiple 0 on, of their sines, and of the shares."""
+    n, count = shares.size, waves.shape[0] // 2
+    for i in range(n):
+        waves[0, i], waves[count, i], waves[2 * count, i] = 1.0, 0.0, shares[i]
+    for k in range(1, count):
+        for i in range(n):
+            if k == 1:
+                waves[1, i], waves[count + 1, i] = cos(2.0 * pi * shares[i]), sin(2.0 * pi * shares[i])
+            else:  # from two halves, so that rounding grows only with the logarithm of the order
+                one, other = k // 2, k - k // 2
+                c, s, more_c, more_s = waves[one, i], waves[count + one, i], waves[other, i], waves[count + other, i]
+                waves[k, i], waves[count + k, i] = c * more_c - s * more_s, s * more_c + c * more_s
 
 
 class PanelSeries:
-    """Functions of a share of the phase by their values at the nodes of panels.
+    """Functions of a share of the phase, given by their values at the nodes of panels.
 
     Parameters
     ----------
@@ -84,23 +91,40 @@ class PanelSeries:
         integrals = np.moveaxis(legint(np.moveaxis(terms, -1, 0), lbnd=-1), 0, -1) * halves
         totals = np.cumsum(integrals.sum(axis=-1), axis=1)
         integrals[:, 1:, 0] += totals[:, :-1]
-        self._terms = np.concatenate([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
+        both = np.array([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
+        self._table = np.ascontiguousarray(both.transpose(2, 3, 0, 1)).reshape(len(edges) - 1, RULE + 1, -1)
 
-    def __call__(self, share: Array) -> tuple[Array, Array]:
-        """The values at shares, and the integrals from 0 to there: a row for each function."""
-        panel = np.clip(np.searchsorted(self._edges, share, side="right") - 1, 0, len(self._edges) - 2)
-        left, right = self._edges[panel], self._edges[panel + 1]
-        waves = legvander(np.clip((2.0 * share - left - right) / (right - left), -1.0, 1.0), RULE)
-        parts = [
-            np.einsum("knj,nj->kn", self._terms[:, panel[i : i + BLOCK]], waves[i : i + BLOCK])
-            for i in range(0, max(share.size, 1), BLOCK)
-        ]
-        found, integrals = np.split(np.concatenate(parts, axis=1), 2)
-        return found, integrals
+    def __call__(self, share: Array) -> Array:
+        """Return the values at shares, and the integrals from 0 to these: a row for each function."""
+        found = np.empty((2, self._table.shape[2] // 2, share.size))
+        fill_polynomials(self._edges, self._table, share, found)
+        return found
+
+
+@entry(types.void(VECTOR, CUBE, VECTOR, CUBE), checked=False)
+def fill_polynomials(edges, table, shares, found):  # type: ignore[no-untyped-def]
+    """Fill values and integrals of Legendre series on panels at shares.
+
+    The table has for each panel and degree the coefficients of the values, and then those of the integrals.
+    """
+    degrees, functions = table.shape[1], table.shape[2]
+    sums = np.empty(functions)
+    for i in range(shares.size):
+        panel = min(max(np.searchsorted(edges, shares[i], side="right") - 1, 0), edges.size - 2)
+        left, right = edges[panel], edges[panel + 1]
+        x = min(max((2.0 * shares[i] - left - right) / (right - left), -1.0), 1.0)
+        before, now = 0.0, 1.0
+        sums[:] = 0.0
+        for k in range(degrees):
+            for j in range(functions):
+                sums[j] += now * table[panel, k, j]
+            before, now = now, ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0)
+        for j in range(functions // 2):
+            found[0, j, i], found[1, j, i] = sums[j], sums[functions // 2 + j]
 
 
 def to_legendre() -> Array:
-    """The matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
+    """Return the matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
     rule = panel_rule()
     table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
     return table

@@ -8,11 +8,12 @@ from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 
-# What can be expanded; the first two grow with each round of a circulation.
+# The quantities that can be expanded; the first two grow with each lap of a circulation.
 QUANTITIES = ("lam", "s", "x", "z", "v", "normal_force")
 GROWING = QUANTITIES[:2]
 
-# Steps of time of the first attempt and of the last one, and the terms that are zero as a share of the largest.
+# The number of time steps of the first attempt and of the last one; and the share of the largest term below which terms
+# count as zero.
 MIN_STEPS, MAX_STEPS, MAX_TAIL = 64, 2**16, 1e-14
 
 
@@ -30,7 +31,7 @@ class Fourier(NamedTuple):
 
 
 def fourier(motion: Any, quantity: str, n: int) -> Fourier:
-    """The coefficients of a quantity up to the n-th; the trapezoidal rule in time converges geometrically.
+    """Return the coefficients of a quantity up to the n-th; the trapezoidal rule in time converges geometrically.
 
     Parameters
     ----------

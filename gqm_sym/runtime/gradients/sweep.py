@@ -28,18 +28,18 @@ from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.kinds import EXTREMES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
-# From how many launches on a thread is worth starting.
+# The number of launches from which on a thread is worth starting.
 MIN_LAUNCHES_PER_THREAD = 64
 
-# Quantities whose gradients compiled code has: periods, each with how many half periods it is, and others.
+# Quantities whose gradients compiled code computes: periods, each with its number of half periods, and others.
 PERIODS = {"half_period": 1.0, "period": 2.0}
 COMPILED = (*PERIODS, "turning_points", *EXTREMES)
 
-# Steps of Newton's method to the turning points, from doubles.
+# The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
 
-# The grid that an extreme is found on, as shares of a lap and of a libration's width; then come so many steps of
-# Newton's method at most, until one is below the first share of the width.
+# The grid on which an extreme is found, in shares of a lap and of a libration's width. At most so many steps of
+# Newton's method follow, until one is below the first share of the width.
 LAP_SHARES = np.arange(BLOCK) / BLOCK
 WIDTH_SHARES = np.sin(0.5 * np.pi * np.arange(BLOCK) / (BLOCK - 1)) ** 2
 MAX_STEPS, LAST_STEP = 8, 1e-12
@@ -74,7 +74,8 @@ def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyp
 
 @entry(types.void(PROGRAM, VECTOR, PROGRAM, VECTOR, INTEGER, MATRIX, MATRIX, MATRIX), nogil=True)
 def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the gradients of half periods, or of times of laps; NaN where double-double arithmetic does not suffice.
+    """Fill the gradients of half periods, or of times of laps, with NaN where double-double arithmetic does not
+    suffice.
 
     Parameters
     ----------
@@ -83,11 +84,11 @@ def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found)
     kind : int
         LIBRATION or CIRCULATION.
     launches : (m, n + 2) array
-        The n variables of each launch, and the turning points of a libration as doubles know them.
+        The n variables of each launch, and the turning points of a libration to the accuracy of doubles.
     nodes : (4, k) array
         The table of shares (`nodes.trapezoidal_nodes`).
     found : (m, k) array
-        The derivatives by the variables that the orbit's program has.
+        Filled with the derivatives by the variables of the orbit's program.
     """
     n = launches.shape[1] - 2
     variables, inputs = np.zeros((3, n)), np.zeros((3, orbit[3]))
@@ -110,7 +111,8 @@ def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found)
 
 @Inner
 def fill_total(program, work, i, tangent, found):  # type: ignore[no-untyped-def]
-    """Fill the derivatives of a quantity at a place of the block that moves by ``tangent``; NaN where digits are lost.
+    """Fill the derivatives of a quantity at place ``i`` of the block, which moves by ``tangent``; they are NaN if
+    digits are lost.
 
     ``program`` is that of `programs.extreme_program`.
     """
@@ -126,7 +128,8 @@ def fill_total(program, work, i, tangent, found):  # type: ignore[no-untyped-def
 
 @Inner
 def fill_extreme(program, work, sign, ends, tangents, shares, found):  # type: ignore[no-untyped-def]
-    """Fill the extreme between two places, the largest size of the quantity on a grid, and the derivatives of it.
+    """Fill the extreme between two places, the largest size of the quantity on a grid, and the derivatives of the
+    extreme.
 
     Parameters
     ----------
@@ -139,7 +142,7 @@ def fill_extreme(program, work, sign, ends, tangents, shares, found):  # type: i
     shares : (k,) array
         The grid.
     found : (n + 2,) array
-        What is filled.
+        Filled with these.
     """
     outputs, has_ends = program[4], tangents.shape[2] > 0
     places, still = np.zeros((2, BLOCK)), np.zeros((3, outputs.size - 3))
@@ -190,8 +193,8 @@ def fill_extremes(turns, turns_work, extreme, work, kind, sign, launches, found)
     sign : float
         1 for the largest, -1 for the smallest.
     launches : (m, n + 2) array
-        The n variables of each launch, and the turning points of a libration as doubles know them, or both ends of a
-        lap.
+        The n variables of each launch, and the turning points of a libration to the accuracy of doubles, or both ends
+        of a lap.
     found : (m, n + 2) array
         The extreme, the largest size on the grid, and the derivatives.
     """
@@ -247,7 +250,7 @@ class Launches(NamedTuple):
 
     @property
     def circulates(self) -> NDArray[np.bool_]:
-        """Which of them circulate."""
+        """Whether each motion is a circulation."""
         circulates: NDArray[np.bool_] = np.isnan(self.spans[:, 0])
         return circulates
 
@@ -255,7 +258,7 @@ class Launches(NamedTuple):
 def launch_gradients(
     formulas: Formulas, quantity: str, launches: Launches, values: Array, rows: tuple[int, ...]
 ) -> Array:
-    """The derivatives of a quantity: a row for each launch, NaN where double-double arithmetic does not suffice.
+    """Return the derivatives of a quantity: a row for each launch, NaN where double-double arithmetic does not suffice.
 
     Parameters
     ----------
@@ -268,7 +271,7 @@ def launch_gradients(
     values : array
         The quantity of each launch.
     rows : tuple of int
-        The variables that derivatives are wanted by.
+        The variables of differentiation.
 
     Returns
     -------
@@ -291,7 +294,7 @@ def launch_gradients(
 
 
 def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Array:
-    """The derivatives of half periods, or of times of laps."""
+    """Return the derivatives of half periods, or of times of laps."""
     table, circulates = launches.table, launches.circulates
     source, found = source_of(formulas), np.full((len(table), len(rows)), nan)
     turns = turning_point_program(source)
@@ -316,9 +319,9 @@ def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, .
 
 
 def _extreme_gradients(formulas: Formulas, quantity: str, launches: Launches, values: Array) -> Array:
-    """The derivatives of extremes of V or of the contact force by all variables.
+    """Return the derivatives of extremes of V or of the contact force by all variables.
 
-    They are NaN too where the extreme is not that of the sweep, as near a pole.
+    They are also NaN where the extreme differs from that of the sweep, as it may near a pole.
     """
     of_speed, sign = quantity.startswith("v_"), 1.0 if quantity.endswith("_max") else -1.0
     source, table, circulates = source_of(formulas), launches.table, launches.circulates

@@ -21,21 +21,22 @@ from gqm_sym.runtime.compiled.types import VECTOR
 from gqm_sym.runtime.inversion.table import place_on_panel
 from gqm_sym.runtime.quadrature.time_panels import derivative
 
-# Nodes of the first fit, and of the last one that is tried: a larger fit takes longer than the table.
+# The number of nodes of the first fit, and of the last one that is tried; a larger fit would take longer than the
+# table.
 MIN_NODES, MAX_NODES = 16, 256
 
-# A fit is resolved when the last quarter of its coefficients is below this, relative to half the swing or to the lap:
-# the rounding of the nodes.
+# A fit is resolved when the last quarter of its coefficients is below this share of half the swing or of the lap, which
+# is the rounding of the nodes.
 MAX_TAIL = 4e-16
 
 # Trailing coefficients below this, half a unit in the last place, are dropped.
 MAX_DROPPED = 1.2e-16
 
-# The coefficients fall like powers: with m times as many nodes the tail is its own m-th power. If that is above this
-# limit for MAX_NODES, no fit is tried.
+# The coefficients decrease geometrically: with m times as many nodes the tail becomes its m-th power. If that is above
+# this limit for MAX_NODES, no larger fit is tried.
 MAX_PREDICTED_TAIL = 1e-12
 
-# Times that are summed together.
+# The number of times for which the series is summed together.
 BLOCK = 128
 _SERIES = types.Tuple((VECTOR, VECTOR))
 
@@ -73,7 +74,9 @@ def equal_phase_angles(edges, times, times_low, terms, n, known, out, lows):  # 
 
 @Inner
 def cosine_at(phi, lows, i):  # type: ignore[no-untyped-def]
-    """Return the cosine of a phase angle of two doubles; rounding it to one would be amplified between the nodes."""
+    """Return the cosine of a phase angle of two doubles. If the angle were rounded to one double, the error would be
+    amplified between the nodes.
+    """
     return cos(phi[i]) - sin(phi[i]) * lows[i]
 
 
@@ -81,7 +84,7 @@ def cosine_at(phi, lows, i):  # type: ignore[no-untyped-def]
 def circular_sum(values, table, k, begin):  # type: ignore[no-untyped-def]
     """Return the sum of values times every k-th entry of a cyclic table, beginning with the entry ``begin``.
 
-    The rounding errors of the sum are added up and compensated; over a hundred terms they would be several ulp.
+    The rounding errors of the sum are added up and corrected for; over a hundred terms they would be several ulp.
     """
     total, lost, entry = 0.0, 0.0, begin
     for i in range(values.size):
@@ -102,8 +105,8 @@ def fit_wave(edges, times, times_low, terms, is_libration):  # type: ignore[no-u
     edges, times, times_low, terms
         The panels, as `table.tabulate` takes them.
     is_libration : bool
-        Whether the motion is a libration. The series is then that of cos(phi) over half a period; else it is that of
-        the difference to a uniform motion, as a share of the lap.
+        Whether the motion is a libration. The series is then that of cos(phi) over half a period; otherwise it is that
+        of the difference from a uniform motion, as a share of the lap.
 
     Returns
     -------
@@ -120,7 +123,7 @@ def fit_wave(edges, times, times_low, terms, is_libration):  # type: ignore[no-u
             table[i] = sin(pi * (0.5 * steps - 2.0 * min(i, steps - i)) / steps)
         if is_libration:
             cosines, sines = np.empty(n), np.empty(0)
-            # The part that is even about the middle has even coefficients only, the odd part odd ones.
+            # The part that is even about the middle has only even coefficients, and the odd part only odd ones.
             even, odd = np.empty(half + 1), np.empty(half)
             for i in range(half):
                 one, other = cosine_at(phi, lows, i * gap), cosine_at(phi, lows, (n - i) * gap)
@@ -160,8 +163,8 @@ def fit_wave(edges, times, times_low, terms, is_libration):  # type: ignore[no-u
 def sum_cosines(c, x, n, out, work):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the sums of c_k cos(k phi) at n places x = cos(phi).
 
-    The arrays have room for a multiple of GROUP numbers. The first two terms, which are the largest, are added last:
-    so the sum is rounded least.
+    The arrays have room for a multiple of GROUP numbers. The first two terms, which are the largest, are added last, so
+    that the sum has the smallest rounding error.
     """
     for j in range(0, n, GROUP):
         sum_group(c, x, j, out, work)

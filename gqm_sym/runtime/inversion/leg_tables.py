@@ -1,9 +1,9 @@
-"""The state of a body on a trajectory of many segments at any times, in one call from Python.
+"""The state of a body at any times on a trajectory of many segments, in one call from Python.
 
 The data of all segments are stored in one record (`records.record`), because passing many arrays would take longer than
 reading them. All segments are of the kinds FROM_TURN and REGULAR (`quadrature.substitution`), and have polynomials for
-the phase angle over time (`table`), and for arc length and speed over the phase angle. Intervals of time follow each
-other from launch.
+the phase angle over time (`table`), and for arc length and speed over the phase angle. The intervals of time follow
+each other, beginning at launch.
 
 =================== ========================================================================================
 section             contents
@@ -30,15 +30,15 @@ from gqm_sym.runtime.inversion.table import LAST, TERMS
 
 FUNCTION, LAUNCH, SLOTS, INTERVALS, STATES, PANELS = range(6)
 
-# Columns of an interval: where it ends; its middle as two doubles, and one over half its length; the last phase angle
-# phi; the share of the way, phi (phi SQUARE + LINEAR); both ends of the segment, as two doubles, and its width; how
-# much whole laps add to places; and the powers of phi.
+# Columns of an interval: its end; its middle as two doubles, and one over half its length; the last phase angle phi;
+# the coefficients of the share of the segment, phi (phi SQUARE + LINEAR); both ends of the segment, as two doubles, and
+# its width; the increase of the place by whole laps; and the coefficients of phi in powers of time.
 UNTIL, MIDDLE, MIDDLE_LOW, SCALE, STOP, SQUARE, LINEAR = range(7)
 PLACE_A, PLACE_A_LOW, PLACE_B, PLACE_B_LOW, WIDTH, LAPS, POWERS = range(7, 14)
 INTERVAL_COLUMNS = POWERS + TERMS
 
-# Columns of a state: its panel; the sign of dlam/dphi, and that of dlam/dt; the arc length at the end ``a``; the speed
-# is Y (GROWTH phi + FIRST_GROWTH); and the errors of the time and of the place.
+# Columns of a state: its panel; the sign of dlam/dphi, and that of dlam/dt; the arc length at the end ``a``; the
+# coefficients of the speed, which is Y (GROWTH phi + FIRST_GROWTH); and the errors of the time and of the place.
 PANEL, DIRECTION, HEADING, ARC_A, GROWTH, FIRST_GROWTH, TIME_ERROR, PLACE_ERROR, STATE_COLUMNS = range(9)
 
 # Columns of a panel; the two series have WIDE terms each.
@@ -46,17 +46,17 @@ EDGE, HALF, ARC, SERIES = range(4)
 WIDE = 24
 PANEL_COLUMNS = SERIES + 2 * WIDE
 
-# A phase angle this close to the last one, as a share, is the last one.
+# A phase angle whose relative distance from the last one is below this is the last one.
 ROUNDED = 4e-16
 
-# States that are found together.
+# The number of states that are found together.
 BLOCK = 64
 
 
 @Inlined
 def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
-    """The index at which the row of the interval of a time begins."""
-    # Where the body rests from the start, t * rate is infinite or not a number: then the last slot is read.
+    """Return the index at which the row of the interval that contains a time begins."""
+    # If the body rests from the start, t * rate is infinite or not a number; the last slot is then read.
     at, last = item_at(slots, np.int64(min(slots.size - 1.0, t * rate))), intervals.size - INTERVAL_COLUMNS
     while at < last and t >= item_at(intervals, at + UNTIL):
         at += INTERVAL_COLUMNS
@@ -65,7 +65,7 @@ def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
 
 @Inlined
 def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
-    """The phase angle at a time on the interval whose row begins at an index."""
+    """Return the phase angle at a time on the interval whose row begins at an index."""
     x = (t - item_at(intervals, at + MIDDLE)) - item_at(intervals, at + MIDDLE_LOW)
     x *= item_at(intervals, at + SCALE)
     phi, stop = item_at(intervals, at + POWERS + LAST), item_at(intervals, at + STOP)
@@ -76,13 +76,25 @@ def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
 
 @Inlined
 def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
-    """The curve parameter within a lap at a phase angle, from the nearer end."""
+    """Return the curve parameter within a lap at a phase angle, from the nearer end."""
     share = phi * fma(phi, item_at(intervals, at + SQUARE), item_at(intervals, at + LINEAR))
     width, low_a = item_at(intervals, at + WIDTH), item_at(intervals, at + PLACE_A_LOW)
     low_b = item_at(intervals, at + PLACE_B_LOW)
     from_a = item_at(intervals, at + PLACE_A) + fma(width, share, low_a)
     to_b = item_at(intervals, at + PLACE_B) - fma(width, 1.0 - share, -low_b)
     return choose(share <= 0.5, from_a, to_b)
+
+
+@Inlined
+def speed_at(states, panels, of, phi):  # type: ignore[no-untyped-def]
+    """Return the index of the panel of a phase angle, the place on it from -1 to 1, and the speed there.
+
+    ``of`` is the index at which the state of its interval begins.
+    """
+    panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
+    x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
+    speed = legendre_sum(panels[panel + SERIES + WIDE : panel + SERIES + 2 * WIDE], x)
+    return panel, x, speed * fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
 
 
 @Inner
@@ -119,12 +131,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             time, j = t[start + i], start + i
             launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
             phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
-            panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
-            x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
-            series = panel + SERIES
-            arc = panels[panel + ARC] + legendre_sum(panels[series : series + WIDE], x)
-            speed = legendre_sum(panels[series + WIDE : series + 2 * WIDE], x)
-            speed *= fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+            panel, x, speed = speed_at(states, panels, of, phi)
+            arc = panels[panel + ARC] + legendre_sum(panels[panel + SERIES : panel + SERIES + WIDE], x)
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
             lam = choose(launched, place, place + item_at(intervals, at + LAPS))
@@ -150,3 +158,20 @@ def places_along_legs(record, t, out, begin, end):  # type: ignore[no-untyped-de
 def states_along_legs(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Call `find_states` from Python."""
     find_states(record, p, t, out, begin, end)
+
+
+@entry(types.void(VECTOR, VECTOR, MATRIX))
+def phases_along_legs(record, t, out):  # type: ignore[no-untyped-def]
+    """Fill rows for times: the number of the interval, the phase angle, and the velocity."""
+    intervals, slots, launch = (
+        section(record, INTERVALS),
+        section(record, SLOTS).view(np.int64),
+        section(record, LAUNCH),
+    )
+    states, panels, rate = section(record, STATES), section(record, PANELS), (slots.size - 1) / launch[3]
+    for i in range(t.size):
+        at = interval_at(intervals, slots, rate, t[i])
+        number, phi = at // INTERVAL_COLUMNS, phase_angle_at(intervals, at, t[i])
+        of = number * STATE_COLUMNS
+        v = states[of + HEADING] * speed_at(states, panels, of, phi)[2]
+        out[0, i], out[1, i], out[2, i] = number, phi, choose(t[i] == 0.0, launch[1], v)

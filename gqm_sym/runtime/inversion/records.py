@@ -1,7 +1,7 @@
-"""The state of a body on a periodic motion at any times, from the tables of its one segment, in one call from Python.
+"""The state of a body at any times of a periodic motion, from the tables of its one segment, in one call from Python.
 
-Everything that is needed is stored in one *record*, an array of doubles, because passing twenty arrays would take
-longer than reading them. A record begins with the positions of its sections; integers are stored by their bits.
+All data are stored in one *record*, an array of doubles, because passing twenty arrays would take longer than reading
+them. A record begins with the positions of its sections; integers are stored by their bits.
 
 ======================== ===================================================================================
 section                  contents
@@ -42,7 +42,7 @@ from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at
 from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block
 
-# Times that are answered together.
+# The number of times for which states are found together.
 BLOCK = 128
 FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
@@ -52,7 +52,7 @@ _STATE = types.UniTuple(types.float64, 10)
 
 
 class Phases(NamedTuple):
-    """Where a block of n times falls on the segment of a periodic motion.
+    """The positions of a block of n times on the segment of a periodic motion.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def phase_angles_at(timing, kind, table, t, n, phases):  # type: ignore[no-untyp
         r, low = two_sum(fma(-count, period, s), fma(-count, period_low, low))
         before = r + low < 0.0
         sign = choose(before, -1.0, 1.0)
-        # Before it reaches ``a``, the body is on its way back to it. The rounded quotient may pass the other end.
+        # Before the body reaches ``a``, it is on its way back to it. The rounded quotient may lie beyond the other end.
         if is_libration:
             r, low = sign * r, sign * low
             over = r > 0.5 * period
@@ -179,10 +179,33 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
 
 @Inlined
 def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore[no-untyped-def]
-    """The bound on the error of a curve parameter, from those of the time and of the table, and from its rounding."""
+    """Return the bound on the error of a curve parameter, from the errors of the time and of the table, and from its
+    rounding.
+    """
     rate = choose(ds > 0.0, fabs(v) / ds, 0.0)
-    of_time = choose(time_error < inf, rate * time_error, inf)  # without a known time, rest has no place
+    of_time = choose(time_error < inf, rate * time_error, inf)  # if the time is unknown, so is the place of rest
     return of_time + table_error + ULP * (1.5 * fabs(lam - in_lap) + 2.0 * fabs(in_lap))
+
+
+@Inner
+def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untyped-def]
+    """Fill the phases at n times, and rows of the place within the lap, of the velocity and of its square.
+
+    ``work`` is space for 4 * n numbers.
+    """
+    bits, shape, launch = section(record, FUNCTIONS).view(np.int64), section(record, SHAPE), section(record, LAUNCH)
+    fns, kind = Addresses(bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
+    a, b, ref, w0, stretching = shape[0], shape[1], shape[2], shape[3], shape[4]
+    integrand = Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0)))
+    direction, (reduced, v, v2) = 1.0 if b > a else -1.0, (found[0], found[1], found[2])
+    phase_angles_at(section(record, TIMING), kind, table_of(record), t, n, phases)
+    # The functions of a generated module take rows of exactly n numbers.
+    fill_speeds(integrand, phases.phi[:n], work.reshape(-1)[: 4 * n].reshape(4, n), v)
+    for i in range(n):
+        launched = t[i] == 0.0
+        place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * stretching)
+        reduced[i], v[i] = choose(launched, launch[0], place), choose(launched, launch[1], speed)
+        v2[i] = v[i] * v[i]
 
 
 @Inner
@@ -201,12 +224,14 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         Its rows are filled with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, in SI units.
     """
     find_places(record, t, out[0], begin, end)
-    bits, shape, launch = section(record, FUNCTIONS).view(np.int64), section(record, SHAPE), section(record, LAUNCH)
-    fns, kind = Addresses(bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
-    a, b, ref, w0, stretching = shape[0], shape[1], shape[2], shape[3], shape[4]
-    lam0, v0, lap_length, s0, s_a = launch[0], launch[1], launch[2], launch[3], launch[4]
+    shape, launch, address = (
+        section(record, SHAPE),
+        section(record, LAUNCH),
+        section(record, FUNCTIONS).view(np.int64)[0],
+    )
+    stretching, lap_length, s0, s_a = shape[4], launch[2], launch[3], launch[4]
     time_error, drift = launch[5], launch[6]
-    timing, table, arcs = section(record, TIMING), table_of(record), section(record, ARCS)
+    arcs = section(record, ARCS)
     edges, lengths, length_terms = (
         section(record, EDGES),
         section(record, LENGTHS),
@@ -214,37 +239,58 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     )
     time_errors, table_errors = section(record, TIME_ERRORS), section(record, TABLE_ERRORS)
     owners = section(record, OWNERS).view(np.int64)
-    integrand = Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0)))
-    direction = 1.0 if b > a else -1.0
+    direction = 1.0 if shape[1] > shape[0] else -1.0
     size = min(BLOCK, end - begin)
-    # Two arrays for all work space: an array for each row would take as long as the state at one time.
+    # Two arrays serve as all work space, because making an array for each row would take as long as finding the state
+    # at one time.
     buffer, indices = np.empty((19, size)), np.empty((2, size), dtype=np.int64)
-    phi, sense, laps, v, reduced, v2, arc = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4], buffer[5], buffer[6]
+    phi, sense, laps, motion, arc = buffer[0], buffer[1], buffer[2], buffer[3:6], buffer[6]
+    reduced, v, v2 = motion[0], motion[1], motion[2]
     spare, work, rows, segments, panels = buffer[7:10], buffer[10:14], buffer[14:19], indices[0], indices[1]
     phases = Phases(phi, sense, laps, spare, segments)
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
-        phase_angles_at(timing, kind, table, t[start:], n, phases)
-        # The functions of a generated module take rows of exactly n numbers.
-        flat, frame = work.reshape(-1)[: 4 * n].reshape(4, n), rows.reshape(-1)[: 5 * n].reshape(5, n)
-        fill_speeds(integrand, phi[:n], flat, v)
+        block, lam = t[start : start + n], out[0, start : start + n]
+        fill_motion(record, p, block, n, phases, work, motion)
         for i in range(n):
             panels[i] = owners[segments[i]]
         read_off_block(edges, lengths, length_terms, phi, n, panels, spare, arc)
-        block, lam = t[start : start + n], out[0, start : start + n]
         for i in range(n):
-            launched = block[i] == 0.0
-            place, speed = place_at(kind, a, b, phi[i]), v[i] * (direction * sense[i] * stretching)
             s = (s_a + direction * stretching * arc[i]) + laps[i] * lap_length
-            reduced[i], v[i] = choose(launched, lam0, place), choose(launched, v0, speed)
-            v2[i], arc[i] = v[i] * v[i], choose(launched, s0, s + s0)
-        call_path_and_contact_force(fns.path_and_contact_force, n, reduced, v2, p, frame)
+            arc[i] = choose(block[i] == 0.0, s0, s + s0)
+        frame = rows.reshape(-1)[: 5 * n].reshape(5, n)
+        call_path_and_contact_force(address, n, reduced, v2, p, frame)
         for i in range(n):
             of_time = time_error + drift * fabs(block[i]) + time_errors[panels[i]]
             spare[0, i] = error_of_place(lam[i], reduced[i], v[i], frame[2, i], of_time, table_errors[segments[i]])
         found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
         for k in range(8):
             put(out[k + 1], start, found[k], 0, n, False)
+
+
+@entry(types.void(VECTOR, VECTOR, VECTOR, MATRIX))
+def phases_along(record, p, t, out):  # type: ignore[no-untyped-def]
+    """Fill rows for times: the phase angle, the velocity, and the sign of the change of the phase angle with time.
+
+    The next rows are the number of half periods (or laps) before the phase, the number of periods, and the place within
+    the lap. The half periods are counted from the segment's end ``a``.
+    """
+    kind, timing = section(record, FUNCTIONS).view(np.int64)[5], section(record, TIMING)
+    size = min(BLOCK, t.size)
+    buffer, segments = np.empty((13, size)), np.empty(size, dtype=np.int64)
+    motion, spare = buffer[3:6], buffer[6:9]
+    phases = Phases(buffer[0], buffer[1], buffer[2], spare, segments)
+    for start in range(0, t.size, BLOCK):
+        n = min(BLOCK, t.size - start)
+        block = t[start : start + n]
+        fill_motion(record, p, block, n, phases, buffer[9:13], motion)
+        for i in range(n):
+            turns = phases.laps[i]
+            if kind == TURN_TURN:
+                turns = 2.0 * nearest_whole((block[i] + timing[2] - phases.sense[i] * spare[0, i]) / timing[0])
+            found = (phases.phi[i], motion[1, i], phases.sense[i], turns, phases.laps[i], motion[0, i])
+            for k in range(6):
+                out[k, start + i] = found[k]
 
 
 @entry(types.void(VECTOR, VECTOR, VECTOR, types.int64, types.int64), nogil=True)

@@ -19,34 +19,36 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE, derivative
 
-# Coefficients of a segment's polynomial, and the last of them.
+# The number of coefficients of a segment's polynomial, and the index of the last one.
 TERMS = 15
 LAST = TERMS - 1
 
 # COSINES[j, i] = cos(j*theta_i) at the nodes of the fit. Both ends of a segment are nodes, where the fit adds no error.
-# The angles are reduced to a quarter turn first: rounding of larger ones would be the largest error of the table.
+# The angles are reduced to a quarter turn first, because the rounding of larger ones would be the largest error of the
+# table.
 _HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 * LAST) - LAST)
 COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
 
 # A fit is resolved when its last two coefficients are below this share of the largest phase angle.
 MAX_TAIL_RATIO = 2e-16
 
-# Coefficients that stop falling below this share are rounding noise.
+# Coefficients that stop decreasing below this share are rounding noise.
 MAX_NOISE_RATIO = 1e-13
 
-# Near a cusp the phase angle goes like the square root of the time that remains, so segments become ever shorter.
+# The largest number of segments of a panel, and of those that are tried first. Near a cusp the phase angle varies like
+# the square root of the remaining time, so segments become ever shorter.
 MAX_CUTS = 2**52
 MAX_FIRST_CUTS = 8
 
-# Where a panel is divided into at least so many segments, an error of the phase angle is accepted that corresponds to
-# no more than this share of the whole time: near a cusp, the rounding of the time itself changes it more.
+# If a panel is divided into at least so many segments, an error of the phase angle is accepted that corresponds to no
+# more than this share of the whole time, because the rounding of the time itself has a larger effect near a cusp.
 MANY_CUTS = 2**12
 MAX_TIME_ERROR = 4e-16
 
-# Newton's method ends with a step this short: the error after it is its square, below rounding.
+# Newton's method ends with a step this short: the error after it is the square of the step, which is below rounding.
 LAST_NEWTON_STEP = 1e-10
 
-# Times that are looked up together.
+# The number of times that are looked up together.
 BLOCK = 64
 
 
@@ -119,8 +121,8 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
     edges : (m+1,) array
         Phase angles at the edges of the panels.
     times, times_low : (m+1,) arrays
-        The time at the edges as two doubles: so short panels keep their own digits after a long time. The time on each
-        panel is scaled such that it agrees with these at both edges.
+        The time at the edges as two doubles, so that short panels keep their own digits after a long time. The time on
+        each panel is scaled such that it agrees with these at both edges.
     time_terms : (m, DEGREE) array
         Legendre coefficients of the time on each panel.
 
@@ -145,7 +147,8 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
             continue
         scale = legendre_sum(time_terms[k], 1.0) / duration
         derivative(time_terms[k], slope_terms)
-        # ``done`` of ``cuts`` equal segments are complete; the panel before suggests how many cuts to try first.
+        # ``done`` of ``cuts`` equal segments are complete; the first number of cuts to try is suggested by the panel
+        # before.
         done, cuts = 0, min(cuts, MAX_FIRST_CUTS)
         while done < cuts:
             # Times from the panel's left edge.

@@ -30,7 +30,7 @@ class DomainNumbers(NamedTuple):
     axis_step: float = 0.0
 
 
-# The same as the type of a compiled function's argument.
+# The same as the type of an argument of compiled functions.
 DOMAIN: Any = types.NamedUniTuple(types.float64, len(DomainNumbers._fields), DomainNumbers)
 
 

@@ -23,7 +23,7 @@ from gqm_sym.runtime.multiprecision.exact_panels import DIGITS
 from gqm_sym.runtime.multiprecision.exact_problem import End
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
-# A `FoundEnd` as Python gets it: making a plain tuple is faster.
+# A `FoundEnd` as Python receives it; making a plain tuple is faster.
 END_TYPE = types.Tuple((types.int64, REAL, REAL))
 
 # `orbit_kind` of a motion that is not periodic, or that doubles cannot decide.
@@ -40,21 +40,21 @@ NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
 # ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
 CUSP_SHARE = 1e-7
 
-# V**2 at an end of the domain above which it is no turning point, as a share of what it gains and loses on the way; and
-# the number of places at which the slope of the potential on the way is looked at.
+# The share of the gains and losses of V**2 on the way to an end of the domain above which V**2 at that end excludes a
+# turning point; and the number of places on the way at which the slope of the potential is evaluated.
 LIP_SHARE, WAY_MARKS = 1e-12, 5
 
-# Distance from a place at which ds is compared with that at the place itself, to decide whether it is a cusp; as a
+# The distance from a place at which ds is compared with ds at the place itself to decide whether that is a cusp, as a
 # share of the first step.
 NEAR_CUSP = 1e-3
 
-# Places at which V**2 nearly vanishes that a search passes.
+# The largest number of places with nearly vanishing V**2 that a search passes.
 MAX_BARRIERS = 100
 
 
 @Inner
 def first_step(domain):  # type: ignore[no-untyped-def]
-    """The step that a search begins with: an eighth of the curve where its length is known."""
+    """Return the step with which a search begins: an eighth of the curve if its length is known."""
     if domain.period > 0.0:
         return domain.period / 8.0
     if isfinite(domain.high - domain.low):
@@ -64,21 +64,22 @@ def first_step(domain):  # type: ignore[no-untyped-def]
 
 @entry(END_TYPE(ADDRESSES, VECTOR, REAL, REAL, types.int64, REAL, REAL, REAL))
 def first_zero_from(fns, p, lam0, w0, direction, begin, length, step):  # type: ignore[no-untyped-def]
-    """`zeros.first_zero`, to be called from Python."""
+    """Call `zeros.first_zero` from Python."""
     found = first_zero(fns, p, lam0, w0, direction, begin, length, step)
     return found.what, found.near, found.far
 
 
 @Inner
 def distance_to_axis(start, direction, axis, step):  # type: ignore[no-untyped-def]
-    """The distance to the first axis of symmetry ahead; negative if the only axis (``step`` 0) is behind."""
+    """Return the distance to the first axis of symmetry ahead; negative if the only axis (``step`` 0) is behind."""
     away = direction * (axis - start)
     return choose(step > 0.0, away - step * whole_below(away / step), away)
 
 
 @Inner
 def mirror_image(fns, p, lam0, direction, length, domain):  # type: ignore[no-untyped-def]
-    """The offset of the turning point of a body released at rest in an even well; 0 where a search must find it.
+    """Return the offset of the turning point of a body that is released at rest in an even well; 0 if a search must
+    find it.
 
     V**2 grows all the way to the first axis ahead and falls all the way from there to the next, so the turning point is
     the mirror image of the launch place.
@@ -86,7 +87,7 @@ def mirror_image(fns, p, lam0, direction, length, domain):  # type: ignore[no-un
     axis, step = domain.axis, domain.axis_step
     ahead = distance_to_axis(lam0, float(direction), axis, step)
     guess = 2.0 * ahead
-    # The first comparison is false (NaN) where no axis is known.
+    # The first comparison is false (NaN) if no axis is known.
     near_axis = not (ahead > NEAR_AXIS * (fabs(lam0) + fabs(axis)) and guess <= length)
     if near_axis or (step > 0.0 and ahead > MAX_AXIS_STEP_SHARE * step):
         return 0.0
@@ -100,7 +101,9 @@ def mirror_image(fns, p, lam0, direction, length, domain):  # type: ignore[no-un
 
 @Inner
 def downhill(fns, p, lam0, step):  # type: ignore[no-untyped-def]
-    """The direction in which a body released at rest falls; 0 next to an equilibrium, which doubles cannot decide."""
+    """Return the direction in which a body released at rest falls; 0 next to an equilibrium, where doubles cannot
+    decide.
+    """
     rows, size = np.empty((2, 3)), 0.0
     call_effective_potential(fns.effective_potential, 3, lam0 + step * np.array([0.0, 1.0, -1.0]), p, rows)
     for potential in rows[0]:
@@ -113,14 +116,15 @@ def downhill(fns, p, lam0, step):  # type: ignore[no-untyped-def]
 
 @Inner
 def ends(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
-    """The ends of a motion in each direction, and the direction in which it begins.
+    """Return the ends of a motion in each direction, and the direction in which it begins.
 
     Returns
     -------
     direction : int
-        The sign of ds/dt after launch (a body released at rest goes where it falls); 0 where doubles cannot decide.
+        The sign of ds/dt after launch (a body released at rest moves in the direction in which it falls); 0 if doubles
+        cannot decide.
     ahead, behind : FoundEnd
-        What `zeros.first_zero` found in this direction, and in the other if ``ahead`` is a turning point.
+        The results of `zeros.first_zero` in this direction, and in the other one if ``ahead`` is a turning point.
     """
     nothing = FoundEnd(LIMIT, 0.0, 0.0)
     w0, period = v0 * v0, domain.period
@@ -145,7 +149,9 @@ def ends(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
 
 @Inner
 def orbit_kind(direction, ahead, behind, v0, period):  # type: ignore[no-untyped-def]
-    """LIBRATION or CIRCULATION, by what `ends` found; NO_ORBIT for any other motion, and where that is not decided."""
+    """Return LIBRATION or CIRCULATION, given the results of `ends`; NO_ORBIT for any other motion, or if that is not
+    decided.
+    """
     if direction == 0:
         return NO_ORBIT
     if ahead.what == TURN and behind.what == TURN:
@@ -164,12 +170,12 @@ class EndOfMotion:
     place : float
         The curve parameter there, infinite if the motion goes on for ever.
     multiprecision : mpf or None
-        The same in extended precision, where it was found so.
+        The same in extended precision, if it was found that way.
     zero_v2 : bool
-        Of a cusp, whether V**2 vanishes there as well: the motion comes to it in finite time nevertheless.
+        For a cusp, whether V**2 vanishes there as well; the motion nevertheless reaches it in a finite time.
     offset : float
-        Of a turning point, its signed distance from the launch place, which keeps its digits where both are the same
-        double.
+        For a turning point, its signed distance from the launch place, which is accurate even if both places are the
+        same double.
     """
 
     what: EndKind
@@ -180,34 +186,34 @@ class EndOfMotion:
 
 
 def starting_step(problem: Problem) -> float:
-    """The step along the curve that a search begins with, in units of the curve parameter."""
+    """Return the step along the curve that a search begins with, in units of the curve parameter."""
     step: float = first_step.py_func(problem.domain.numbers)
     return step
 
 
 def distance_to_end(problem: Problem, direction: int) -> float:
-    """The distance from the launch place to the end of the domain in one direction."""
+    """Return the distance from the launch place to the end of the domain in one direction."""
     return problem.high - problem.lam0 if direction > 0 else problem.lam0 - problem.low
 
 
 def search_beyond_barriers(
     problem: Problem, direction: int, found: tuple[int, float, float], length: float, step: float
 ) -> tuple[tuple[int, float, float], End | None]:
-    """Continue a search beyond places that doubles cannot decide and where V**2 is positive in extended precision.
+    """Continue a search beyond places that doubles cannot decide but at which V**2 is positive in extended precision.
 
     Parameters
     ----------
     found : (what, near, far)
-        What the search has found so far (`zeros.FoundEnd`).
+        The result of the search so far (`zeros.FoundEnd`).
     length, step : float
-        The distance from the launch to search, and the first step beyond a place.
+        The distance from the launch up to which to search, and the first step beyond a place.
 
     Returns
     -------
     found : (what, near, far)
-        What ended the search. If that is CRITICAL, extended precision has decided:
+        The result of the continued search. If that is CRITICAL, extended precision has decided it.
     end : End or None
-        what lies there, a turning point or an equilibrium.
+        The turning point or equilibrium that extended precision found.
     """
     f, lam0 = problem.functions, problem.lam0
     for _ in range(MAX_BARRIERS):
@@ -220,13 +226,13 @@ def search_beyond_barriers(
             return found, end
         begin = max(abs(far), 1e-300)
         found = first_zero_from(f.addresses, f.p, lam0, problem.w0, direction, begin, length, step)
-    if not isfinite(length):  # as far as any search goes on an endless curve
+    if not isfinite(length):  # the farthest that any search goes on an endless curve
         return (zeros.STEPS_SPENT, begin, begin), None
     raise _too_many_barriers(problem)
 
 
 def _too_many_barriers(problem: Problem) -> SolutionError:
-    """The error for a curve with too many places that doubles cannot decide."""
+    """Return the error for a curve with too many places that doubles cannot decide."""
     return SolutionError(
         f"turning points from {problem.formulas.parameter} = {problem.lam0!r}: "
         "too many places at which V**2 nearly vanishes; launch a little higher, or with more speed"
@@ -241,7 +247,7 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
         found, end = search_beyond_barriers(problem, direction, found, length, step)
         if found[0] != LIMIT or not period or problem.w0 > 0.0:
             break
-        # The search is back at the launch place of a body released from rest, where V**2 is zero again.
+        # The search has returned to the launch place of a body released from rest, where V**2 is zero again.
         found = (CRITICAL, found[1] * (1.0 - 1e-4), found[1])
     else:
         raise _too_many_barriers(problem)
@@ -260,10 +266,12 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
 
 
 def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
-    """The end of the domain, or a turning point if V**2 vanishes there: a body released at one lip of a half pipe.
+    """Return the end of the domain, or a turning point if V**2 vanishes there, as for a body released at one lip of a
+    half pipe.
 
-    The ends of a chart are known to a rounding only; V**2 counts as zero there if it is zero within that. It is judged
-    by what V**2 gains and loses on the way, for a body launched next to the end has a small V**2 of its own there.
+    The ends of a chart are known to a rounding only; V**2 counts as zero there if it is zero within that. Its size is
+    compared with the gains and losses of V**2 on the way, because a body launched next to the end has a small V**2
+    there anyway.
     """
     end, exact, f, lam0 = domain_end(problem, direction), problem.functions.exact, problem.functions, problem.lam0
     offset = end.place - lam0
@@ -286,7 +294,7 @@ def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
 
 
 def _decided_end(problem: Problem, end: End) -> EndOfMotion:
-    """The turning point or the equilibrium that was found in extended precision."""
+    """Return the turning point or the equilibrium that was found in extended precision."""
     place = min(max(float(end.place), problem.low), problem.high)
     if end.what == "equilibrium" and is_cusp(problem, place):
         return EndOfMotion("cusp", place, end.place, zero_v2=True)
@@ -297,7 +305,7 @@ def _decided_end(problem: Problem, end: End) -> EndOfMotion:
 
 
 def domain_end(problem: Problem, direction: int) -> EndOfMotion:
-    """The end of the domain in one direction, and what is there."""
+    """Return the end of the domain in one direction, and its kind."""
     upper = direction > 0
     place = problem.high if upper else problem.low
     if not isfinite(place):
@@ -311,14 +319,14 @@ def domain_end(problem: Problem, direction: int) -> EndOfMotion:
 
 
 def is_cusp(problem: Problem, place: float, share: float = 1e-10) -> bool:
-    """Whether ds vanishes at a place, up to a share of its values near by."""
+    """Return whether ds vanishes at a place, up to a share of its values nearby."""
     f, near = problem.functions, NEAR_CUSP * starting_step(problem)
     ds = path_and_force_at(f.addresses, f.p, place + near * np.array([0.0, -1.0, 1.0]), np.zeros(3))[2]
     return bool(ds[0] <= share * np.nanmax(ds[1:]))
 
 
 def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:
-    """The error for a launch that would leave the curve at once."""
+    """Return the error for a launch that would leave the curve at once."""
     return LaunchError(
         f"lam0: {problem.lam0!r} is the {what} itself, and the motion would leave through it at once; "
         f"launch with direction={-direction} or from a place inside the domain"

@@ -1,8 +1,9 @@
-"""Equilibria of a model: where its effective potential is stationary, whether stable, and how fast a body swings there.
+"""Equilibria of a model, which are the stationary points of its effective potential; their stability, and the frequency
+of small oscillations about them.
 
 The zeros of dU/dlam are isolated by interval bounds, as the zeros of V**2 are (`zeros`): an interval on which the
 bounds exclude zero has none, and any other is halved until it is tiny. So none is missed. Friction, drag and resistance
-do not count: they vanish at rest, or hold a body near an equilibrium too.
+are ignored: they vanish at rest, or also hold a body near an equilibrium.
 """
 
 from collections.abc import Iterator
@@ -24,29 +25,30 @@ from gqm_sym.runtime.launch.problem import bind_all
 
 _MANY = POINTER(c_double)
 
-# Beyond this value of the curve parameter nothing is looked for on an open curve.
+# On an open curve, equilibria beyond this value of the curve parameter are not searched for.
 MAX_PLACE = 2.0**40
 
-# The width at which an interval is halved no further, as a share of the width of the first ones.
+# The width below which an interval is not halved any more, as a share of the width of the first intervals.
 MIN_WIDTH = 2.0**-32
 
-# The most intervals that are looked at, and the most equilibria that are listed.
+# The largest number of intervals that are examined, and of equilibria that are listed.
 MAX_INTERVALS, MAX_EQUILIBRIA = 40_000, 200
 
-# The first intervals of a bounded range.
+# The number of first intervals of a bounded range.
 PIECES = 64
 
-# Nodes of the polynomial whose derivative is that of the slope, and the share of its last coefficients below which it
-# is taken as accurate.
+# The number of nodes of the polynomial from which the derivative of the slope is taken, and the share of the last
+# coefficients below which it counts as accurate.
 NODES, MAX_TAIL = 17, 1e-13
 
-# By how much of a period a closed curve is cut behind its start, which often is an equilibrium or opposite to one.
+# The share of a period after its start at which a closed curve is cut. The start itself is often an equilibrium, or
+# opposite to one.
 SHIFT = 0.01234
 
 # A slope of this size has underflowed and is not used.
 TINY = 1e-290
 
-# A slope below this share of that a piece away is rounding, and so is a stiffness.
+# A slope, or a stiffness, below this share of its value a piece away is rounding.
 ROUNDING = 1e-11
 
 
@@ -61,8 +63,8 @@ class Equilibrium:
     stable : bool
         Whether the effective potential rises in both directions.
     frequency : float
-        Angular frequency of small oscillations about it in rad/s: the limit of 2*pi/period. NaN where it is unstable, 0
-        where the restoring force is weaker than linear, and infinite at a corner or a cusp.
+        Angular frequency of small oscillations about it in rad/s: the limit of 2*pi/period. NaN if the equilibrium is
+        unstable, 0 if the restoring force is weaker than linear, and infinite at a corner or a cusp.
     """
 
     lam: float
@@ -89,14 +91,14 @@ class Potential:
         self._p = self.bound.p.ctypes.data_as(_MANY)
 
     def rows(self, places: Any) -> Array:
-        """U in m**2/s**2 and dU/dlam at places, as rows."""
+        """Return U in m**2/s**2 and dU/dlam at places, as rows."""
         lam = np.ascontiguousarray(places, dtype=np.float64).reshape(-1)
         out = np.empty((2, lam.size))
         self._potential(lam.size, lam.ctypes.data_as(_MANY), self._p, out.ctypes.data_as(_MANY))
         return out
 
     def slope(self, lam: float) -> float:
-        """DU/dlam at a place."""
+        """Return dU/dlam at a place."""
         return float(self.rows([lam])[1, 0])
 
     def bounds(self, low: float, high: float) -> Array:
@@ -107,7 +109,7 @@ class Potential:
 
 
 def equilibria(formulas: Formulas, p: ParameterValues, between: Any = None) -> tuple[Equilibrium, ...]:
-    """The equilibria of a model, in ascending order.
+    """Return the equilibria of a model, in ascending order.
 
     Parameters
     ----------
@@ -116,16 +118,16 @@ def equilibria(formulas: Formulas, p: ParameterValues, between: Any = None) -> t
     p : ParameterValues
         The values of its run-time parameters.
     between : pair of numbers, optional
-        The range of the curve parameter to look in; the whole domain, or one period from -period/2 (on a charted curve
-        from 0), if not given.
+        The range of the curve parameter to search. By default it is the whole domain, or one period from -period/2 (on
+        a charted curve from 0).
 
     Raises
     ------
     InputError
         If the range is not a pair of numbers in ascending order.
     SolutionError
-        If the potential is constant, or has too many equilibria to be listed. (Stretches on which it is constant, where
-        others are not, are left out.)
+        If the potential is constant, or has too many equilibria to be listed. (Equilibria on stretches of constant
+        potential are omitted if the potential varies elsewhere.)
     """
     potential = Potential(formulas, p)
     domain = formulas.domain(p).numbers
@@ -146,7 +148,7 @@ def equilibria(formulas: Formulas, p: ParameterValues, between: Any = None) -> t
 
 
 def _range(formulas: Formulas, domain: Any, between: Any) -> tuple[float, float]:
-    """The ends of the range to look in; infinite ones are replaced by those beyond which nothing is looked for."""
+    """Return the ends of the range to search; infinite ones are replaced by the limits of the search."""
     if between is None:
         if domain.period:
             low = (SHIFT - (0.0 if formulas.chart is not None else 0.5)) * domain.period
@@ -165,7 +167,7 @@ def _range(formulas: Formulas, domain: Any, between: Any) -> tuple[float, float]
 
 
 def _cuts(low: float, high: float) -> Iterator[float]:
-    """Places at which the range is cut first: evenly, and by octaves where it is vast."""
+    """Return the places at which the range is cut first: at equal distances, and by octaves if it is very large."""
     if high - low <= MAX_PLACE**0.5:
         yield from np.linspace(low, high, PIECES + 1)[1:-1].tolist()
         return
@@ -176,7 +178,7 @@ def _cuts(low: float, high: float) -> Iterator[float]:
 
 
 def _clusters(potential: Potential, starts: list[float]) -> Iterator[tuple[float, float]]:
-    """Tiny intervals that hold all zeros of the slope, neighbours joined, in ascending order."""
+    """Return tiny intervals that contain all zeros of the slope, in ascending order; neighbouring ones are joined."""
     waiting = [(a, b, (b - a) * MIN_WIDTH) for a, b in pairwise(starts)][::-1]
     current: tuple[float, float] | None = None
     looked = found = 0
@@ -211,17 +213,19 @@ def _clusters(potential: Potential, starts: list[float]) -> Iterator[tuple[float
 
 
 def _is_real(potential: Potential, a: float, b: float) -> bool:
-    """Whether the potential has a slope somewhere in an interval, by a few places."""
+    """Return whether the potential has a slope somewhere in an interval, judged at a few places."""
     return bool(np.isfinite(potential.rows(np.linspace(a, b, 5))[1]).any())
 
 
 def _located(potential: Potential, a: float, b: float, domain: tuple[float, float]) -> tuple[float, tuple[int, int]]:
-    """The zero of the slope in a cluster, and the slope's signs before and behind; (0, 0) if there is no zero."""
+    """Return the zero of the slope in a cluster, and the slope's signs before and after it; they are (0, 0) if there is
+    no zero.
+    """
     width = max(b - a, 4.0 * np.spacing(max(abs(a), abs(b))))
     low, high = max(a - width, domain[0]), min(b + width, domain[1])
     before, behind = potential.slope(low), potential.slope(high)
     signs = int(np.sign(before)), int(np.sign(behind))
-    if domain[0] == low == a or domain[1] == high == b:  # beyond the end of a curve nothing pushes back or on
+    if domain[0] == low == a or domain[1] == high == b:  # beyond the end of a curve there is no force
         inside = signs[1] if low == domain[0] else signs[0]
         end = low if low == domain[0] else high
         at_end = abs(potential.slope(end)) <= ROUNDING * max(abs(before), abs(behind), 1e-300)
@@ -247,7 +251,9 @@ def _located(potential: Potential, a: float, b: float, domain: tuple[float, floa
 
 
 def _spacing(place: float, clusters: list[tuple[float, float]], starts: list[float]) -> float:
-    """A length around a place within which the slope has no other zero: half the way to the next one or to an end."""
+    """Return a distance from a place within which the slope has no other zero: half the distance to the next zero or to
+    an end.
+    """
     others = [end for cluster in clusters if not cluster[0] <= place <= cluster[1] for end in cluster]
     ends = [place for place in (starts[0], starts[-1]) if abs(place) < MAX_PLACE]
     gaps = [abs(other - place) for other in (*others, *ends) if other != place]
@@ -255,7 +261,7 @@ def _spacing(place: float, clusters: list[tuple[float, float]], starts: list[flo
 
 
 def _described(potential: Potential, lam: float, signs: tuple[int, int], *, spacing: float) -> Equilibrium:
-    """An equilibrium with its stability and its frequency."""
+    """Return an equilibrium with its stability and its frequency."""
     if signs != (-1, 1):
         return Equilibrium(lam, False, nan)
     ds = 0.5 * float(potential.bounds(lam, lam)[2:].sum())
@@ -276,7 +282,9 @@ def _described(potential: Potential, lam: float, signs: tuple[int, int], *, spac
 
 
 def _derivative(potential: Potential, lam: float, left: float, right: float) -> float:
-    """The derivative of the slope at a place, from a polynomial through values from lam + left to lam + right."""
+    """Return the derivative of the slope at a place, from a polynomial through values between lam + left and lam +
+    right.
+    """
     nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     best, best_tail = nan, inf
     for _ in range(12):

@@ -35,12 +35,12 @@ EXACT_BITS = 640
 
 
 class ParameterValues(tuple[Number, ...]):
-    """Exact values of the run-time parameters, and what follows from them alone: it is the same for all launches.
+    """Exact values of the run-time parameters, and the data that follow from them alone and serve all launches.
 
     Attributes
     ----------
     values : array
-        The values as doubles, and behind them the sines, cosines and tangents of parameters alone.
+        The values as doubles, followed by the sines, cosines and tangents of parameters alone.
     domain : Domain or None
         The range of the curve parameter, once it has been asked for.
     functions : launch.functions.BoundFunctions or None
@@ -48,9 +48,10 @@ class ParameterValues(tuple[Number, ...]):
     tape : double_double.recording.BoundTape or None
         The exact formulas as a tape, once it has been asked for; False if there is none.
     true_pieces : charts.double_double.pieces.TruePieces or None
-        A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
+        A charted curve in double-double arithmetic, once it has been asked for; False if the curve is known in doubles
+        only.
     columns : tuple of lists of arrays or None
-        What sweeps lay out of them (`sweep.columns`), once one has been asked for.
+        The columns of sweeps with these values (`sweep.columns`), once one has been asked for.
     """
 
     values: Array
@@ -62,13 +63,13 @@ class ParameterValues(tuple[Number, ...]):
 
 
 def shape_of(maker: ChartMaker, values: tuple[Any, ...], other: Any) -> tuple[Any, ...]:
-    """The values of the run-time parameters that shape a curve, and one and the same value for the others."""
+    """Return the values of the run-time parameters that shape a curve, with one fixed value in place of all others."""
     shaping = maker.shaped_by
     return values if shaping is None else tuple(v if k in shaping else other for k, v in enumerate(values))
 
 
 def chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
-    """The chart of a curve; it is made once for the same values of the run-time parameters that shape it."""
+    """Return the chart of a curve, which is made once for the same values of the run-time parameters that shape it."""
     return _chart_with(maker, shape_of(maker, values, 1.0))
 
 
@@ -79,7 +80,7 @@ def _chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
 
 
 def true_pieces_of(maker: ChartMaker, p: tuple[Number, ...], chart: Chart) -> Any:
-    """The curve behind a chart in double-double arithmetic, or None; it is made once for one shape."""
+    """Return the curve behind a chart in double-double arithmetic, or None; it is made once for each shape."""
     return _true_pieces_of(maker, shape_of(maker, tuple(p), read_number(1, where="p")), chart)
 
 
@@ -111,47 +112,47 @@ class Formulas:
     functions : CompiledFunctions
         The functions that serve one motion.
     domain_of : callable or None
-        ``f(op, p)`` gives both ends of the parameter's range and its period, None for each that does not exist. None
-        for a charted curve, whose chart has its own range.
+        ``f(op, p)`` gives both ends of the parameter's range and its period, with None for each that does not exist. It
+        is None for a charted curve, whose chart has its own range.
     axes_of : callable or None
-        ``f(op, p)`` gives one place about which V**2 and ds are even, and the distance to the next; None for each that
-        does not exist.
+        ``f(op, p)`` gives one place about which V**2 and ds are even, and the distance to the next, with None for each
+        that does not exist.
     monotone : bool
-        Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
-        nowhere.
+        Whether it is proved that V**2 is monotone between two neighbouring axes and that ds vanishes nowhere.
     exact : ExactFormulas, ExactPotential, ExactLaw, ExactChartLaw or None
-        The formulas over a namespace of operations; those of the forces only for a charted curve.
+        The formulas over a namespace of operations; for a charted curve only those of the forces.
     chart : ChartMaker or None
-        What makes the chart of a curve that has no formulas.
+        The maker of the chart of a curve that has no formulas.
     dissipation : DissipativeFunctions or None
-        What a dissipative model adds; None for a conservative one.
+        The additional functions of a dissipative model; None for a conservative one.
     load_map : Emitted or None
         The function that fills a load map in one pass; None if there is none.
     batch : BatchFunctions or None
         The functions that serve many orbits at once; None if motions are solved one by one.
     source, text : str
-        The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
+        The path of the module's file, and its text when it was imported, by which a motion is restored in another
+        process.
     effective_potential, bounds : Emitted or None
-        Functions for the equilibria of a dissipative module; a conservative one has them in ``functions``.
+        Functions for the equilibria of a dissipative model; a conservative one has them in ``functions``.
     units : mapping of str to str
-        SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
-        and angles.
+        SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" for plain
+        numbers and angles.
     inertia : callable or None
-        ``f(op, p)`` gives 1 + beta of a rolling body; None where it is 1.
+        ``f(op, p)`` gives 1 + beta of a rolling body; None if it is 1.
     trigonometric : callable or None
-        ``f(op, p)`` gives sines, cosines and tangents of parameters alone, whose values compiled functions read behind
-        the parameters; None where there are none.
+        ``f(op, p)`` gives sines, cosines and tangents of parameters alone, which compiled functions read after the
+        parameters; None if there are none.
     separated : SeparatedTerms or None
-        Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
+        Potential and load along a charted curve as sums of products; None if they cannot be separated.
     path_in_space : Emitted or None
         The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
-        Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+        Whether the contact force has a sign. It has none on a space curve that lies in no vertical plane.
     sided : bool
-        Whether the sign of the contact force, or on a banked space curve of its part along the upward direction of
-        riders, tells on which side of the track the body is.
+        Whether the sign of the contact force shows on which side of the track the body is. On a banked space curve this
+        is the sign of the force's component along the upward direction of riders.
     directed : bool
-        Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
+        Whether the contact force depends on the sign of ds/dt, as it does on a space curve in a rotating frame.
     rider_loads : Emitted or None
         The function that fills the loads on a rider of a banked track.
     """
@@ -197,14 +198,14 @@ class Formulas:
         )
 
     def __post_init__(self) -> None:
-        # Most launches have the parameters of a launch before. The integer 1 and the float 1.0 are kept apart, because
-        # their texts differ.
+        # Most launches have the parameters of an earlier launch. The integer 1 and the float 1.0 are kept apart,
+        # because their texts differ.
         object.__setattr__(self, "_read", lru_cache(maxsize=16, typed=True)(self._numbers))
         file = Path(self.source)
         object.__setattr__(self, "text", file.read_text(encoding="utf-8") if file.is_file() else "")
 
     def numbers(self, values: tuple[Any, ...]) -> "ParameterValues":
-        """The run-time parameters as exact numbers, checked.
+        """Check the run-time parameters and return them as exact numbers.
 
         Parameters
         ----------
@@ -238,15 +239,15 @@ class Formulas:
         return p
 
     def trigonometric_over(self, operations: Any, p: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Sines, cosines and tangents of the run-time parameters, over a namespace of operations."""
+        """Return the sines, cosines and tangents of the run-time parameters, over a namespace of operations."""
         values = () if self.trigonometric is None else self.trigonometric(operations, p)
         return values if isinstance(values, tuple) else (values,)
 
     def separated_factors(self, p: Sequence[Array]) -> list[Array]:
         """Return the factors of the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
 
-        A factor does not depend on the number of others that are computed with it: elementary functions of NumPy may
-        differ in their last bits between single numbers and arrays, and between arrays with and without gaps.
+        Each factor is the same however many are computed together, although elementary functions of NumPy may differ in
+        their last bits between single numbers and arrays, and between arrays with and without gaps.
         """
         assert self.separated is not None
         with np.errstate(all="ignore"):
@@ -254,7 +255,8 @@ class Formulas:
         return [np.asarray(factor, dtype=np.float64) for factor in found]
 
     def trigonometric_values(self, numbers: Sequence[Number]) -> tuple[float, ...]:
-        """Sines, cosines and tangents of the run-time parameters, as doubles; of multiples of pi they are exact.
+        """Return the sines, cosines and tangents of the run-time parameters as doubles, which are exact for multiples
+        of pi.
 
         A value that is zero to `EXACT_BITS` bits counts as zero.
         """
@@ -278,21 +280,23 @@ class Formulas:
                 raise ParameterError(f"{name}: must be at least {what}, got {values[name].text}")
 
     def charted(self, p: ParameterValues) -> Chart:
-        """The chart of a charted curve."""
+        """Return the chart of a charted curve."""
         assert self.chart is not None
         return chart_with(self.chart, tuple(p.values.tolist()))
 
     def offset(self, p: Sequence[Number]) -> Pair:
-        """How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0."""
+        """Return the distance of the body's path to the left of the curve, as two doubles: the radius of a rolling
+        body, else 0.
+        """
         radius = self.radius(p)
         return ZERO if radius is None else (radius.value, radius.low)
 
     def radius(self, p: Sequence[Number]) -> Number | None:
-        """The radius of a rolling body; None where the curve itself is the path."""
+        """Return the radius of a rolling body; None if the curve itself is the path."""
         return dict(zip(self.parameters, p, strict=True)).get(self.rolling_radius)
 
     def domain(self, p: ParameterValues) -> Domain:
-        """The range of the curve parameter."""
+        """Return the range of the curve parameter."""
         if p.domain is None:
             p.domain = self._domain(p)
         return p.domain
@@ -315,7 +319,7 @@ class Formulas:
         )
 
     def ends(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any, Any]:
-        """Both ends of the parameter's range and its period, None for each that does not exist.
+        """Return both ends of the parameter's range and its period, with None for each that does not exist.
 
         A closed curve has no ends.
         """
@@ -324,5 +328,5 @@ class Formulas:
         return (low, high, None) if period is None else (None, None, period)
 
     def axes(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any]:
-        """One place of symmetry and the distance to the next; None for each that does not exist."""
+        """Return one place of symmetry and the distance to the next, with None for each that does not exist."""
         return (None, None) if self.axes_of is None else self.axes_of(op, values)

@@ -27,7 +27,7 @@ class BoundFunctions(NamedTuple):
     bends : array
         The sign of the tangent's turn at each corner: 1 where the curve bends to the left.
     dissipation : Dissipation or None
-        What compiled code takes of a dissipative model; None for a conservative one.
+        The data of a dissipative model for compiled code; None for a conservative one.
     chart, joints : arrays
         The chart, and the places at which its pieces meet, within one period; empty for a curve with formulas.
     """
@@ -44,11 +44,13 @@ class BoundFunctions(NamedTuple):
     joints: Array = NOWHERE
 
     def drops(self, only_sign: int) -> Array:
-        """The corners at which a moving body leaves a track that can only push with one sign of N (0: with both)."""
+        """Return the corners at which a moving body leaves a track that can push with one sign of N only (0: with
+        both).
+        """
         return self.corners[self.bends * only_sign < 0.0] if only_sign and self.corners.size else NOWHERE
 
     def between(self, places: Array, a: float, b: float) -> Array:
-        """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""
+        """Return the places that lie strictly between a and b; on a closed curve they are repeated with the period."""
         if not places.size:
             return places
         low, high = min(a, b), max(a, b)

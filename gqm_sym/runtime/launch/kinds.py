@@ -22,8 +22,8 @@ from typing import Literal, TypeAlias
 # Kinds of motion (MATHS, section 6).
 MotionKind: TypeAlias = Literal["libration", "circulation", "transit", "asymptotic", "rest", "dissipative"]
 
-# What lies where a motion can go no farther in one direction. "closed" is the launch place again after a whole lap of
-# a closed curve, and "open" infinity or a pole of the curve or of the potential.
+# The kinds of the places beyond which a motion cannot go in one direction. "closed" is the launch place after a whole
+# lap of a closed curve, and "open" is infinity or a pole of the curve or of the potential.
 EndKind: TypeAlias = Literal["turn", "equilibrium", "domain-end", "singular-point", "cusp", "closed", "open"]
 
 # Ends of legs, and kinds of events.
@@ -33,13 +33,13 @@ LEG_ENDS = (
 )
 EVENT_KINDS = (*LEG_ENDS, "slip")
 
-# The quantities of a motion: its attributes and methods, what gradients and uncertainties are of, and what sweeps, fits
-# and designs ask for.
+# The quantities of a motion. They are attributes and methods of motions, have gradients and uncertainties, and are used
+# in sweeps, fits and designs.
 PERIODIC_QUANTITIES = ("half_period", "period", "action")
 FINAL_QUANTITIES = ("t_end", "rest_position")
 EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
 QUANTITIES = (*PERIODIC_QUANTITIES, "turning_points", *EXTREMES, "time_at", *FINAL_QUANTITIES)
 
-# What a rider feels on a banked track, and the extremes of it, which sweeps have too, without gradients.
+# The loads on a rider of a banked track, and their extremes, which sweeps compute too, without gradients.
 LOADS = ("vertical", "lateral", "longitudinal")
 LOAD_EXTREMES = tuple(f"n_{load}_{which}" for load in LOADS for which in ("min", "max"))

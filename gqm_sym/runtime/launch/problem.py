@@ -20,14 +20,14 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
-    """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
+    """Return the compiled functions bound to parameter values, with one launch's problem in extended precision."""
     bound = bind_all(formulas, p)
     exact = exact_problem(formulas, p, launch)
     return bound if exact is None else BoundFunctions(bound.addresses, bound.p, exact, *bound[3:])
 
 
 def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
-    """The bound functions that all launches with these parameters share."""
+    """Return the bound functions that all launches with these parameters share."""
     if p.functions is None:
         addresses, losses = formulas.functions.addresses(), formulas.dissipation
         dissipation = None if losses is None else losses.addresses()
@@ -50,7 +50,7 @@ class Problem:
     formulas : Formulas
         The module's record.
     launch : Launch
-        Where and how the motion begins.
+        The launch of the motion.
     p : ParameterValues
         The exact values of the run-time parameters.
     functions : BoundFunctions
@@ -82,19 +82,21 @@ class Problem:
 
     @property
     def exact(self) -> ExactProblem:
-        """The problem in extended precision; only for curves that are known by formulas."""
+        """The problem in extended precision; it exists only for curves that are known exactly."""
         exact = self.functions.exact
         assert exact is not None
         return exact
 
     @property
     def tape(self) -> BoundTape | None:
-        """The exact formulas for double-double arithmetic, of a chart the potential; None where they are too long."""
+        """The exact formulas for double-double arithmetic, or the potential for a charted curve; None if they are too
+        long.
+        """
         return tape_of(self.formulas, self.p)
 
     @property
     def true_pieces(self) -> TruePieces | None:
-        """A charted curve in double-double arithmetic; None where there is no such thing."""
+        """A charted curve in double-double arithmetic; None if the curve is known in doubles only."""
         maker, p = self.formulas.chart, self.p
         if maker is None or not isinstance(self.formulas.exact, ExactPotential):
             return None
@@ -110,7 +112,9 @@ class Problem:
 
     @property
     def decider(self) -> ExactProblem | RoundedProblem:
-        """The decisions that doubles cannot make: by extended precision, or by rounding margins without it."""
+        """The problem that makes the decisions that doubles cannot make: by extended precision, or else by rounding
+        margins.
+        """
         exact = self.functions.exact
         return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
 
@@ -126,7 +130,9 @@ class Problem:
 
 
 def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
-    """The exact formulas for double-double arithmetic, of a chart the potential; None where they are too long."""
+    """Return the exact formulas for double-double arithmetic, or the potential for a charted curve; None if they are
+    too long.
+    """
     if p.tape is None:
         exact, domain, found = formulas.exact, formulas.domain_of, None
         if isinstance(exact, ExactFormulas) and domain is not None:
@@ -138,7 +144,7 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
 
 
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
-    """The problem of one launch in extended precision; None if the curve is known in doubles only."""
+    """Return the problem of one launch in extended precision; None if the curve is known in doubles only."""
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)

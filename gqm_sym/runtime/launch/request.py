@@ -14,11 +14,11 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 # length of the nearest piece (a curve as a whole may be very long).
 MAX_POINT_DISTANCE_SHARE = 1e-6
 
-# Which side of the track can push, and the only sign that N can have then; 0 if it can have both.
+# The names of the side of the track that can push, each with the only sign that N can then have; 0 if it can have both.
 ONLY_SIGN = {"bilateral": 0, "above": 1, "below": -1}
 CONTACTS = tuple(ONLY_SIGN)
 
-# The largest speed in m/s whose square is in the range of doubles with room for what it is multiplied by.
+# The largest speed in m/s. Its square is in the range of doubles, with room for the factors that multiply it.
 MAX_SPEED = 1e150
 
 # The largest launch place on a closed curve, in laps: beyond it, doubles resolve places to a thousandth of a lap or
@@ -80,7 +80,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     Raises
     ------
     LaunchError
-        If the model cannot be launched so; the message names the argument and says what would be right.
+        If the model cannot be launched in this way. The message names the argument and says what would be right.
     """
     lam0, v0, direction, point, t_max, contact = request
     if point is None and lam0 is not None:
@@ -115,7 +115,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
 
 
 def _read_direction(given: Any) -> int:
-    """A sign that is given as another number than an int."""
+    """Return a sign that is given as a number of another type than int."""
     try:
         sign = 0.0 if isinstance(given, str | np.ndarray) else read_number(given, where="direction").value
     except NumberError:
@@ -154,7 +154,7 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
 def _read_place(
     formulas: Formulas, p: ParameterValues, lam0: Any, point: Any
 ) -> tuple[Number, tuple[Number, Number] | None]:
-    """The launch place as a value of the curve parameter, and its coordinates if these were given."""
+    """Return the launch place as a value of the curve parameter, and its coordinates if these were given."""
     if point is None:
         raise LaunchError(f"lam0: not given; it is the value of {formulas.parameter} to launch from")
     if formulas.chart is None:

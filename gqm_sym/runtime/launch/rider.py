@@ -22,16 +22,16 @@ FIELDS = (
     *("roll", "track_x", "track_y", "track_z"),
 )
 
-# What loads are measured in, in m/s**2.
+# The unit of loads in m/s**2.
 STANDARD_GRAVITY = 9.80665
 
-# A tangent whose horizontal part has a smaller square is vertical to rounding.
+# A tangent whose horizontal component has a smaller square is vertical to rounding.
 MIN_LEVEL = 1e-20
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR, VECTOR, REAL, REAL), nogil=True)
 def rider_loads_at(address, p, lam, v2, v, nu):  # type: ignore[no-untyped-def]
-    """Rows of `FIELDS` at places ``lam``, and the square of the tangent's horizontal part."""
+    """Return the rows of `FIELDS` at places ``lam``, and the square of the tangent's horizontal component."""
     out = np.empty((RIDER_ROWS, lam.size))
     call_rider_loads(address, lam.size, lam, v2, v, nu, p, out)
     for i in range(lam.size):
@@ -57,18 +57,18 @@ def check_banked(formulas: "Formulas", asked: str) -> None:
 
 
 def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction: Array, force: Array) -> Array:
-    """Rows of `FIELDS` at places.
+    """Return the rows of `FIELDS` at places.
 
     Parameters
     ----------
     p : array
-        The run-time parameters, and what stands behind them.
+        The run-time parameters and the numbers that follow them.
     lam, v2 : (n,) arrays
         The places, and V**2 there.
     direction : (n,) array
-        The sign of ds/dt. Where it is 0, what opposes the motion is left out.
+        The sign of ds/dt. Where it is 0, forces that oppose the motion are omitted.
     force : (n,) array
-        The contact force, of which the sign counts where it has one.
+        The contact force. Only its sign matters, if it has one.
 
     Raises
     ------

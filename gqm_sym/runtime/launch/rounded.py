@@ -21,12 +21,14 @@ class RoundedProblem:
     w0: float
 
     def slope_sign(self) -> int:
-        """The sign of the effective potential's slope at the launch place; 0 if it is zero within rounding."""
+        """Return the sign of the effective potential's slope at the launch place; 0 if it is zero within rounding."""
         value, slope = self._potential(self.lam0)
         return 0 if abs(slope) <= ZERO_SHARE * (0.5 + abs(value)) else int(np.sign(slope))
 
     def resolve(self, near: float, far: float, direction: int) -> End:
-        """Whether a turning point, an equilibrium or neither lies between two places with V**2 nearly zero."""
+        """Decide whether a turning point, an equilibrium or neither lies between two places with nearly vanishing
+        V**2.
+        """
         width = abs(far - near)
         equilibrium = self._equilibrium(near, far + direction * width)
         beyond = far if equilibrium is None else equilibrium
@@ -59,7 +61,7 @@ class RoundedProblem:
             near, far = (middle, far) if np.sign(self._potential(middle)[1]) == sign else (near, middle)
 
     def _zero(self, near: float, far: float) -> float:
-        """The zero of V**2 between a place where it is positive and one where it is not."""
+        """Return the zero of V**2 between a place where V**2 is positive and one where it is not."""
         while True:
             middle = 0.5 * (near + far)
             if middle in (near, far):

@@ -1,9 +1,9 @@
 """Pass 1: position, curvature, V**2 and contact force at given places of a conservative model.
 
-A load map has all of these at many places. It is filled block by block, so that intermediate results stay in cache.
-V**2 is its value at launch less the change of the effective potential. Where most of that cancels, as near a launch
-from rest, the first divided difference of the potential from the launch place keeps the digits that a subtraction of
-potentials loses.
+A load map has all of these at many places. It is filled block by block, so that intermediate results stay in the cache.
+V**2 is its value at launch less twice the change of the effective potential. If most of that difference cancels, as
+near a launch from rest, the first divided difference of the potential from the launch place keeps the digits that a
+subtraction of potentials loses.
 """
 
 from itertools import pairwise
@@ -29,7 +29,8 @@ from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS, SPACE_ROWS
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
-# Places filled at a time: few enough that what is streamed drains into memory while the next are computed.
+# The number of places that are filled at a time. It is small enough that streamed results are written to memory while
+# the next ones are computed.
 BLOCK = 256
 
 # The rows of a load map.
@@ -135,16 +136,16 @@ class Pass1OfRider(NamedTuple):
 
 
 class LaunchNumbers(NamedTuple):
-    """A launch in doubles, and what a load map keeps of it.
+    """A launch in doubles, with the numbers that a load map keeps of it.
 
     Attributes
     ----------
     lam0, w0 : float
         The launch place, and V**2 there.
     v2_correction : float
-        What V**2 gains because the launch place is given more exactly than by a double.
+        The increase of V**2 that results from the difference between the exact launch place and its double.
     size : float
-        Size of the terms of the effective potential at launch; NaN where it is not known.
+        Size of the terms of the effective potential at launch; NaN if it is not known.
     """
 
     lam0: float
@@ -156,12 +157,12 @@ class LaunchNumbers(NamedTuple):
 def load_map_arrays(
     kind: type[Pass1] | type[Pass1InSpace] | type[Pass1OfRider], shape: tuple[int, ...], lam: Array, out: Any
 ) -> Pass1 | Pass1InSpace | Pass1OfRider:
-    """The arrays of a load map: those of ``out``, or new ones if it is None.
+    """Return the arrays of a load map: those of ``out``, or new ones if it is None.
 
     Parameters
     ----------
     kind : type
-        What the arrays are handed over as.
+        The NamedTuple class in which the arrays are returned.
     shape : tuple of int
         The shape of the places.
     lam : array
@@ -172,7 +173,8 @@ def load_map_arrays(
     Raises
     ------
     InputError
-        If ``out`` is not so many writable, contiguous arrays of doubles of that shape, each with memory of its own.
+        If ``out`` does not consist of the right number of writable, contiguous arrays of doubles of that shape, each
+        with memory of its own.
     """
     names = kind._fields
     if out is None:
@@ -212,7 +214,9 @@ def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
 
 @Inlined
 def keeps_digits(w0, v2, sizes):  # type: ignore[no-untyped-def]
-    """Whether V**2 has kept its digits though terms of some size were subtracted; false if one is not a number."""
+    """Return whether V**2 has kept its digits although terms of some size were subtracted; false if one of them is not
+    a number.
+    """
     return sizes <= MAX_TERMS_RATIO * max(fabs(w0 - v2), w0)
 
 
@@ -220,8 +224,8 @@ def keeps_digits(w0, v2, sizes):  # type: ignore[no-untyped-def]
 def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignore[no-untyped-def]
     """Fill V**2 and the contact force by the divided difference of the potential wherever that has more digits.
 
-    ``field`` holds the rows of a block of a load map. If the size of the potential's terms at launch is not known,
-    there is nothing in it yet, and all of its rows are filled.
+    ``field`` holds the rows of a block of a load map. If the size of the potential's terms at launch is not known, it
+    is empty on entry and all of its rows are filled.
     """
     n, lam0, w0, size = places.size, launch.lam0, launch.w0, launch.size
     is_filled = size >= 0.0
@@ -253,8 +257,8 @@ def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignor
 def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
     """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map.
 
-    The arguments are not checked, for looking at the tuples would take two microseconds a call: `CompiledModel.pass1`,
-    the only caller, sees to it that arrays are aligned, contiguous and of doubles.
+    The arguments are not checked, because examining the tuples would take two microseconds a call.
+    `CompiledModel.pass1`, the only caller, ensures that arrays are aligned, contiguous and of doubles.
 
     Parameters
     ----------
@@ -267,7 +271,7 @@ def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # 
     rows : tuple of six arrays
         The rows to be filled.
     part : (begin, end)
-        Which places.
+        The range of places to fill.
     past_cache : bool
         Whether the rows are written past the caches (`streaming.put`).
     """
@@ -304,7 +308,7 @@ def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # 
 
 @entry(MATRIX(ADDRESSES, VECTOR, VECTOR, VECTOR))
 def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
-    """Rows x, z, ds, kappa and contact force at places ``lam``, given V**2 there."""
+    """Return rows x, z, ds, kappa and contact force at places ``lam``, given V**2 there."""
     out = np.empty((5, lam.size))
     call_path_and_contact_force(fns.path_and_contact_force, lam.size, lam, v2, p, out)
     return out
@@ -312,7 +316,7 @@ def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
 
 @entry(MATRIX(ADDRESSES, VECTOR, VECTOR))
 def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
-    """Rows of the effective potential and of its slope at places ``lam``."""
+    """Return rows of the effective potential and of its slope at places ``lam``."""
     out = np.empty((2, lam.size))
     call_effective_potential(fns.effective_potential, lam.size, lam, p, out)
     return out
@@ -320,7 +324,9 @@ def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(ADDRESSES, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR))
 def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
-    """V**2 at places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting potentials."""
+    """Return V**2 at places with their offsets from lam0, for a launch at lam0 + lam0_low, without subtracting
+    potentials.
+    """
     rows, launch = np.empty((2, offsets.size)), np.empty((2, 1))
     call_potential_divdiff1(fns.potential_divdiff1, offsets.size, lam0, places, offsets, p, rows)
     call_effective_potential(fns.effective_potential, 1, np.array([lam0]), p, launch)
@@ -332,16 +338,18 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR, VECTOR, REAL), nogil=True)
 def path_in_space_at(address, p, lam, v2, v):  # type: ignore[no-untyped-def]
-    """Rows y and contact force along x, y and z at places ``lam`` of a space curve, given V**2 and sgn(ds/dt) there."""
+    """Return rows y and contact force along x, y and z at places ``lam`` of a space curve, given V**2 and sgn(ds/dt)
+    there.
+    """
     out = np.empty((SPACE_ROWS, lam.size))
     call_path_in_space(address, lam.size, lam, v2, v, p, out)
     return out
 
 
 def path_in_space(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction: Array) -> Array:
-    """Rows y and contact force along x, y and z at places ``lam`` of a space curve.
+    """Return rows y and contact force along x, y and z at places ``lam`` of a space curve.
 
-    ``direction`` holds signs of ds/dt, or V itself; they matter in a frame that turns only.
+    ``direction`` contains signs of ds/dt, or V itself; they matter only in a rotating frame.
     """
     assert formulas.path_in_space is not None
     address = formulas.path_in_space.address
@@ -352,6 +360,6 @@ def path_in_space(formulas: "Formulas", p: Array, lam: Array, v2: Array, directi
 
 
 def length(vector: Array) -> Array:
-    """The lengths of vectors, whose components are the rows."""
+    """Return the lengths of vectors, whose components are the rows."""
     found: Array = np.sqrt((vector * vector).sum(axis=0))
     return found

@@ -17,18 +17,18 @@ from gqm_sym.runtime.quadrature.trapezoid import LIBRATION, time_by_trapezoid
     checked=False,
 )
 def survey(fns, p, lam0, v0, direction, domain, is_smooth):  # type: ignore[no-untyped-def]
-    """Find both ends of a motion, and its half period or loop time where that is easy.
+    """Find both ends of a motion, and its half period or loop time if the trapezoidal rule gives it.
 
     Parameters
     ----------
     lam0, v0 : float
         The launch place, and the speed there in m/s.
     direction : int
-        The sign of ds/dt at launch; of a launch from rest it is found.
+        The sign of ds/dt at launch; for a launch from rest it is determined here.
     domain : DomainNumbers
         The range of the curve parameter.
     is_smooth : bool
-        Whether the curve is smooth everywhere. The trapezoidal rule does not converge on others.
+        Whether the curve is smooth everywhere. The trapezoidal rule does not converge on other curves.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def survey(fns, p, lam0, v0, direction, domain, is_smooth):  # type: ignore[no-u
         As `ends.ends` returns them.
     time : float
         Half period of a libration or loop time of a circulation in s, within some units in the last place. NaN for any
-        other motion, where the trapezoidal rule does not converge, and where too much of V**2 cancels for doubles.
+        other motion, if the trapezoidal rule does not converge, or if too much of V**2 cancels for doubles.
     """
     direction, ahead, behind = ends(fns, p, lam0, v0, direction, domain)
     kind, time = orbit_kind(direction, ahead, behind, v0, domain.period), np.nan

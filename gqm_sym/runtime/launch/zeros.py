@@ -15,24 +15,25 @@ from gqm_sym.runtime.compiled.calls import call_bounds, call_effective_potential
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.types import Array
 
-# What ends a search: a zero of V**2, the length to search, a place that doubles cannot decide, a cusp, the count of
-# steps, a value that is not finite.
+# The codes of what ends a search: a zero of V**2, the length to search, a place that doubles cannot decide, a cusp, the
+# number of steps, a value that is not finite.
 TURN, LIMIT, CRITICAL, CUSP, STEPS_SPENT, NOT_FINITE = range(6)
 MAX_STEPS = 4096
 
-# Limit of the parameter, as a multiple of its value at the launch: it counts as infinite beyond. Powers of a parameter
-# this large still lie within the range of doubles.
+# The limit of the parameter, as a multiple of its value at the launch; a larger parameter counts as infinite. Powers of
+# a parameter this large still lie within the range of doubles.
 MAX_PARAMETER = 1e50
 
-# V**2 above which a value that is not finite means overflow, not a pole.
+# The value of V**2 above which a value that is not finite means overflow and not a pole.
 OVERFLOW_V2 = 1e100
 
 # V**2 counts as constant in doubles over a step if its possible change is below this share of the terms it consists of.
 CONSTANT_SHARE = 1e-13
 
-# By what factor the terms of V**2 on a step may be larger than at the zero on it and before. It must cover what terms
-# are larger by inside the formulas, which are not seen here: CONSTANT_SHARE allows for 450 roundings, so that divided
-# differences may cancel to their last three or four digits. If it is too large, extended precision is used in vain.
+# The factor by which the terms of V**2 on a step may be larger than at the zero on the step and before it. It must
+# cover larger terms inside the formulas, which are not known here: CONSTANT_SHARE allows for 450 roundings, so that
+# divided differences may cancel to their last three or four digits. If it is too large, extended precision is used in
+# vain.
 TERMS_GROWTH = 1e3
 
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
@@ -65,14 +66,14 @@ class FoundEnd(NamedTuple):
 
 
 class SearchArrays(NamedTuple):
-    """Arrays that a search works in.
+    """The work arrays of a search.
 
     Attributes
     ----------
     point : (2,) array
         A place and its offset from the launch.
     rows : (2, 1) array
-        What the model's functions fill in for one place.
+        The rows that the model's functions fill for one place.
     bounds : (4,) array
         Enclosures of the effective potential's slope and of ds.
     """
@@ -84,7 +85,7 @@ class SearchArrays(NamedTuple):
 
 @Inner
 def speed_squared(fns, p, lam0, w0, offset, arrays):  # type: ignore[no-untyped-def]
-    """V**2 at lam0 + offset, and the size of its terms, without subtracting potentials."""
+    """Return V**2 at lam0 + offset, and the size of its terms, without subtracting potentials."""
     point, rows = arrays.point, arrays.rows
     point[0], point[1] = lam0 + offset, offset
     call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, point[:1], point[1:], p, rows)
@@ -94,7 +95,9 @@ def speed_squared(fns, p, lam0, w0, offset, arrays):  # type: ignore[no-untyped-
 
 @Inner
 def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-def]
-    """The zero of V**2 between offsets lo (V**2 > 0) and hi (V**2 < 0), by Newton's method kept inside the bracket."""
+    """Return the zero of V**2 between offsets lo (V**2 > 0) and hi (V**2 < 0), by Newton's method kept inside the
+    bracket.
+    """
     point, rows = arrays.point, arrays.rows
     x = 0.5 * (lo + hi)
     for _ in range(200):
@@ -119,7 +122,7 @@ def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-de
 
 @Inner
 def zero_on_step(fns, p, lam0, w0, near, far, sizes, arrays):  # type: ignore[no-untyped-def]
-    """The zero of V**2 on a step on which it falls throughout: TURN, or CRITICAL next to an equilibrium.
+    """Return the zero of V**2 on a step on which it decreases throughout, as TURN; CRITICAL next to an equilibrium.
 
     ``near`` and ``far`` are the signed offsets of the ends of the step, and ``sizes`` those of the terms of V**2 up to
     the end of the step, and up to its beginning.
@@ -127,12 +130,12 @@ def zero_on_step(fns, p, lam0, w0, near, far, sizes, arrays):  # type: ignore[no
     point, rows, bounds = arrays
     direction = 1.0 if far > near else -1.0
     root = polish_zero(fns, p, lam0, w0, near, far, arrays)
-    # At the far end of the step the terms of V**2 may be larger without limit, as next to a pole. At the zero itself
-    # they may all vanish, so those before it count too.
+    # At the far end of the step the terms of V**2 may be arbitrarily large, as next to a pole. At the zero itself they
+    # may all vanish, so those before it count too.
     terms = max(sizes[1], speed_squared(fns, p, lam0, w0, root, arrays)[1])
     terms = max(terms, speed_squared(fns, p, lam0, w0, 0.5 * (near + root), arrays)[1])
     size = min(sizes[0], TERMS_GROWTH * terms)
-    # How far rounding may move the zero: if an equilibrium is that close, doubles cannot decide.
+    # The distance by which rounding may move the zero; if an equilibrium is that close, doubles cannot decide.
     point[0] = lam0 + root
     call_effective_potential(fns.effective_potential, 1, point, p, rows)
     largest = max(fabs(far) - fabs(near), MAX_ZERO_ERROR_SHARE * (fabs(lam0) + fabs(root)))
@@ -146,9 +149,9 @@ def zero_on_step(fns, p, lam0, w0, near, far, sizes, arrays):  # type: ignore[no
 
 @Inner
 def stays_positive(lower, upper, width, narrow, v2_near, v2_far, size):  # type: ignore[no-untyped-def]
-    """Whether V**2 > 0 all along a step, by the bounds of its slope and its values at both ends.
+    """Decide whether V**2 > 0 on a whole step, from bounds on its slope and its values at both ends.
 
-    Returns 1 if it is, 0 if the step must be halved for a decision, and -1 if doubles cannot decide.
+    The result is 1 if it is, 0 if the step must be halved for a decision, and -1 if doubles cannot decide.
     """
     least = max(v2_near + lower * width, v2_far - upper * width)
     if upper <= 0.0 or least > CONSTANT_SHARE * size:
@@ -173,7 +176,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
     Returns
     -------
     FoundEnd
-        What was found first.
+        The first end that was found.
     """
     arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
     bounds = arrays.bounds

@@ -1,4 +1,4 @@
-"""A body leg after leg: what it does after each of them, and what ends its motion."""
+"""The advance of a body leg by leg: what it does after each leg, and what ends its motion."""
 
 from math import fabs, inf, isfinite
 from typing import NamedTuple
@@ -70,32 +70,33 @@ from gqm_sym.runtime.legs.runs.follow import follow, released
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Route, Start
 
-# What became of a body that was to advance, beside the codes of `runs.ends`; in place of TURN where it stays, and
-# ENDING has the same code where the motion ends. AT_ONCE: the track would have to pull it at once, so that it lifts off
-# where it is. LEAVES: it would leave the domain at once. BEYOND: it has left the range of doubles.
+# Codes for the result of an advance, in addition to those of `runs.ends`. RESTS takes the place of TURN if the body
+# stays; ENDING has the same code if the motion ends. AT_ONCE: the track would have to pull the body at once, so that it
+# lifts off where it is. LEAVES: the body would leave the domain at once. BEYOND: it has left the range of doubles.
 RESTS, AT_ONCE, LEAVES, BEYOND = range(10, 14)
 
 DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean), Dissipation)
 
-# The first panel as a share of the first step of a search. The shorter it is, the more digits early times have.
+# The width of the first panel as a share of the first step of a search. The narrower it is, the more digits early times
+# have.
 FIRST_PANEL_SHARE = 0.25
 
-# How many laps of a closed curve are followed in one run at most: so far its breaks are listed. It is one lap where
-# breaks are so many that the gaps between them are kept.
+# The largest number of laps of a closed curve that are followed in one run, for which its breaks are listed. It is one
+# lap if the gaps between breaks are kept, because there are many of them.
 LAPS_AHEAD = 8
 
-# The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
-# halved at most; over such a distance the force grows by this factor at most.
+# The width of the first panel of a body released near an equilibrium, in units of the distance to it; the largest
+# number of times that the step to it is halved; and the largest factor by which the force may grow over that step.
 FIRST_STEPS, MAX_HALVINGS, MAX_FORCE_GROWTH = 8.0, 1000, 4.0
 
 # The length of a panel, as a share of the first step of a search, at which a body that pauses creeps towards an
 # equilibrium that it never reaches.
 CREEPING_SHARE = 1e-6
 
-# As how many pauses one counts at which a body creeps: it does not come farther and farther.
+# The number of pauses that a pause of a creeping body counts for, because such a body does not move on and on.
 CREEPING_PAUSES = 5.0
 
-# A leg that is longer than this share of one that was not one polynomial is not tried as one.
+# A leg is not tried as one polynomial if it is longer than this share of one for which that failed.
 MAX_WHOLE_SHARE = 0.9
 
 
@@ -112,10 +113,10 @@ class Joints(NamedTuple):
     drops : array
         The corners at which a body that moves leaves the track, which can only push (`BoundFunctions.drops`).
     ahead : array
-        A buffer for the breaks ahead of a body; `room_ahead` says how long it must be.
+        A buffer for the breaks ahead of a body; `room_ahead` returns the length that it must have.
     gaps : array
-        A buffer for what is kept of the curve between its breaks, for the run-time parameters of the body; `room_kept`
-        says how long it must be. It is empty if nothing is kept.
+        A buffer for the data kept of the gaps between breaks, for the run-time parameters of the body; `room_kept`
+        returns the length that it must have. It is empty if nothing is kept.
     """
 
     breaks: Array
@@ -126,24 +127,28 @@ class Joints(NamedTuple):
 
 
 def room_ahead(breaks: int) -> int:
-    """Return the largest number of breaks ahead of a body on a curve with a number of them in each lap."""
+    """Return the largest number of breaks ahead of a body on a curve with this number of breaks in each lap."""
     return (LAPS_AHEAD + 3) * breaks
 
 
 def room_kept(breaks: int) -> int:
-    """Return the number of values that are kept for a curve with a number of breaks."""
+    """Return the number of values that are kept for a curve with this number of breaks."""
     return 4 * GAP_COLUMNS * breaks
 
 
 @Inner
 def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
-    """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
+    """Return the data kept of the gaps between breaks; empty if a leg cannot be followed by them, because its panels
+    are read or the law is not linear.
+    """
     return joints.gaps if reading.what != PANELS and dissipation.linear else joints.gaps[:0]
 
 
 @Inner
 def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: ignore[no-untyped-def]
-    """The breaks strictly between two places, in the order in which they are passed, and which of all is the first."""
+    """Return the breaks strictly between two places, in the order in which they are passed, and the index of the first
+    among all breaks.
+    """
     count, first_break = 0, 0
     low, high = min(begin, limit), max(begin, limit)
     first, last = 0, 0
@@ -152,7 +157,7 @@ def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: igno
     laps = last - first + 1
     for i in range(laps):
         lap = (first + i if direction > 0 else last - i) * period
-        # One more on either side, because a lap is subtracted with a rounding.
+        # One more break is taken on either side, because the subtraction of a lap is rounded.
         from_k = max(np.searchsorted(breaks, low - lap) - 1, 0)
         to_k = min(np.searchsorted(breaks, high - lap) + 1, breaks.size)
         for j in range(to_k - from_k):
@@ -167,7 +172,7 @@ def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: igno
 
 @Inner
 def is_break(breaks, period, place):  # type: ignore[no-untyped-def]
-    """Whether the curve is not smooth at a place."""
+    """Return whether the curve is not smooth at a place."""
     for known in breaks:
         lap = period * round((place - known) / period) if period > 0.0 else 0.0
         if known + lap == place:
@@ -177,9 +182,10 @@ def is_break(breaks, period, place):  # type: ignore[no-untyped-def]
 
 @Inner
 def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-untyped-def]
-    """The direction in which a body at rest leaves a place; 0 if it stays.
+    """Return the direction in which a body at rest leaves a place; 0 if it stays.
 
-    At a corner both planes decide; where it could slide down either of them, it takes the ``preferred`` direction.
+    At a corner the planes on both sides decide; if the body could slide down either of them, it takes the ``preferred``
+    direction.
     """
     off, period = 0.0, body[PERIOD]
     if is_break(joints.breaks, period, place):
@@ -189,9 +195,10 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 @Inner
 def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
-    """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
+    """Return a width for the first panel, based on a distance of at most ``step`` over which the force on a body, or
+    else V**2, hardly changes.
 
-    Next to an equilibrium a body turns, or moves on, by a distance that is unrelated to other lengths of the curve.
+    Next to an equilibrium the body turns, or moves on, over a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -208,7 +215,7 @@ def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-u
 
 @Inner
 def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
-    """Set what a body begins with."""
+    """Set the numbers of a body at its launch."""
     lam0, period = body[LAM0], body[PERIOD]
     step = first_step(DomainNumbers(body[LOW], body[HIGH], period, 0.0, 0.0))
     preferred = int(body[PREFERRED])
@@ -222,10 +229,11 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
 
 @Inner
 def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
-    """Whether the body, which turns at a place, has come to rest on a corner there within the resolution of times.
+    """Return whether the body, which turns at a place, has come to rest on a corner there within the resolution of
+    times.
 
-    Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
-    factor. The body is at rest if the sum of all that follow is less than a rounding of the time.
+    Between two planes the times from turn to turn decrease geometrically, in both directions by the same factor. The
+    body is at rest if the sum of all that follow is less than a rounding of the time.
     """
     before, last, now = body[LEG_BEFORE], body[LAST_LEG], body[ELAPSED]
     this = body[LEG_TIME]
@@ -249,7 +257,9 @@ def fold(body):  # type: ignore[no-untyped-def]
 
 @Inner
 def expected_width(body):  # type: ignore[no-untyped-def]
-    """About how long a leg from turn to turn will be: widths decrease in a geometric sequence. 0 if that is unknown."""
+    """Return the expected width of the next leg from turn to turn, since widths decrease in a geometric sequence; 0 if
+    it is unknown.
+    """
     last, before = body[LAST_WIDTH], body[WIDTH_BEFORE]
     return last * (last / before) if last > 0.0 and before > 0.0 else last
 
@@ -266,7 +276,8 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     limit = place + direction * (LAPS_AHEAD if gaps.size == 0 else 1) * period if period > 0.0 else end
     drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
     limit = drops[0] if drops.size else limit
-    # Breaks a little behind show on which piece of the curve the body is, and one at the limit where that piece ends.
+    # Breaks a little behind the body show on which piece of the curve it is, and one at the limit shows the end of that
+    # piece.
     begin, beyond = place - direction * body[FIRST_STEP], direction * clearance(place, limit)
     breaks, first_break = breaks_before(joints.breaks, joints.ahead, period, direction, begin, limit + beyond)
     record[START], record[START_LOW], record[LAPS_BEFORE] = place, body[PLACE_LOW], body[LAPS]
@@ -291,7 +302,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
 
 @Inner
 def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-untyped-def]
-    """Whether a body rests where V**2 has vanished, and what it remembers of a turn otherwise."""
+    """Return whether a body rests where V**2 has vanished; if it turns, store the data of the turn."""
     place, low = record[END], record[END_LOW]
     stays = found.direction == 0 or (place == body[PLACE] and low == body[PLACE_LOW] and body[V2] == 0.0)
     rests = stays or rests_between(dissipation, p, joints, body, place)
@@ -312,12 +323,12 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     Parameters
     ----------
     dissipation : Dissipation
-        The module's compiled functions, and of what kind its forces are.
+        The module's compiled functions, and the kind of its forces.
     p : array
         Run-time parameters.
     joints : Joints
     body : array
-        The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
+        The line of the body (`legs.body`), which has been launched. It is unchanged if the record is FULL.
     reading : runs.route.Reading
     record : array
         Filled in (`leg_record`).
@@ -325,8 +336,8 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     Returns
     -------
     int
-        RESTS if it comes to rest, one of the codes of `runs.ends` for what ended the run, LEAVES or
-        BEYOND; SPENT if it could not be followed.
+        RESTS if the body comes to rest, one of the codes of `runs.ends` for the end of the run, LEAVES or BEYOND; SPENT
+        if the body could not be followed.
     """
     found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]

@@ -67,38 +67,39 @@ from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIMIT, NARROWED, SPE
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Reading
 
-# The question for each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
-# equilibrium; RUN_AGAIN is to follow one of them once more for its panels, or a part of it.
+# The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
+# equilibrium. RUN_AGAIN means to follow a leg, or a part of it, once more for its panels.
 FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
 
-# What became of a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
+# The code for a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
 NEARBY = 14
 
-# Whether there is an answer: LEFT is the status of a body that the loop does not decide.
+# The status of an answer; LEFT is that of a body that the loop does not decide.
 FOUND, LEFT, NONE = range(3)
 
-# On a curve without ends, after how many runs in a row without a turn no end is looked for any more.
+# On a curve without ends, the number of successive runs without a turn after which the search for an end stops.
 MAX_PAUSES = 60
 
-# The number of turns after which the place where the body comes to rest is not looked for any more.
+# The number of turns after which the search for the place of rest stops.
 MAX_TURNS = 20000
 
-# The most legs of one body.
+# The largest number of legs of one body.
 MAX_LEGS = 250_000
 
-# A swing about an equilibrium at 0 has died away when it is so small that V**2 and the errors of it come to the end of
-# the range of doubles.
+# A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
+# doubles.
 LEAST_SWING = 1e-110
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
-# What has been kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart; the chart
-# stands beside it, so that no other one can have its identity. Who uses it takes it out meanwhile.
+# The data kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart. The chart is
+# stored with them, so that no other chart can have the same identity. A thread that uses an entry removes it for that
+# time.
 _KEPT: dict[Any, tuple[Array, Array]] = {}
 MAX_KEPT = 8
 _LOCK = threading.Lock()
 
-# What compiled code reads of a curve that is smooth everywhere.
+# The joints of a curve that is smooth everywhere, for compiled code.
 SMOOTH = Joints(NOTHING, NOTHING, NOTHING, NOTHING)
 
 
@@ -119,17 +120,17 @@ class Track(NamedTuple):
     drops: Array
 
     def is_kept(self, dissipation: Dissipation) -> bool:
-        """Whether the curve between its breaks is kept, by which most legs are passed."""
+        """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
         return dissipation.linear and self.breaks.size > 0
 
 
 class Observed(NamedTuple):
-    """What the legs so far have shown.
+    """The findings of the legs so far.
 
     Attributes
     ----------
     arrival : float
-        The time of the first arrival at the target; infinite so far.
+        The time of the first arrival at the target; infinite as long as there is none.
     peak : float
         The largest value of the quantity, or minus the smallest.
     """
@@ -140,20 +141,22 @@ class Observed(NamedTuple):
 
 @Inner
 def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
-    """Whether the next leg has to be followed too."""
+    """Return whether the next leg has to be followed too."""
     if body[ENDING] != 0.0 or arrival < inf:
         return False
     if isfinite(body[HORIZON]):
         return body[ELAPSED] < body[HORIZON]
     if question == ARRIVAL:
-        # A body that turns at two points reaches no place outside of them any more.
+        # A body that has turned at two points reaches no place outside of them any more.
         return body[TURNS] < (1.0 if body[FROM_REST] else 2.0)
     return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_REST] == 0.0 or body[TURNS] > MAX_TURNS))
 
 
 @Inner
 def sought(question):  # type: ignore[no-untyped-def]
-    """Whether a question is about the contact force; and 1 if about the largest value, -1 if about the smallest."""
+    """Return whether a question is about the contact force, and 1 if it is about the largest value, -1 if about the
+    smallest.
+    """
     return question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0
 
 
@@ -175,7 +178,7 @@ def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
 
 @Inner
 def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
-    """The answer for a body that stays where it is, and its status."""
+    """Return the answer for a body that stays where it is, and its status."""
     if body[ONLY_SIGN] != 0.0:
         return np.nan, LEFT
     if question == END_TIME:
@@ -193,7 +196,7 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
 
 @Inner
 def conclude(body, question, observed):  # type: ignore[no-untyped-def]
-    """The answer for a body that has been followed long enough, and its status."""
+    """Return the answer for a body that has been followed long enough, and its status."""
     if question == ARRIVAL:
         is_there = observed.arrival < inf and observed.arrival <= body[HORIZON]
         return (observed.arrival, FOUND) if is_there else (np.nan, NONE)
@@ -219,7 +222,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     force, sign = sought(question)
     for _ in range(MAX_LEGS):
         what = advance(dissipation, p, joints, body, Reading(reads, force, sign, observed.peak), record)
-        # Of a run without room for a panel `solve` says whether the curve or the arithmetic ends there.
+        # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
         if what in (FULL, SPENT, NARROWED, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
@@ -234,14 +237,17 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
 
 @Inner
 def is_tiny(record):  # type: ignore[no-untyped-def]
-    """Whether a leg is so short that the next one may be followed by its distance from an equilibrium, or by none."""
+    """Return whether a leg is so short that the next one may have to be followed by the distance from an equilibrium,
+    or cannot be followed at all.
+    """
     start, end = record[START], record[END]
     return fabs(end - start) < SMALL_SHARE * fabs(end) or max(fabs(start), fabs(end)) < LEAST_SWING
 
 
 @Inner
 def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no-untyped-def]
-    """Advance a body by one leg, past what is kept of the curve; ``before`` becomes what the body is before it.
+    """Advance a body by one leg, with the data kept of the gaps between breaks; ``before`` becomes a copy of the body
+    before the leg.
 
     A leg that ends at a turn, or at the limit of a run, has a record without panels, which `RUN_AGAIN` fills in.
     """
@@ -257,7 +263,7 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
 
 @Inner
 def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-untyped-def]
-    """Advance a body by as many legs as there are records, or to a leg after which something else is decided."""
+    """Advance a body by as many legs as there are records, or up to a leg after which Python decides how to go on."""
     what, count, body = RESTS, 0, bodies[0]
     while count < records.shape[0]:
         if joints.gaps.size > 0:
@@ -281,30 +287,30 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
     checked=False,
 )
 def drive(dissipation, parameters, joints, question, bodies, records):  # type: ignore[no-untyped-def]
-    """Drive bodies along the curve, each until a question about its motion is answered.
+    """Drive bodies along the curve, each of them until a question about its motion is answered.
 
     Parameters
     ----------
     dissipation : Dissipation
-        The module's compiled functions, and of what kind its forces are.
+        The module's compiled functions, and the kind of its forces.
     parameters : array
         A row of run-time parameters for each body, or one for all of them.
     joints : Joints
     question : int
-        FIRST_LEGS to MOST_LOAD. The answer to all from END_TIME on is in VALUE and STATUS of the body; LEAST_LOAD and
+        FIRST_LEGS to MOST_LOAD. From END_TIME on, the answers are in VALUE and STATUS of each body; LEAST_LOAD and
         MOST_LOAD mean the contact force per mass. After FIRST_LEGS and LEGS, VALUE is the number of legs that have been
         followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
     bodies : (n, SIZE) array
-        The bodies (`legs.body`), which are moved on. Up to RUN_AGAIN that is the first one alone; where the curve
-        between its breaks is kept, the others become what it is before each leg.
+        The bodies (`legs.body`), which are moved on. For questions up to RUN_AGAIN there is one body, in the first row;
+        if data of gaps are kept, the other rows become copies of it before each leg.
     records : (n, size) array
-        Filled in with legs of the first body (`leg_record`), of which LEGS asks for n at most. The first row is work
-        space of other questions.
+        Filled with legs of the first body (`leg_record`), at most n for LEGS. For other questions the first row is work
+        space.
 
     Returns
     -------
     int
-        What became of the last body on its last leg (`advance`), or NEARBY.
+        The code for the last leg of the last body (`advance`), or NEARBY.
     """
     breaks, corners, drops, ahead, gaps = joints
     joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
@@ -331,7 +337,7 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
 def drive_along(
     track: Track, dissipation: Dissipation, parameters: Array, question: int, bodies: Array, records: Array
 ) -> int:
-    """`drive` bodies along a curve, with what is kept of it for these forces and run-time parameters."""
+    """Call `drive` for a curve, with the data kept of it for these forces and run-time parameters."""
     if not track.breaks.size:
         what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
         return what

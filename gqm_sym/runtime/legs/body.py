@@ -12,7 +12,7 @@ TARGET                the place whose time of arrival is asked for
 V2                    V**2 where the body is
 ===================== ===========================================================================================
 
-These are set by who launches the body, as `launched` does it; all other numbers are zero until its first leg.
+These are set at the launch, as by `launched`; all other numbers are zero until the first leg.
 
 ===================== ===========================================================================================
 number                meaning
@@ -52,14 +52,14 @@ LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, VALUE, STA
 
 
 def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:
-    """Bodies at their launch.
+    """Return bodies at their launch.
 
     Parameters
     ----------
     given : (n, PLACE) array or sequence of sequences
         LAM0 to V2 of each body.
     lines : int
-        The number of lines more.
+        The number of additional lines.
 
     Returns
     -------

@@ -24,7 +24,16 @@ from gqm_sym.runtime.legs.leg_record import (
     LAPS_BEFORE,
 )
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece, leg_record, tabulated
-from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
+from gqm_sym.runtime.legs.variations.answers import (
+    MarchPoints,
+    Switch,
+    gradient,
+    nearest_switch,
+    places_at,
+    points_by_record,
+    points_of,
+    states_at,
+)
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
@@ -42,20 +51,20 @@ from gqm_sym.runtime.motion.sampler import (
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
-# When the record that compiled code reads is made anew for later times, it has this many times the pieces, so that many
-# questions one after the other do not copy it for each leg.
+# When the record that compiled code reads is extended to later times, its number of pieces grows by this factor, so
+# that successive questions do not copy it for each leg.
 EXTENSION = 1.25
 
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    """The motion of a launch where forces dissipate."""
+    """Return the motion of a launch with dissipative forces."""
     problem = Problem(formulas, launch, p, bind_all(formulas, p), formulas.domain(p))
     motion = DissipativeMotion(problem)
     return motion if motion.direction else MotionAtRest(problem)
 
 
 def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: Array) -> Array:
-    """V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
+    """Return V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
     motion = dissipate(formulas, p, launch)
     v2 = np.full(places.shape, np.nan)
     if isinstance(motion, DissipativeMotion):
@@ -65,14 +74,14 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
 
 
 def _plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Times from launch on as doubles, with the least and the greatest; None if they are not that."""
+    """Return times from launch on as doubles, with the smallest and the largest; None if they are not such numbers."""
     time = plain_time(t)
     times = plain_times(t) if time is None else (np.array([time]), time, time)
     return times if times is not None and 0.0 <= times[1] <= times[2] < inf else None
 
 
 class Reading(NamedTuple):
-    """What compiled code reads of a motion.
+    """The record of a motion for compiled code.
 
     Attributes
     ----------
@@ -83,7 +92,7 @@ class Reading(NamedTuple):
     since : float
         The time in s from which on it holds.
     pieces : sequence of TabulatedPiece
-        What it is made of.
+        The pieces that the record contains.
     """
 
     record: Array = np.empty(0)
@@ -92,12 +101,12 @@ class Reading(NamedTuple):
     pieces: Sequence[TabulatedPiece] = ()
 
     def has(self, t: float, errors: bool) -> bool:
-        """Whether it holds up to a time, with all errors if these are required."""
+        """Return whether it holds up to a time, with all errors if these are required."""
         return t <= self.until and (self.pieces[-1].has_all_errors or not errors)
 
 
 class DissipativeMotion(FollowedMotion):
-    """A motion that loses energy: leg after leg, until the body rests or leaves the track, or for ever.
+    """A motion that loses energy, leg by leg until the body rests or leaves the track, or for ever.
 
     Each leg begins with V**2 = 0 at a turning point, so that its accuracy does not depend on the legs before it; times
     are summed as two doubles. Legs are computed when they are needed. Without ``t_max``, `legs` and `events` of a
@@ -142,7 +151,7 @@ class DissipativeMotion(FollowedMotion):
         return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
 
     def lam(self, t: Any) -> Any:
-        """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
+        """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
         if times is None:
             return super().lam(t)
@@ -150,7 +159,7 @@ class DissipativeMotion(FollowedMotion):
         return out.reshape(times[0].shape) if np.ndim(t) else float(out[0])
 
     def state(self, t: Any) -> State:
-        """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
+        """Return the state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
         if times is None or (self.problem.formulas.path_in_space is not None and self.problem.period):
             return super().state(t)
@@ -164,7 +173,7 @@ class DissipativeMotion(FollowedMotion):
         return self._state_of(times[0] if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
-        """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
+        """Return a bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
         return super().error_bound(t) if _plain_times(t) is None else self.state(t).error
 
     def _read(
@@ -176,7 +185,7 @@ class DissipativeMotion(FollowedMotion):
         by_record: Callable[[Array, Array, Array], None],
         by_segments: Callable[[Array], Array],
     ) -> Array:
-        """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
+        """Return rows of numbers at times, as far as possible from the record that compiled code reads."""
         read = self._reading_at if times.size == 1 else self._reading_up_to
         record, until = read(greatest, rows > 1)[:2]
         times = times.reshape(-1)
@@ -222,7 +231,7 @@ class DissipativeMotion(FollowedMotion):
 
     @locked
     def _read_first(self, t: float, errors: bool) -> Reading:
-        """`_reading_at`, once the motion is followed so far."""
+        """Return the record of `_reading_at` after following the motion up to the time."""
         self._check_end(t)
         pieces, first = self._pieces, self._first_reading
         k = bisect_right(pieces, t, key=lambda timed: timed.t_stop[0])
@@ -235,7 +244,7 @@ class DissipativeMotion(FollowedMotion):
         return self._first_reading
 
     def _with_errors(self, made: Sequence[TabulatedPiece], pieces: Sequence[TimedSegment]) -> list[TabulatedPiece]:
-        """Tabulated pieces with all errors."""
+        """Return tabulated pieces with all errors."""
         return [
             piece
             if piece.has_all_errors
@@ -248,10 +257,10 @@ class DissipativeMotion(FollowedMotion):
 
     @locked
     def _extended(self, t: float, errors: bool) -> Reading:
-        """`_reading_up_to`, once the motion is followed so far."""
+        """Return the record of `_reading_up_to` after following the motion up to the time."""
         self._check_end(t)
         before = self._reading
-        if before.has(t, errors):  # another thread has followed it
+        if before.has(t, errors):  # another thread has extended it
             return before
         made = list(before.pieces)
         if t > before.until:
@@ -278,20 +287,32 @@ class DissipativeMotion(FollowedMotion):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        self._trajectory(float(times.max(initial=0.0)))
-        found = states_at(self, self._changes, times, low)
+        points, shape = self._march_points(t)
+        found = states_at(self._changes, points)
         fields = (getattr(found, name) for name in Sensitivity._fields[1:])
         return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
 
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
-        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
+        points, shape = self._march_points(t)
+        found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        return found
+
+    def _march_points(self, t: Any) -> tuple[MarchPoints, tuple[int, ...]]:
+        """Return the points of the motion at times, and the shape of the times."""
+        given = _plain_times(t)
+        if given is not None:
+            times, _, greatest = given
+            reading = (self._reading_at if times.size == 1 else self._reading_up_to)(greatest, errors=False)
+            if greatest <= reading.until:
+                shape = np.shape(times) if np.ndim(t) else ()
+                return points_by_record(reading.record, reading.pieces, times.reshape(-1)), shape
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))
-        found: Array = places_at(self, self._changes, times, low)[list(rows.values())].reshape(len(rows), *shape)
-        return found
+        found = self._phase_points(times, low)
+        return points_of(found, self._velocities(found)), shape
 
     @property
     @locked

@@ -57,33 +57,35 @@ from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARR
 from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
-# The most panels of legs that are stored; each takes some kilobytes.
+# The largest number of panels of legs that are stored; each takes some kilobytes.
 MAX_STORED = 250_000
 
-# How many panels a record has space for beside one for each break; a leg with more is followed again with a larger
-# record. How many legs are followed in one call of a motion that has a horizon, whose legs are all needed.
+# The number of panels for which a record has space in addition to one for each break; a leg with more is followed again
+# with a larger record. The number of legs that are followed in one call for a motion with a horizon, all legs of which
+# are needed.
 FEW_PANELS, LEGS_PER_CALL = 12, 8
 
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
 
-# A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
-# than this share of its place and of the length of the leg.
+# If a body creeps towards an equilibrium and no panel is narrow enough any more, its distance from the equilibrium is
+# at most this share of its place, or of the length of the leg.
 NEAR_EQUILIBRIUM = 1e-13
 
-# How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
-# body is not a product of a factor and V**2, but a difference of forces that agree to a rounding.
+# The smallest distance from an unstable equilibrium at which a body may be launched from rest, as a share of its place.
+# It applies if the resistance is not a factor times V**2 but a difference of forces that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
-# Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
-# than this share of what it is a thousandth of the first step away.
+# Legs approach a cusp to within some 1e-8, where roundings of the place hide the decrease of ds/dlam. There ds is at
+# most this share of its value a thousandth of the first step away.
 CUSP_SHARE = 1e-2
 
-# What ends a leg along a chart that may have been passed by what is kept of the curve (`answers.follow_leg`).
+# The codes for the end of a leg that may have been followed without panels, by the data kept of gaps
+# (`answers.follow_leg`).
 PASSED = TURN, RESTS, LIMIT
 
-# The names of what ends a run, where the code alone says it.
+# The names of the ends of runs that the code alone determines.
 END_NAMES = {
     TURN: "turn",
     RESTS: "rest",
@@ -97,14 +99,14 @@ SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 
 
 def _loss(problem: Problem) -> Dissipation:
-    """The dissipation of the model."""
+    """Return the dissipation of the model."""
     loss = problem.functions.dissipation
     assert loss is not None
     return loss
 
 
 def _track(problem: Problem) -> Track:
-    """The curve of a motion, with all places where it, or its chart, is not smooth."""
+    """Return the curve of a motion, with all places at which the curve or its chart is not smooth."""
     f = problem.functions
     return Track(f.chart, f.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact])) if f.chart.size else SMOOTH
 
@@ -127,19 +129,20 @@ class Driver:
     track : Track
         The curve.
     runs : list of Run
-        The runs so far that nobody has taken from here.
+        The runs so far that have not been removed from this list.
     body : array
-        The lines of the body (`legs.body`); the first one is where it is.
+        The lines of the body (`legs.body`); the first one is its present state.
     at : list of float
-        That line where the curve is followed by its parameter; empty before the first leg.
+        That line in terms of the curve parameter, also while the body is followed by its distance from an equilibrium;
+        empty before the first leg.
     ending : str
-        The name of what ended the motion, or nothing.
+        The name of the end of the motion; empty as long as there is none.
     last_swing : float
         The distance of the last turn from the equilibrium, once the swing has died away.
     force_error : float
-        By what share the force next to the unstable equilibrium of a frame may be wrong.
+        The relative error of the force next to the unstable equilibrium of a frame.
     launch_error : float or None
-        What its distance from there may be wrong by at launch.
+        The error of the body's distance from there at launch.
     """
 
     ending = ""
@@ -153,7 +156,7 @@ class Driver:
         self.runs: list[Run] = []
         self.at: list[float] = []
         self._horizon = horizon
-        # If legs are passed by what is kept of the curve, and may have to be followed again.
+        # Whether legs are followed by the data kept of gaps, and may have to be followed again.
         self._passes = passes = self.track.is_kept(self.dissipation)
         self._space = FEW_PANELS + (0 if passes else self.track.breaks.size)
         ends, asked = problem.domain.numbers[:3], (ONLY_SIGN[launch.contact], horizon, nan)
@@ -175,7 +178,7 @@ class Driver:
 
     @property
     def goes_on_for_ever(self) -> bool:
-        """Whether the body has done so much that an end of the motion is not looked for any further."""
+        """Whether so many legs have been followed that no end of the motion is searched for any more."""
         turns, pauses = self.at[TURNS], self.at[PAUSES]
         return bool(pauses >= MAX_PAUSES or turns > MAX_TURNS or (turns and not self.at[MAY_REST]))
 
@@ -201,7 +204,7 @@ class Driver:
             self._end_run(what, record, before[-1])
 
     def with_panels(self, run: Run) -> list[Run]:
-        """A run in parts with panels; the run alone if these are known."""
+        """Return a run divided into parts with panels; the run alone if its panels are known."""
         if run.before is None:
             return [run]
         parts: list[Array] = []
@@ -221,7 +224,7 @@ class Driver:
         raise self._lost(record[0])
 
     def _end_run(self, what: int, record: Array, before: Array | None) -> None:
-        """Note a run that another follows in another way, or none."""
+        """Store a run after which the body is followed in another way, or not at all."""
         problem, frame = self.problem, self._frame
         if frame is not None:
             frame.move(record, 1)
@@ -235,7 +238,7 @@ class Driver:
         name = "" if leaves_frame else self._end_name(what, record, heading)
         if name == "cusp" and what == NARROWED:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
-        # At a cusp dW/dlam vanishes, so that its rounding, too, is large against it.
+        # At a cusp dW/dlam vanishes, so that its rounding error is large compared with it there too.
         if what == SPENT or (what == NARROWED and name != "cusp" and self._force_cancels(record)):
             raise self._lost(record)
         self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
@@ -248,7 +251,9 @@ class Driver:
             )
 
     def _followed(self) -> tuple[int, Array]:
-        """Return the end of the last of the next legs (`advance`), and the records of all; one if the body stays."""
+        """Return the code for the end of the last of the next legs (`advance`), and the records of all of them, or one
+        record if the body stays.
+        """
         legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
         while True:
             records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
@@ -271,7 +276,9 @@ class Driver:
         return drive_along(self.track, self.dissipation, p, question, bodies, records)
 
     def _settle(self, what: int, start: float, end: float) -> None:
-        """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
+        """Decide whether a run has come so close to an equilibrium that the motion ends there, or is followed in a
+        frame.
+        """
         in_frame, linear = self._frame is not None, self.dissipation.linear
         if what in (TURN, PAUSED) and self._has_died_away(start, end):
             self.ending = "asymptote"
@@ -284,7 +291,7 @@ class Driver:
                 self._enter_frame()
 
     def _lost(self, record: Array) -> SolutionError:
-        """Why a leg could not be followed."""
+        """Return the error that says why a leg could not be followed."""
         place = f"V**2 beyond {self.problem.formulas.parameter} = {float(record[END])!r}"
         if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:
             return SolutionError(
@@ -299,14 +306,18 @@ class Driver:
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
 
     def _force_cancels(self, record: Array) -> bool:
-        """Whether terms of the force cancel at the end or the start of a leg, so that doubles do not resolve it."""
-        with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
+        """Return whether terms of the force cancel at the end or the start of a leg, so that doubles do not
+        resolve it.
+        """
+        with suppress(SolutionError):  # without formulas, or with very long ones, there is no bound on its rounding
             law, heading = FormulaLaw(self.problem), int(record[HEADING])
             return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
         return False
 
     def _has_died_away(self, start: float, end: float) -> bool:
-        """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""
+        """Return whether the body is, or swings, so close to an equilibrium that its place does not show it any
+        more.
+        """
         frame = self._frame
         swing = max(abs(start), abs(end)) if frame is None else abs(self.body[0, PLACE])
         # From an unstable equilibrium the body departs, however near it turns.
@@ -323,14 +334,15 @@ class Driver:
         self._enter_frame(lam0)
         if self._frame is None:
             self.body[0, PLACE_LOW] = 0.0
-        else:  # it is launched there again, by its distance
+        else:  # the body is launched again, at its distance from the equilibrium
             self.body[0, STEP] = 0.0
             self.launch_error = ULP * abs(float(self.body[0, PLACE]))
 
     def _enter_frame(self, lam0: Number | None = None) -> None:
-        """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
+        """From here on, follow the body by its distance from an equilibrium, if it is close to one and stays there for
+        a while.
 
-        About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
+        A body does not stay near an unstable equilibrium, so this is done only for a launch there, at ``lam0``.
         """
         problem, line, loss = self.problem, self.body[0], self.dissipation
         if not is_small(loss, problem.functions.p, problem.functions.breaks, line):
@@ -351,7 +363,7 @@ class Driver:
             if known is not None:
                 (frame, line[PLACE]), line[PLACE_LOW], unknown = known, 0.0, 0.0
         if v2 == 0.0 and abs(line[PLACE]) < unknown:
-            line[PLACE] = 0.0  # there it stays
+            line[PLACE] = 0.0  # the body stays there
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
         self._frame = frame
@@ -359,7 +371,9 @@ class Driver:
         line[FIRST_STEP] = reach
 
     def _check_distance(self, size: float, frame: Frame) -> None:
-        """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
+        """Refuse a launch so near to an unstable equilibrium that doubles cannot represent the force that drives the
+        body away.
+        """
         place = float(frame.p[PLACE_IN_FRAME])
         nearest = LEAST_SWING if self.dissipation.linear else NEAREST_SHARE * abs(place)
         if not frame.is_stable and 0.0 < size < nearest:
@@ -370,7 +384,7 @@ class Driver:
             )
 
     def _leave_frame(self, record: Array) -> None:
-        """Follow the body by its place again; the record has places."""
+        """Return to following the body by its place; the record has places."""
         problem, line = self.problem, self.body[0]
         self._frame = None
         domain, step = problem.domain, starting_step(problem)
@@ -380,7 +394,9 @@ class Driver:
         self.at = line.tolist()
 
     def _cusp_ahead(self, record: Array, heading: int) -> float:
-        """The place of a cusp close ahead of the end of a run; the way there takes less than a rounding of the time."""
+        """Return the place of a cusp close ahead of the end of a run; the time to it is less than a rounding of the
+        time.
+        """
         f, place, near = self.problem.functions, float(record[END]), 0.01 * NEAR_CUSP * starting_step(self.problem)
         places = place - heading * near * np.array([0.0, 1.0, 2.0])
         ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
@@ -389,7 +405,7 @@ class Driver:
         return place + heading * distance * (1.0 + float(0.5 * bend / slope) * distance)
 
     def _end_name(self, what: int, record: Array, heading: int) -> str:
-        """The name of what ended a run."""
+        """Return the name of the end of a run."""
         problem = self.problem
         if what == LIMIT and not problem.period:
             return domain_end(problem, heading).what

@@ -1,4 +1,6 @@
-"""A motion with losses as far as it has been followed: its legs, their segments, and what errors they begin with."""
+"""A motion with losses as far as it has been followed: its legs, their segments, and the errors with which they
+begin.
+"""
 
 from contextlib import suppress
 from functools import cached_property
@@ -22,10 +24,11 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Traject
 
 
 class FollowedMotion(Motion):
-    """A motion that loses energy, followed as far as required; `DissipativeMotion` has the questions."""
+    """A motion that loses energy, followed as far as required; `DissipativeMotion` answers the questions about it."""
 
     _whole: Trajectory | None = None
-    # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
+    # The number of runs that `_look_ahead` computes of a motion for which it finds no end; 0 as long as that is not
+    # known.
     _beginning = 0
 
     def __init__(self, problem: Problem) -> None:
@@ -68,7 +71,7 @@ class FollowedMotion(Motion):
     def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
         if not self._driver.last_swing:
             return super()._phase_points(t, t_low)
-        # A swing that has died away stays where it turned last.
+        # After a swing has died away, the body stays where it turned last.
         last, last_low = self._pieces[-1].t_stop
         return super()._phase_points(np.minimum(t, last), np.where(t < last, t_low, last_low))
 
@@ -90,7 +93,7 @@ class FollowedMotion(Motion):
             trajectory = self._trajectory(0.0)
             found = passages(trajectory.segments[done:], trajectory, lam, low)
             done = len(trajectory.segments)
-            # A body that turns at two points reaches no place outside of them any more.
+            # A body that has turned at two points reaches no place outside of them any more.
             settled = driver.at[TURNS] >= (1.0 if self.problem.w0 == 0.0 else 2.0)
             if found or driver.ending or settled or driver.elapsed >= self._horizon:
                 return found
@@ -123,14 +126,14 @@ class FollowedMotion(Motion):
         return [*self._layout.runs, *self._driver.runs]
 
     def _runs_as_legs(self) -> list[Leg]:
-        """The runs of `legs`, which are not cut at changes of the contact sign and at corners."""
+        """Return the runs of `legs`, which are not cut at changes of the contact sign and at corners."""
         everything, lap = self._all_runs, self.problem.period
         stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._driver.elapsed]
         shown = everything[: self._beginning or None]
         return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
 
     def _known_end(self) -> float:
-        """The time at which the motion ends, as far as is known; infinite if it is not."""
+        """Return the time at which the motion ends, as far as is known; infinite if it is not."""
         ends = self._driver.ending not in ("", "asymptote")
         return min(self._horizon, self._driver.elapsed if ends else inf)
 
@@ -150,7 +153,7 @@ class FollowedMotion(Motion):
 
     def _follow_amply(self, enough: float) -> None:
         """Follow the motion until there are enough pieces, or as far as it can be followed."""
-        with suppress(SolutionError, BudgetError):  # it is raised when that is requested
+        with suppress(SolutionError, BudgetError):  # the error is raised when the failed part is requested
             while len(self._pieces) < enough and not self._driver.ending and self._driver.elapsed < self._horizon:
                 self._go_on()
 
@@ -162,7 +165,7 @@ class FollowedMotion(Motion):
             self._go_on()
 
     def _follow_again(self) -> None:
-        """Follow runs once more whose panels are not known, each in as many parts as that takes."""
+        """Follow the runs without panels once more for their panels, each in as many parts as necessary."""
         runs: list[Run] = []
         for run in self._driver.runs:
             parts = self._driver.with_panels(run)
@@ -172,5 +175,5 @@ class FollowedMotion(Motion):
         self._driver.runs = runs
 
     def _is_ahead(self, places: Array) -> bool:
-        """Whether one of the places lies ahead of what has been computed."""
+        """Return whether one of the places lies ahead of the part that has been computed."""
         return bool(np.any((places - self._driver.reached) * self._driver.at[DIRECTION] > 0.0))

@@ -1,4 +1,4 @@
-"""The errors that the legs of a motion with losses begin with, each from those before it."""
+"""The errors with which the legs of a motion with losses begin, each found from the errors before it."""
 
 from contextlib import suppress
 from math import inf, isnan
@@ -24,12 +24,12 @@ NO_CHARTS: Array = np.empty((0, 0))
 
 
 def _known(errors: tuple[float, float, float]) -> Errors:
-    """Bounds of errors, which are infinite where they come out as no numbers."""
+    """Return bounds of errors, with infinity in place of NaN."""
     return Errors(*(inf if isnan(error) else error for error in errors))
 
 
 def _changed_charts(problem: Problem) -> Array:
-    """The run-time parameters with charts that are changed by what they may be off by, as rows."""
+    """Return the run-time parameters with charts that are changed by their possible errors, as rows."""
     if problem.formulas.chart is None:
         return NO_CHARTS
     charts = problem.formulas.charted(problem.p).rounded()
@@ -44,19 +44,21 @@ class InheritedErrors:
     driver : Driver
         The body.
     runs : list of Run
-        Its runs with panels, which others are added to.
+        Its runs with panels; further ones may be appended.
     """
 
     def __init__(self, driver: Driver, runs: list[Run]) -> None:
         self._driver, self._runs = driver, runs
         self._errors = [self._at_launch()]
-        # For each panel of runs how large the terms of the force are that may cancel.
+        # For each panel of the runs, the size of the terms of the force that may cancel.
         self._terms: list[Array] = []
         self._charts = _changed_charts(driver.problem)
         self._frame: tuple[Frame, float, float] | None = None
 
     def before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
-        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        """Return bounds of the errors inherited by a timed segment: those of its place, and of the times at phase
+        angles.
+        """
         while len(self._errors) <= timed.leg + 1:
             self._errors.append(self._carried(len(self._errors) - 1))
         run, (before, after) = self._runs[timed.leg], self._errors[timed.leg : timed.leg + 2]
@@ -65,7 +67,7 @@ class InheritedErrors:
         of_frame = 0.0 if run.frame is None else self._errors_of(run.frame)[0]
         swing = 2.0 * self._driver.last_swing if timed.leg == len(self._runs) - 1 else 0.0
         if swing and run.what != ASYMPTOTE:
-            # So small a V**2 may have no error in the range of doubles, but the body stays where it is.
+            # The error of so small a V**2 may be below the range of doubles, but the body stays where it is.
             return before.place + of_frame + swing, np.zeros_like(phi)
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
         which = np.searchsorted(timed.segment.edges[1:-1], phi, side="right")
@@ -86,7 +88,9 @@ class InheritedErrors:
         return self._driver.force_error * float(run.record[TIME_FROM_START] + run.record[TIME_FROM_END])
 
     def _carried(self, leg: int) -> Errors:
-        """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
+        """Return the errors at the end of a leg, given those with which it begins; in a frame they are errors of
+        distances.
+        """
         run, before, driver = self._runs[leg], self._errors[leg], self._driver
         frame, turns = run.frame, run.what in (TURN, RESTS)
         share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
@@ -104,13 +108,15 @@ class InheritedErrors:
         return after._replace(place=after.place + of_place) if run.what == LIMIT else after
 
     def _errors_of(self, frame: Frame) -> tuple[float, float]:
-        """The error of the place of a frame's equilibrium, and what the chart makes of the force there, as a share."""
+        """Return the error of the place of a frame's equilibrium, and the relative error of the force there due to the
+        chart.
+        """
         if self._frame is None or self._frame[0] is not frame:
             self._frame = (frame, *error_of_chart(frame, self._driver.dissipation, self._charts))
         return self._frame[1:]
 
     def _terms_of(self, leg: int) -> Array:
-        """For each panel of a leg how large the terms of the force are that may cancel; 0 where that is not known."""
+        """Return, for each panel of a leg, the size of the terms of the force that may cancel; 0 if it is not known."""
         missing, driver = self._runs[len(self._terms) :], self._driver
         if missing:
             terms = [np.zeros(run.ahead + run.back) for run in missing]

@@ -14,7 +14,7 @@ from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIFTOFF
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
-# A change of the contact force's sign this many roundings from the end of a piece is there.
+# A change of the contact force's sign within this many roundings of the end of a piece counts as the end.
 END_ROUNDINGS = 8.0
 
 
@@ -24,7 +24,7 @@ class Layout:
     Parameters
     ----------
     functions : BoundFunctions
-        Those of the launch.
+        The functions of the launch.
 
     Attributes
     ----------

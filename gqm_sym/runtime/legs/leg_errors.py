@@ -1,16 +1,17 @@
-"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: those of its start, of V**2 there and of the time, by derivatives.
 
-Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
-``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
-``(P - Q W - P(a) exp(-q)) da``: this is small next to a, and gives the change of the time from a to the middle of the
-run. From b to the middle it is the same with the direction reversed. What rounding makes of V**2 is a few units in the
-last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
-What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
-bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). Along a chart
-it follows from the forces on charts that are changed by what their rows may be off by (`Chart.rounded`). A law that is
-not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
-followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
+Assume that the body starts from rest at a and turns at b. With q the integral of Q from a on, V**2 at a place changes
+by ``-P(a) exp(-q) da``, and therefore the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2
+changes by ``(P - Q W - P(a) exp(-q)) da``; this is small next to a, and gives the change of the time from a to the
+middle of the run. From b to the middle the same holds with the direction reversed. The rounding error of V**2 is a few
+units in the last place of the sum of all gains and losses by its terms, reduced by the resistance since then; it also
+changes the time. The driving and the resisting forces may nearly cancel: the sum of their sizes is the larger one of
+the forces on bodies that move in either direction. Terms of the force on a body at rest may cancel too: their size
+follows from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). Along
+a chart it follows from the forces on charts that are changed by the possible errors of their rows (`Chart.rounded`). If
+the law is not linear in V**2, it contains a square root at the turn. Panels that run into the turn then may have nine
+digits only, while those that are followed back from it have all digits. The difference between both in the middle gives
+the error of the turn.
 """
 
 from math import fabs, inf
@@ -79,7 +80,9 @@ PLACE_ROUNDINGS, TIME_ROUNDINGS = 1.0, 6.0
 
 
 def _slopes() -> Array:
-    """The matrix from values at a panel's nodes to the derivative by the share of the panel, a row for each node."""
+    """Return the matrix that maps values at a panel's nodes to the derivative by the share of the panel, a row for each
+    node.
+    """
     degree, x = np.arange(COUNT), 2.0 * SHARES - 1.0
     angle = np.arccos(np.clip(x, -1.0, 1.0))
     at_nodes = 2.0 * degree * np.sin(np.outer(angle, degree)) / np.sin(angle)[:, None]
@@ -99,11 +102,11 @@ class Errors(NamedTuple):
     Attributes
     ----------
     place : float
-        Of the place.
+        The bound for the place.
     v2 : float
-        Of V**2 there; 0 where the body turns.
+        The bound for V**2 there; 0 if the body turns there.
     time : float
-        Of the time in s.
+        The bound for the time in s.
     """
 
     place: float
@@ -112,20 +115,21 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """Data of some panels on the motion between the place where they begin and the middle of the run.
+    """Data of the motion on the panels from one end of the run to its middle.
 
     Attributes
     ----------
     by_place, by_v2 : float
-        The changes of the time by the place where they begin, at a given distance from there, and by V**2 there.
+        The derivatives of the time by the place where the panels begin, at a given distance from there, and by V**2
+        there.
     damping : float
-        What resistance leaves of a change of V**2.
+        The factor by which resistance reduces a change of V**2.
     gained : float
-        The sum of all gains and losses of V**2 by each of its terms, less what resistance took of them.
+        The sum of the sizes of all gains and losses of V**2 by each of its terms, reduced by the resistance since then.
     rounded : float
         The change of the time by a relative error of all these gains and losses.
     slope : float
-        By how much V**2 grows per distance where they begin.
+        The increase of V**2 per distance where the panels begin.
     rate : float
         The time rate per distance in the middle; 0 if there are no panels.
     least, most : float
@@ -148,9 +152,10 @@ class Half(NamedTuple):
 
 @Inner
 def size_of_terms(forces, panel, least, charts, work):  # type: ignore[no-untyped-def]
-    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`), which is at least ``least``.
+    """Return the size of the terms of FORCE on a panel that was just solved (`solve_panel`), which is at least
+    ``least``.
 
-    What a chart may be off by (``charts``, as of `carry`) counts as terms of which that is the rounding.
+    The possible error of a chart (``charts``, as in `carry`) counts as the rounding of further terms.
     """
     rows, v, nu, size = sample_buffer(), float(forces.direction), float(panel.contact_sign), 0.0
     for j in range(WIDE):
@@ -172,18 +177,18 @@ def size_of_terms(forces, panel, least, charts, work):  # type: ignore[no-untype
 
 @Inner
 def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: ignore[no-untyped-def]
-    """Solve the panels of a half of the leg once more, and sum up how errors grow on them.
+    """Solve the panels of a half of the leg once more, and accumulate the growth of errors on them.
 
     Parameters
     ----------
     panels : (int, int)
-        Where the first of them stands in the record, and their number.
+        The position of the first of them in the record, and their number.
     v2 : float
         V**2 where they begin.
     errors : (float, float, float)
-        Errors of the place where they begin, of V**2 there, and relative ones of gains and losses. INHERITED of each
-        panel becomes the largest error that these make in the times to places of the panel that are given by their
-        distance from there.
+        The errors of the place where they begin and of V**2 there, and the relative error of gains and losses.
+        INHERITED of each panel is set to the largest error that these cause in the times to places of the panel, which
+        are given by their distance from there.
     sizes : (array, array)
         ``terms`` and ``charts``, as in `carry`.
     """
@@ -235,13 +240,13 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
 
 
 def rounding_share(linear: bool) -> float:
-    """The relative error that rounding makes in what V**2 gains and loses by each of its terms."""
+    """Return the relative rounding error of the gains and losses of V**2 by each of its terms."""
     return (V2_ROUNDINGS if linear else NONLINEAR_V2_ROUNDINGS) * ULP
 
 
 @Inner
 def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
-    """The sum of what the times of panels may be wrong by, as their last coefficients show."""
+    """Return the sum of the errors of the times of panels, as estimated from their last coefficients."""
     error = 0.0
     for k in range(count):
         error += record[begin + k * COLUMNS + TIME_ERROR]
@@ -254,26 +259,26 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
     )
 )
 def carry(dissipation, p, turns, before, share, terms, charts, record):  # type: ignore[no-untyped-def]
-    """The errors at the end of a leg, which are those with which the next one begins.
+    """Return the errors at the end of a leg, with which the next one begins.
 
     Parameters
     ----------
     dissipation : Dissipation
-        The module's compiled functions, and of what kind its forces are.
+        The module's compiled functions, and the kind of its forces.
     p : array
         Run-time parameters.
     turns : bool
-        Whether V**2 vanishes where the leg ends, and times are counted back from there.
+        Whether V**2 vanishes at the end of the leg, from which times are then counted back.
     before : Errors
     share : float
-        The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
+        The relative error of the gains and losses of V**2 by each of its terms (`rounding_share`).
     terms : array
-        For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
+        For each panel of the record, the size of the terms of the force that may cancel; 0 if it is not known.
     charts : array
         Rows of run-time parameters, each with another chart (`Chart.rounded`); none for a curve with formulas.
     record : array
-        The record of the leg (`leg_record`). INHERITED is filled in: for panels from the end it is that of an error of
-        1 of the place of the end.
+        The record of the leg (`leg_record`). INHERITED is filled in; for panels from the end it is the effect of a unit
+        error of the place of the end.
 
     Returns
     -------
@@ -299,8 +304,9 @@ def carry(dissipation, p, turns, before, share, terms, charts, record):  # type:
     if ahead == 0:
         start_slope, rate = slope_of_v2(forces, record[START], record[START_V2], 0, point_buffer()), second.rate
     by_place, by_v2 = -start_slope * damping / second.slope, damping / second.slope
-    at_end = rate - second.by_place  # the time from the middle to the end, by the place of the end
-    # The end is held as two doubles. Forces are those at doubles, which shifts it by as much as they vary on the leg.
+    at_end = rate - second.by_place  # the derivative of the time from the middle to the end, by the place of the end
+    # The end is stored as two doubles, but forces are evaluated at doubles; this shifts the end in proportion to their
+    # variation on the leg.
     varied = max(first.most, second.most) - min(first.least, second.least)
     rounding *= max(ULP, min(1.0, varied / fabs(second.slope)))
     width = fabs((record[END] - record[START]) + (record[END_LOW] - record[START_LOW]))

@@ -1,4 +1,6 @@
-"""Readings of the record of a leg: the time at a place, the place at a time, and the largest speed or contact force."""
+"""Quantities that are read from the record of a leg: the time at a place, the place at a time, and the largest speed or
+contact force.
+"""
 
 from math import fabs, inf, sqrt
 
@@ -39,7 +41,9 @@ from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIEN
 
 
 def _to_legendre() -> tuple[Array, Array]:
-    """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
+    """Return the matrices that map values at a panel's nodes to Legendre coefficients of the function on [-1, 1] and of
+    its integral from -1.
+    """
     # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
     j = np.arange(WIDE + 1)
     series = np.zeros((COUNT, WIDE + 1))
@@ -60,25 +64,27 @@ def _to_legendre() -> tuple[Array, Array]:
 PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
 to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 
-# Values at a panel's nodes, and two series.
+# The length of a buffer for values at a panel's nodes and two series.
 terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(2 * WIDE)
 
-# The most steps of a search within a panel, and the part of it that is not searched any more.
+# The largest number of steps of a search within a panel, and the share of the panel at which the search stops.
 MAX_STEPS, LAST_STEP = 60, 4e-16
 
-# An extreme is searched to this part of a panel, because the function is flat there.
+# An extreme is located to this share of a panel, which suffices because the function is flat there.
 FLAT_PART = 1e-9
 
 
 @Inner
 def edge(record, begin, k):  # type: ignore[no-untyped-def]
-    """The march variable where the k-th of some panels begins, the first of which stands at ``begin``."""
+    """Return the march variable at the beginning of the k-th of some panels; the first of them is at ``begin`` in the
+    record.
+    """
     return record[begin + (k - 1) * COLUMNS + RIGHT] if k > 0 else 0.0
 
 
 @Inner
 def time_to(record, begin, count, w):  # type: ignore[no-untyped-def]
-    """The time from where ``count`` panels begin to a march variable on one of them."""
+    """Return the time from the beginning of ``count`` panels to a march variable on one of them."""
     terms, time, k = terms_buffer(), 0.0, 0
     while k < count - 1 and record[begin + k * COLUMNS + RIGHT] <= w:
         time += record[begin + k * COLUMNS + TIME]
@@ -92,7 +98,9 @@ def time_to(record, begin, count, w):  # type: ignore[no-untyped-def]
 
 @Inner
 def marched_in(record, begin, count, time):  # type: ignore[no-untyped-def]
-    """The march variable at a time from where ``count`` panels begin: the inverse of `time_to`; NaN without rates."""
+    """Return the march variable at a time from the beginning of ``count`` panels, as the inverse of `time_to`; NaN
+    without rates.
+    """
     terms, k = terms_buffer(), 0
     while k < count - 1 and record[begin + k * COLUMNS + TIME] <= time:
         time -= record[begin + k * COLUMNS + TIME]
@@ -119,14 +127,16 @@ def marched_in(record, begin, count, time):  # type: ignore[no-untyped-def]
 
 @Inner
 def march_of(record):  # type: ignore[no-untyped-def]
-    """The march variable of the panels from a leg's start."""
+    """Return the march variable of the panels from a leg's start."""
     half_c, start, v = record[HALF_C], (record[START], record[START_LOW]), int(record[HEADING])
     return March(start, v, 1.0, 2.0 * half_c) if half_c < inf else March(start, v, 0.0, 1.0)
 
 
 @Inner
 def passage(record, place):  # type: ignore[no-untyped-def]
-    """The time from a leg's start at which the body passes a place; inf if it does not, NaN if the record has none."""
+    """Return the time from a leg's start at which the body passes a place; inf if it does not, NaN if the record has no
+    such time.
+    """
     ahead, back, march = int(record[AHEAD]), int(record[BACK]), march_of(record)
     v, gone = march.direction, offset(place, march.origin, march.direction)
     left = 0.0 if place == record[END] else -offset(place, (record[END], record[END_LOW]), v)
@@ -144,7 +154,7 @@ def passage(record, place):  # type: ignore[no-untyped-def]
 
 @entry(types.float64(VECTOR, types.float64))
 def place_at(record, time):  # type: ignore[no-untyped-def]
-    """The place within the lap at a time in s from a leg's start; NaN if the record does not say."""
+    """Return the place within the lap at a time in s from a leg's start; NaN if the record does not determine it."""
     record, ahead, back = uncounted(record), int(record[AHEAD]), int(record[BACK])
     march, v = march_of(record), record[HEADING]
     if record[WHOLE] > 0.0:
@@ -160,13 +170,14 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
 
 @Inner
 def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
-    """The largest value of ``sign`` times a Chebyshev series that has one extreme at most between two places."""
+    """Return the largest value of ``sign`` times a Chebyshev series that has at most one extreme between two places."""
     left, rise = sum_and_slope(terms, lo)
     right, fall = sum_and_slope(terms, hi)
     best, rise, fall = max(sign * left, sign * right), sign * rise, sign * fall
     if not rise > 0.0 > fall:
         return best
-    # The slope's zero, by the rule of false position; the slope at an end that stays is halved (Illinois).
+    # The zero of the slope by the method of false position; if an end of the bracket stays, its slope is halved
+    # (Illinois method).
     moved = 0
     for _ in range(MAX_STEPS):
         x = min(max(lo + (hi - lo) * (rise / (rise - fall)), lo), hi)
@@ -183,7 +194,7 @@ def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
 
 @Inner
 def peak_of_panel(values, first, last, sign, best):  # type: ignore[no-untyped-def]
-    """The larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel.
+    """Return the larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel.
 
     Parameters
     ----------
@@ -195,7 +206,8 @@ def peak_of_panel(values, first, last, sign, best):  # type: ignore[no-untyped-d
     top, bottom = -inf, inf
     for j in range(COUNT):
         top, bottom = max(top, sign * values[j]), min(bottom, sign * values[j])
-    # Between the nodes a polynomial exceeds them by less than their spread (`polynomials.LEBESGUE`).
+    # Between the nodes a polynomial exceeds the values there by less than a multiple of their spread
+    # (`polynomials.LEBESGUE`).
     if top + (top - bottom) <= best:
         return best
     to_coefficients(values, 0, values, WIDE)
@@ -215,14 +227,14 @@ def peak_of_panel(values, first, last, sign, best):  # type: ignore[no-untyped-d
 
 @Inner
 def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[no-untyped-def]
-    """The larger of ``best`` and the peak of some panels between two values of the march variable.
+    """Return the larger of ``best`` and the peak of some panels between two values of the march variable.
 
     Parameters
     ----------
     panels : (int, int)
-        Where the first of the panels stands, and their number.
+        The position of the first of the panels in the record, and their number.
     half_c : float
-        c/2 of their march variable; infinite where that is the distance.
+        c/2 of their march variable; infinite if that is the distance.
     between : (float, float)
     asked : (bool, float)
         Whether the contact force per mass is asked for instead of the speed; 1 for the largest, -1 for the smallest.
@@ -246,7 +258,7 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
 
 @Inner
 def peak_of_rows(record, asked, best):  # type: ignore[no-untyped-def]
-    """`peak_of_leg` of a leg from turn to turn that the record has as rows."""
+    """Return `peak_of_leg` for a leg from turn to turn whose record has rows."""
     values, (force, sign) = sample_buffer(), asked
     if sign < 0.0 and not force:
         return max(best, 0.0)  # the body is slowest where it turns
@@ -258,9 +270,10 @@ def peak_of_rows(record, asked, best):  # type: ignore[no-untyped-def]
 
 @Inner
 def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
-    """The larger of ``best`` and the peak of a leg up to a time from its start; ``asked`` as of `peak_between`.
+    """Return the larger of ``best`` and the peak of a leg up to a time from its start; ``asked`` is as in
+    `peak_between`.
 
-    With the sign -1 it is minus the smallest value.
+    With the sign -1, the peak is minus the smallest value.
     """
     if record[WHOLE] > 0.0:
         return peak_of_rows(record, asked, best)

@@ -22,11 +22,11 @@ from HEAD on         the panels from the start; after them what was followed bac
 at the end           the places at which N changes sign, the first one last
 ==================== ============================================================================================
 
-A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
-(from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
-TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`). A panel that was passed by what is kept of
-the curve (`runs.gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = NO_RATES; with NO_VALUES it has
-RIGHT and TIME alone.
+A panel is a row of COLUMNS numbers. It has, at its nodes, the rates of time and of arc length, Y, and the contact force
+per mass (from NORMAL_LOAD on). After each of the first three there is one more number: RIGHT (the march variable at the
+panel's end), TIME, and TIME_ERROR (the error of the time). The last number is INHERITED (`leg_errors`). A panel that
+was passed by the data kept of a gap (`runs.gaps`) has its nodes in terms of distance, V in place of Y, no rates, and
+TIME_ERROR = NO_RATES; with NO_VALUES it has RIGHT and TIME alone.
 
 A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
 which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).
@@ -53,8 +53,9 @@ START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
 WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 
-# What is read of a record (`runs.route.Reading`): the times and places between which the leg runs; the largest or
-# smallest speed or contact force, too; the time at which the body passes a place; or all that panels say.
+# The data that are read from a record (`runs.route.Reading`): the times and places between which the leg runs; also the
+# largest or smallest speed or contact force; the time at which the body passes a place; or everything that panels
+# contain.
 TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
@@ -66,13 +67,13 @@ NO_RATES, NO_VALUES = -1.0, -2.0
 
 @Inlined
 def has_space(record, used, change_count):  # type: ignore[no-untyped-def]
-    """Whether the record has space for one more panel and one more change of sign."""
+    """Return whether the record has space for one more panel and one more change of sign."""
     return used + COLUMNS + change_count < record.size
 
 
 @Inlined
 def change_at(record, k):  # type: ignore[no-untyped-def]
-    """The index of the k-th change of N's sign in a record."""
+    """Return the index of the k-th change of N's sign in a record."""
     return record.size - 1 - k
 
 
@@ -91,7 +92,7 @@ def add_panel(record, at, right, width, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def total_time(record, begin, count):  # type: ignore[no-untyped-def]
-    """The time on ``count`` panels, the first of which stands at ``begin``."""
+    """Return the time on ``count`` panels, the first of which is at ``begin`` in the record."""
     high, low = 0.0, 0.0
     for k in range(count):
         high, rounding = two_sum(high, record[begin + k * COLUMNS + TIME])

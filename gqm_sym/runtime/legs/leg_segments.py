@@ -49,7 +49,7 @@ MAX_PHASE_ANGLE = 690.0
 
 @entry(types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, types.float64))(MATRIX, types.float64))
 def read_panels(panels, time):  # type: ignore[no-untyped-def]
-    """A leg's panels as `time_panels.lay` has them; their times add up to ``time``.
+    """Return a leg's panels in the form of `time_panels.lay`; their times add up to ``time``.
 
     Returns
     -------
@@ -83,22 +83,23 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
 
 
 class Run(NamedTuple):
-    """One run of the body as compiled code found it (`runs.follow`), from which segments are made when they are needed.
+    """One run of the body as found by compiled code (`runs.follow`), from which segments are made when they are needed.
 
     Attributes
     ----------
     record : array
         The record of the leg (`leg_record`).
     what : int
-        What ended it (`runs.ends`).
+        The code for its end (`runs.ends`).
     end : str
         The name of its end, as in `Leg.end`.
     frame : Frame or None
-        The surroundings of an equilibrium by which it was followed.
+        The frame of the equilibrium in which it was followed.
     before : array or None
-        The line of the body before it (`legs.body`), if the record says no more of its panels than their times.
+        The line of the body before it (`legs.body`), if the record has only the times of its panels.
     passed : array or None
-        That record, if its panels have been followed since, and the motion may end on it: it says where.
+        The record without panels, if the run has been followed again for its panels and the motion may end on it. It
+        determines the place of the end.
     """
 
     record: Array
@@ -109,7 +110,7 @@ class Run(NamedTuple):
     passed: Array | None = None
 
     def with_panels(self, records: list[Array], until: float) -> "list[Run]":
-        """The run in parts with panels, the last of which ends at the same place and time up to rounding.
+        """Return the run as parts with panels, the last of which ends at the same place and time up to rounding.
 
         ``until`` is the last time of the motion.
         """
@@ -138,17 +139,17 @@ class Run(NamedTuple):
         return int(self.record[BACK])
 
     def pair(self, at: int) -> Pair:
-        """Two doubles of the record: a place, or the times from the start and from the end."""
+        """Return two doubles of the record: a place, or the times from the start and from the end."""
         high, low = self.record[at : at + 2].tolist()
         return high, low
 
     @property
     def half_c(self) -> float:
-        """``c/2`` of the march variable; infinite where that is the distance."""
+        """``c/2`` of the march variable; infinite if that is the distance."""
         return float(self.record[HALF_C])
 
     def leg(self, lap: float, t_end: float) -> Leg:
-        """The leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
+        """Return the leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
         head = self.record[:HEAD].tolist()
         start, before = head[START], head[LAPS_BEFORE] * lap
         end = start if self.what == AT_ONCE else head[END]
@@ -181,9 +182,9 @@ class Run(NamedTuple):
 
 
 def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float, panels: Array) -> Segment:
-    """A segment by its panels, whose times add up to ``time``; its ends are two doubles each.
+    """Return a segment made from panels whose times add up to ``time``; its ends are two doubles each.
 
-    ``half_c`` is c/2 of the march variable of the panels, infinite where that is the distance.
+    ``half_c`` is c/2 of the march variable of the panels; it is infinite if that is the distance.
     """
     *laid, speed_terms, error = read_panels(panels, time)
     last = float(panels[-1, RIGHT])
@@ -200,6 +201,8 @@ def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float
 
 
 def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
-    """A segment towards an equilibrium b by the field of V**2 there; its panels begin where those of the field do."""
+    """Return a segment towards an equilibrium b, made from the field of V**2 there; its panels begin where the rows of
+    the field do.
+    """
     hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
     return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=MAX_PHASE_ANGLE, panel_breaks=hints)

@@ -18,7 +18,7 @@ from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR
 
-# How many equal parts of the time there are for each interval, by which the interval of a time is found.
+# The number of equal parts of the time for each interval; they serve to find the interval of a time.
 SLOTS_PER_INTERVAL = 4
 
 
@@ -31,6 +31,10 @@ class TabulatedPiece(NamedTuple):
         INTERVALS, STATES and PANELS; panels are counted from the first one of the piece.
     edges : array
         The phase angles at the edges of its panels.
+    leg, sense, laps : int
+        As in `TimedSegment`.
+    last : float
+        The march variable at the last phase angle, which is 1.
     has_all_errors : bool
         Whether the errors in STATES are those of times and places from launch, or of this piece alone.
     """
@@ -39,10 +43,14 @@ class TabulatedPiece(NamedTuple):
     states: Array
     panels: Array
     edges: Array
+    leg: int
+    sense: int
+    laps: int
+    last: float
     has_all_errors: bool = False
 
     def with_errors(self, of_place: float, of_times: Array) -> "TabulatedPiece":
-        """The piece with the errors from before it: of places, and of the times on each panel."""
+        """Return the piece with the inherited errors included: those of places, and of the times on each panel."""
         states = self.states.copy()
         states[:, leg_tables.TIME_ERROR] += of_times[states[:, leg_tables.PANEL].astype(np.intp)]
         states[:, leg_tables.PLACE_ERROR] += of_place
@@ -50,18 +58,18 @@ class TabulatedPiece(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """The numbers by which the table of a segment becomes rows for its times from launch, as in `TimedSegment`.
+    """The numbers that convert the table of a segment to rows for times from launch, as in `TimedSegment`.
 
     Attributes
     ----------
     from_turn : float
         1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
     last, turn_offset : float
-        As in `Segment.speed_series`, and of `Segment`.
+        As in `Segment.speed_series` and in `Segment`.
     relative_error : float
-        The errors of its times.
+        The relative error of its times.
     lam_before : float
-        By how much the curve parameter has grown in all laps before it.
+        The growth of the curve parameter over all laps before it.
     """
 
     from_turn: float
@@ -85,7 +93,7 @@ class Timing(NamedTuple):
 
 @Inner
 def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
-    """A time from the segment's end ``a`` as a time from launch, both in two doubles."""
+    """Convert a time from the segment's end ``a`` to a time from launch, both as two doubles."""
     s, e = two_sum(r, -timing.r_start)
     high, rest = two_sum(timing.t_start, timing.sense * s)
     return two_sum(high, rest + timing.t_start_low + timing.sense * (e + r_low - timing.r_start_low))
@@ -96,7 +104,7 @@ TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)
 
 @entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, TIMING))
 def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # type: ignore[no-untyped-def]
-    """The arrays of a `TabulatedPiece`.
+    """Return the arrays of a `TabulatedPiece`.
 
     Parameters
     ----------
@@ -138,7 +146,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         state[leg_tables.HEADING], state[leg_tables.ARC_A] = sense * direction, timing.s_a
         state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = growth
         state[leg_tables.TIME_ERROR] = (timing.relative_error + ULP + MAX_TIME_ERROR) * times[panel + 1]
-        # The error of a turn as of `Segment`, which is largest next to it.
+        # The error due to a turn, as in `Segment`, is largest next to it.
         of_turn = MAX_END_ROUNDINGS * ULP * (1.0 - start * start) if is_from_turn else 0.0
         state[leg_tables.PLACE_ERROR] = abs(width) * (slope * errors[i] + 3.0 * ULP + of_turn)
         kept += 1
@@ -165,11 +173,11 @@ def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
     )
     marks = np.array([edges, *segment.edge_times, lengths])
     intervals, states, panels = tabulate_piece(marks, time_terms, length_terms, speed_terms, timing)
-    return TabulatedPiece(intervals, states, panels, edges)
+    return TabulatedPiece(intervals, states, panels, edges, timed.leg, timed.sense, timed.laps, last)
 
 
 def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:
-    """The record by which compiled code finds places and states on pieces that follow each other from launch.
+    """Return the record from which compiled code finds places and states on pieces that follow each other from launch.
 
     ``v0`` is the signed speed of the launch.
     """
@@ -181,7 +189,7 @@ def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) ->
     until = intervals[:, leg_tables.UNTIL]
     parts, last = SLOTS_PER_INTERVAL * len(until), len(until) - 1
     slots: NDArray[np.int64] = np.zeros(parts + 1, dtype=np.int64)
-    # Rounding may put a time into the slot after its own.
+    # Rounding may assign a time to the slot after its own.
     slots[1:] = until.searchsorted(until[-1] / parts * np.arange(parts), side="right")
     slots[0] = slots[1]
     slots = np.minimum(slots, last) * leg_tables.INTERVAL_COLUMNS

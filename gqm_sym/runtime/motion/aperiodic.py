@@ -1,4 +1,4 @@
-"""Motions that do not repeat: to an end of the curve, to an equilibrium, to infinity or a pole, and rest."""
+"""Motions that do not repeat: those to an end of the curve, to an equilibrium, to infinity or to a pole, and rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,20 +27,22 @@ from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 
-# How many segments of a motion to infinity `legs` and `events` cover, and how many panels: on these its end is searched
-# for. Each segment is twice as long as the one before, so that they reach as far as for motions with losses.
+# The number of segments of a motion to infinity that `legs` and `events` cover, and the number of panels; its end is
+# searched for on these. Each segment is twice as long as the one before, so that they reach as far as for motions with
+# losses.
 MAX_SEGMENTS_AHEAD, MAX_PANELS_AHEAD = 12, 200
 
 # The next segment is twice as long unless the last one has more panels than this.
 MAX_PANELS_TO_DOUBLE = 64
 
-# The phase angle up to which the approach to an equilibrium is shown: the rest is less than a thousandth of it.
+# The phase angle up to which the approach to an equilibrium is shown; the rest of the way is less than a thousandth of
+# it.
 SHOWN_PHASE = 8.0
 
 
 @dataclass(slots=True)
 class OpenEnd:
-    """How far a motion to infinity or to a pole has been computed; it is continued on request.
+    """The open end of a motion to infinity or to a pole, which is continued on request.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class OpenEnd:
     direction : int
         The sign of its further change.
     limit : float
-        What it tends to: infinity, or a place where the curve or the potential is not finite.
+        The limit of the curve parameter: infinity, or a place where the curve or the potential is not finite.
     step : float
         The length of the next segment, in units of the parameter.
     """
@@ -68,7 +70,7 @@ class OpenEnd:
 
 
 class AperiodicMotion(Motion):
-    """A motion that does not repeat: its segments follow each other, and each is passed once in each direction at most.
+    """A motion that does not repeat: its segments follow each other, and each is passed at most once in each direction.
 
     If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
     pole is continued when later times or farther places are requested; `t_end`, `legs` and `events` cover as many
@@ -79,7 +81,7 @@ class AperiodicMotion(Motion):
         super().__init__(problem, kind, direction)
         self._segments: list[TimedSegment] = []
         self.open_end: OpenEnd | None = None
-        # Why a motion to infinity cannot be followed any farther.
+        # The reason for which a motion to infinity cannot be followed any farther.
         self._obstacle = ""
         self._segments_at_first, self._is_endless = 0, False
 
@@ -88,7 +90,7 @@ class AperiodicMotion(Motion):
     def t_end(self) -> float:
         """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither.
 
-        A motion to infinity is searched for its end some way ahead only.
+        The end of a motion to infinity is searched for up to a limited distance only.
         """
         return min(self._horizon, _end_time(self._history()))
 
@@ -98,7 +100,9 @@ class AperiodicMotion(Motion):
         return bool(self._segments) and self._segments[-1].end == "liftoff"
 
     def add(self, segment: Segment, sense: int, end: str) -> None:
-        """Append a whole segment: from its end ``a`` if ``sense`` is +1, towards it if -1; ``end`` is what ends it."""
+        """Append a whole segment, passed from its end ``a`` if ``sense`` is +1 and towards ``a`` if it is -1; ``end``
+        is the name of its end.
+        """
         total_time = segment.total_time
         start, stop = (ZERO, total_time) if sense > 0 else (total_time, ZERO)
         if not self._segments:
@@ -121,7 +125,7 @@ class AperiodicMotion(Motion):
         )
 
     def _launch_delay(self, segment: Segment) -> float:
-        """The time in s from the double nearest to the launch place to that place itself."""
+        """Return the time in s from the double nearest to the launch place to that place itself."""
         low, speed = self.problem.launch.lam0.low, self.problem.launch.v0.value
         if segment.from_multiprecision or low == 0.0 or speed == 0.0:
             return 0.0
@@ -147,12 +151,12 @@ class AperiodicMotion(Motion):
             self.add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
 
     def leave_open(self, end: OpenEnd) -> None:
-        """Have the motion continued where its segments end, unless contact is lost before."""
+        """Let the motion be continued beyond its segments, unless contact is lost on them."""
         if not self.lifted_off:
             self.open_end = end
 
     def finish(self) -> "AperiodicMotion":
-        """Compute the first segment at least; returns the motion itself."""
+        """Compute at least the first segment; return the motion itself."""
         end = self.open_end
         self._is_endless = end is not None and not isfinite(end.limit)
         if end is not None and not self._segments:
@@ -182,14 +186,16 @@ class AperiodicMotion(Motion):
     def _history(self) -> tuple[TimedSegment, ...]:
         if isfinite(self._horizon):
             return self._trajectory(self._horizon).segments
-        # One segment more shows whether the last of them leads to the end.
+        # One more segment shows whether the last of them leads to the end.
         while self.open_end is not None and len(self._segments) <= self._segments_ahead():
             self._extend()
         count = self._segments_ahead()
         return tuple(self._segments if count == inf else self._segments[: int(count)])
 
     def _segments_ahead(self) -> float:
-        """The number of segments of `legs` and `events`; infinite if there are fewer so far, or all lead to a pole."""
+        """Return the number of segments of `legs` and `events`; infinity if there are fewer so far, or if all lead to a
+        pole.
+        """
         panels = 0
         for k, timed in enumerate(self._segments if self._is_endless else ()):
             panels += timed.segment.edges.size
@@ -218,7 +224,7 @@ class AperiodicMotion(Motion):
         return found
 
     def _is_ahead(self, lam: float) -> bool:
-        """Whether the motion will come to a place beyond what has been computed of it."""
+        """Return whether the motion will reach a place beyond the part that has been computed."""
         end = self.open_end
         return end is not None and (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
 
@@ -245,7 +251,7 @@ class AperiodicMotion(Motion):
         found = first_zero_from(f.addresses, f.p, lam0, problem.w0, end.direction, begin, length, end.step)
         (what, near, far), _ = search_beyond_barriers(problem, end.direction, found, length, end.step)
         if what == zeros.STEPS_SPENT and abs(near) > begin:
-            target = lam0 + near  # as far as one search goes; the next one begins there
+            target = lam0 + near  # one search ends here, and the next one begins here
         elif what == zeros.CUSP:
             self.add(through(f, end.place, lam0 + far, lam0, problem.w0), 1, "cusp")
             self.open_end = None
@@ -258,7 +264,7 @@ class AperiodicMotion(Motion):
             segment.duration <= NEGLIGIBLE_SHARE * self._segments[-1].t_stop[0]
             and segment.length <= NEGLIGIBLE_SHARE * abs(self._arc_end())
         ):
-            self._end_here()  # the motion along a spiral has come to its centre
+            self._end_here()  # the motion along a spiral has reached its centre
             return
         self.add(segment, 1, "")
         end.place = target
@@ -266,11 +272,11 @@ class AperiodicMotion(Motion):
             end.step *= 2.0
 
     def _stop_following(self, why: str) -> None:
-        """Compute no more of a motion to infinity."""
+        """Stop the computation of a motion to infinity."""
         self.open_end, self._obstacle = None, f"{why}; give a shorter t_max, or a domain that ends there"
 
     def _end_here(self) -> None:
-        """End the motion at a singular point: the rest of it takes no time, and has no length, within rounding."""
+        """End the motion at a singular point, because the rest of it has no duration and no length within rounding."""
         self._segments[-1] = replace(self._segments[-1], end="singular-point")
         self.open_end = None
 
@@ -292,7 +298,7 @@ class AperiodicMotion(Motion):
 
 
 def _end_time(segments: Sequence[TimedSegment]) -> float:
-    """The time in s at which the last of these segments ends the motion; infinite if it does not."""
+    """Return the time in s at which the last of these segments ends the motion; infinity if it does not."""
     return segments[-1].t_stop[0] if segments[-1].end not in ("", "asymptote") else inf
 
 
@@ -319,7 +325,7 @@ class MotionAtRest(Motion):
 
     @property
     def legs(self) -> tuple[Leg, ...]:
-        """None, or one of no length if contact is lost at once."""
+        """Empty, or one leg of no length if contact is lost at once."""
         lam0 = self.problem.lam0
         return Rows([Leg(lam0, lam0, 0.0, 0.0, self.direction, "liftoff")] if self._lifts_off else [])
 
@@ -340,6 +346,6 @@ class MotionAtRest(Motion):
 
 
 def _is_pulled(problem: Problem) -> bool:
-    """Whether a track that can push from one side only would have to pull a body at rest at the launch place."""
+    """Return whether a track that can push from one side only would have to pull a body at rest at the launch place."""
     f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
     return bool(side) and bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1))[0] < 0.0)

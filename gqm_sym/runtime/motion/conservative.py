@@ -1,4 +1,4 @@
-"""The motion of a conservative model that a launch begins: its ends, its kind, and the segments that it consists of."""
+"""The motion of a conservative model that begins with a launch: its ends, its kind, and its segments."""
 
 from math import isfinite, ulp
 
@@ -38,19 +38,20 @@ from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 # Distance from a cusp or a corner, as a share of the first step, at which V**2 is evaluated and a search begins.
 NEAR_CUSP = 1e-6
 
-# The lesser of two distances from a cusp, as a share of the first step, at which the tangential force is compared.
+# The smaller of two distances from a cusp, as a share of the first step, at which the tangential forces are compared.
 FORCE_SHARE = 1e-4
 
-# How many roundings of a place a corner is from an end of the motion if it is not that end; and how many of its terms
-# V**2 may be at a corner on which the body comes to rest.
+# A corner within so many roundings of an end of the motion counts as that end; a body comes to rest on a corner if V**2
+# there is at most so many roundings of its terms.
 RIDGE_ROUNDINGS = 16.0
 
-# How far beyond the double nearest to a launch place V**2 is looked at, in units of its last place.
+# The distance beyond the double nearest to a launch place at which V**2 is evaluated, in units of the double's last
+# place.
 HILLTOP_ROUNDINGS = 64.0
 
 
 def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    """The motion that a launch begins, as long as contact lasts.
+    """Compute the motion that begins with a launch, as long as contact lasts.
 
     Parameters
     ----------
@@ -59,12 +60,12 @@ def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     p : ParameterValues
         The exact values of its run-time parameters.
     launch : Launch
-        Where and how the motion begins.
+        The launch of the motion.
 
     Returns
     -------
     Motion
-        The motion, which computes what it is asked for.
+        The motion, which computes its answers on request.
 
     Raises
     ------
@@ -75,7 +76,7 @@ def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """
     motion = _as_bilateral(formulas, p, launch)
     if launch.contact == "bilateral" or not isinstance(motion, PeriodicMotion):
-        return motion  # an aperiodic motion finds by itself where contact is lost
+        return motion  # an aperiodic motion itself finds the place where contact is lost
     until_liftoff = AperiodicMotion(motion.problem, "transit", motion.direction)
     for timed in motion.one_period:
         until_liftoff.append(timed)
@@ -83,7 +84,7 @@ def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
 
 
 def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    """The motion if contact is never lost; of an aperiodic one the part for which contact lasts."""
+    """Return the motion if contact is never lost; if it is aperiodic, only the part for which contact lasts."""
     domain = formulas.domain(p)
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
@@ -93,8 +94,9 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         behind_v2, ahead_v2 = _speeds_beside(problem)
         if behind_v2 < 0.0 and ahead_v2 < 0.0:
             return MotionAtRest(problem)
-        # The body slides down the plane that falls, and from a ridge in the direction of launch. It is put beside the
-        # corner, on that plane. No double is the corner itself: more digits might put it on the other plane.
+        # The body slides down the plane that descends, and from a ridge in the direction of launch. It is placed next
+        # to the corner, on that plane. No double is the corner itself, and more digits might place it on the other
+        # plane.
         direction = launch.direction if behind_v2 > 0.0 and ahead_v2 > 0.0 else 1 if ahead_v2 > behind_v2 else -1
         lam0 += direction * near
         f = f._replace(exact=None)
@@ -115,7 +117,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         begin = _beyond_hilltop(problem, direction)
         ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, begin, length, starting_step(problem))
     known_duration = time if time == time else None
-    if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have found all of a libration
+    if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have determined the libration completely
         near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
         segment = between_turns(f, lam0 + near, lam0 + far, known_duration)
         return PeriodicMotion(problem, "libration", direction, segment, (abs(near), abs(far)))
@@ -133,17 +135,19 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         return _with_one_turn(problem, direction, front, back)
     low, high = sorted((front, back), key=lambda end: end.place)
     ends = low.multiprecision, high.multiprecision
-    # A curve with many joints has as many panels, which the half period does not need: it comes from the true curve.
+    # A curve with many joints has as many panels, which are not needed for the half period: it is computed from the
+    # true curve.
     is_lazy = f.exact is not None and f.breaks.size > 0 and ends == (None, None)
     segment = between_turns(f, low.place, high.place, ends=ends, is_lazy=is_lazy)
     return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
 
 
 def _check_ridges(problem: Problem, end: float) -> None:
-    """Refuse a motion that comes to rest on a corner between its launch and an end: it may slide off either way.
+    """Refuse a motion that comes to rest on a corner between its launch and an end, because it may slide off in either
+    direction.
 
-    Where the curve is smooth a body takes for ever to reach such a place, which is its end. A corner is reached in
-    finite time, with a V**2 that is zero within rounding.
+    On a smooth curve a body takes an infinite time to reach such a place, which is the end of its motion. A corner is
+    reached in finite time, with a V**2 that is zero within rounding.
     """
     f, lam0 = problem.functions, problem.lam0
     if not f.corners.size or not isfinite(end):
@@ -176,7 +180,7 @@ def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOf
 
 
 def _speeds_beside(problem: Problem) -> Array:
-    """V**2 a little before and after the launch place, which is a corner, of a body at rest there."""
+    """Return V**2 a little before and after the launch place, which is a corner, for a body at rest there."""
     f, lam0 = problem.functions, problem.lam0
     offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
     v2: Array = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
@@ -184,7 +188,9 @@ def _speeds_beside(problem: Problem) -> Array:
 
 
 def _beyond_hilltop(problem: Problem, direction: int) -> float:
-    """How far from the launch a search begins: past a hilltop that lies between it and the double nearest to it."""
+    """Return the distance from the launch at which a search begins, beyond a hilltop that lies between the launch and
+    the double nearest to it.
+    """
     f, lam0 = problem.functions, problem.lam0
     if not problem.launch.lam0.low:
         return 0.0
@@ -195,7 +201,9 @@ def _beyond_hilltop(problem: Problem, direction: int) -> float:
 
 
 def _check_place(problem: Problem) -> None:
-    """Refuse a launch where the curve has no point, because a coordinate is the root of a negative number."""
+    """Refuse a launch at a place where the curve has no point, because a coordinate is the root of a negative
+    number.
+    """
     f, lam0 = problem.functions, problem.lam0
     x, z = (float(row[0]) for row in path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:2])
     if not (isfinite(x) and isfinite(z)):
@@ -206,7 +214,7 @@ def _check_place(problem: Problem) -> None:
 
 
 def _from_cusp(problem: Problem) -> Motion:
-    """A motion that begins at a cusp: it goes into the domain, and downhill if the body is released there."""
+    """Return a motion that begins at a cusp: it leads into the domain, and downhill if the body is released there."""
     f, lam0, w0 = problem.functions, problem.lam0, problem.w0
     begin, directions = _directions_from_cusp(problem)
     if not directions or (w0 == 0.0 and _is_level_cusp(problem)):
@@ -220,8 +228,8 @@ def _from_cusp(problem: Problem) -> Motion:
     )
     motion = AperiodicMotion(problem, "transit", direction)
     if w0 > 0.0 and front.what in ("cusp", "domain-end", "singular-point"):
-        # A slow body gains and loses its speed over distances that equal steps would miss, so panels grow from both
-        # ends.
+        # A slow body gains and loses its speed over distances that equal steps would miss, so the width of panels grows
+        # from both ends.
         steps = np.geomspace(1e-12, 0.25, 25) * (front.place - lam0)
         panel_breaks = (*(lam0 + steps), *(front.place - steps))
         motion.add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
@@ -238,9 +246,10 @@ def _from_cusp(problem: Problem) -> Motion:
 
 
 def _is_level_cusp(problem: Problem) -> bool:
-    """Whether the tangential force vanishes at the cusp at which the body is at rest, so that it stays.
+    """Return whether the tangential force vanishes at the cusp at which the body is at rest, so that the body stays.
 
-    Where the tangent of a cusp is level, the force decreases to zero with the distance; elsewhere it tends to a limit.
+    If the tangent of a cusp is horizontal, the force decreases to zero with the distance; otherwise it tends to a
+    nonzero limit.
     """
     f, step = problem.functions, starting_step(problem)
     places = problem.lam0 + step * np.array([[FORCE_SHARE, -FORCE_SHARE], [10.0 * FORCE_SHARE, -10.0 * FORCE_SHARE]])
@@ -251,7 +260,9 @@ def _is_level_cusp(problem: Problem) -> bool:
 
 
 def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
-    """A distance from the cusp, and the directions in which V**2 > 0 there; that of the launch comes first."""
+    """Return a distance from the cusp, and the directions in which V**2 > 0 at that distance; that of the launch comes
+    first.
+    """
     f, lam0, w0, first = problem.functions, problem.lam0, problem.w0, problem.launch.direction
     distance = NEAR_CUSP * starting_step(problem)
     while True:
@@ -268,7 +279,7 @@ def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
 
 
 def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
-    """A motion that has no turning point ahead."""
+    """Return a motion that has no turning point ahead."""
     f, lam0 = problem.functions, problem.lam0
     if front.place == lam0:
         raise leaving_at_once(problem, direction, front.what)
@@ -297,14 +308,16 @@ def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motio
 
 
 def _from_turn_to(f: BoundFunctions, turn: float, end: EndOfMotion) -> Segment:
-    """The segment from a turning point to an end; if V**2 vanishes there too, it is one between two turning points."""
+    """Return the segment from a turning point to an end; if V**2 vanishes there too, it is a segment between two
+    turning points.
+    """
     return between_turns(f, turn, end.place) if end.zero_v2 else from_turn(f, turn, end.place)
 
 
 def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
-    """Add the first half of the way to an equilibrium if the launch is slow; returns where the rest begins.
+    """Add the first half of the way to an equilibrium if the launch is slow; return the place at which the rest begins.
 
-    Measured from the equilibrium, V**2 at a slow launch is the small difference of large numbers.
+    If V**2 were computed from the equilibrium, it would be a small difference of large numbers at a slow launch.
     """
     problem, f, lam0, w0 = motion.problem, motion.problem.functions, motion.problem.lam0, motion.problem.w0
     middle = 0.5 * (lam0 + equilibrium)
@@ -315,7 +328,7 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
     if w0 >= MIN_CANCELLATION_RATIO * middle_v2 or f.exact is None:
         motion.add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
-    # A launch as slow as this is next to another equilibrium, and its place is needed as exactly as it was given.
+    # So slow a launch is next to another equilibrium, and its place is needed as exactly as it was given.
     scale = f.exact.at(DIGITS)
     panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
     slow = Segment(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels)
@@ -324,7 +337,7 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
 
 
 def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: EndOfMotion) -> Motion:
-    """A motion that has a turning point ahead and none behind the launch place."""
+    """Return a motion that has a turning point ahead and none behind the launch place."""
     f, lam0 = problem.functions, problem.lam0
     kind: MotionKind = "asymptotic" if back.what == "equilibrium" else "transit"
     motion = AperiodicMotion(problem, kind, direction)

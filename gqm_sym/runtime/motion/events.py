@@ -22,15 +22,16 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
     from gqm_sym.runtime.launch.problem import Problem
 
-# Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
+# The number of places on each panel at which the sign of the contact force is sampled; its changes are then located by
+# bisection.
 SAMPLES_PER_PANEL = 24
 
-# A contact force below this share of the two terms that it is the sum of is zero within rounding, and has no sign. (On
-# the orbit of a planet it is zero everywhere.)
+# A contact force below this share of the two terms that add up to it is zero within rounding, and has no sign. (On the
+# orbit of a planet it is zero everywhere.)
 ROUNDING_SHARE = 4e-15
 
-# The same as a share of the median of these terms on a segment: where the curvature and the load both vanish, N is the
-# rounding of both.
+# The same as a share of the median of these terms on a segment, because N is the rounding error of both terms where
+# both vanish.
 MEDIAN_ROUNDING_SHARE = 2e-14
 
 # A change of sign this close to a singular point, as a share of the segment, is the rounding of a curvature that has no
@@ -91,14 +92,16 @@ class Leg:
 
 
 def contact_force(segment: Segment, phi: Array) -> Array:
-    """The contact force N in N at phase angles of a segment."""
+    """Return the contact force N in N at phase angles of a segment."""
     f = segment.functions
     force: Array = path_and_force_at(f.addresses, f.p, segment.places(phi), segment.speeds(phi) ** 2)[4]
     return force
 
 
 def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Array:
-    """The contact force in N at phase angles of a timed segment; in a frame that turns its direction counts."""
+    """Return the contact force in N at phase angles of a timed segment; in a rotating frame it depends on the direction
+    of motion.
+    """
     if not problem.formulas.directed:
         return contact_force(timed.segment, phi)
     places, v2 = timed.segment.places(phi), timed.segment.speeds(phi) ** 2
@@ -107,7 +110,9 @@ def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Arr
 
 
 def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Array) -> Array:
-    """What tells on which side of the track a body is: N, or the vertical load on the riders of a space curve."""
+    """Return a force whose sign shows on which side of the track a body is: N, or the vertical load on the riders of a
+    space curve.
+    """
     force: Array
     if formulas.signed:
         force = path_and_force_at(f.addresses, f.p, places, v2)[4]
@@ -117,7 +122,7 @@ def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Arra
 
 
 def contact_signs(formulas: "Formulas", segment: Segment, phi: Array) -> Array:
-    """The sign of N at phase angles of a segment, as `sided_force`; 0 where it is zero within rounding, or NaN."""
+    """Return the sign of `sided_force` at phase angles of a segment; 0 where it is zero within rounding, or NaN."""
     f, places = segment.functions, segment.places(phi)
     force = sided_force(formulas, f, places, segment.speeds(phi) ** 2)
     load = sided_force(formulas, f, places, np.zeros_like(phi))
@@ -131,7 +136,7 @@ def contact_signs(formulas: "Formulas", segment: Segment, phi: Array) -> Array:
 
 
 def contact_changes(formulas: "Formulas", timed: TimedSegment) -> Array:
-    """The phase angles of a timed segment at which N changes sign, in ascending order."""
+    """Return the phase angles of a timed segment at which N changes sign, in ascending order."""
     segment = timed.segment
     if not formulas.sided:
         return np.empty(0)
@@ -148,20 +153,22 @@ def contact_changes(formulas: "Formulas", timed: TimedSegment) -> Array:
 
 
 def _launch_share(timed: TimedSegment) -> float:
-    """The distance in phase angle from the launch that is the launch itself, as a share of the segment."""
+    """Return the distance in phase angle, as a share of the segment, within which a change of sign is at the launch
+    itself.
+    """
     at_turn = timed.segment.kind != REGULAR and timed.phi_start in (0.0, timed.segment.stop)
     return sqrt(LAUNCH_SHARE) if at_turn else LAUNCH_SHARE
 
 
 def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
-    """The phase angles of a segment at which a sign changes, in ascending order.
+    """Return the phase angles of a segment at which a sign changes, in ascending order.
 
     Parameters
     ----------
     signs : callable
-        Gives the signs at an array of phase angles, 0 where the sign is not certain.
+        A function that returns the signs at an array of phase angles; 0 where the sign is not certain.
     narrowing : callable
-        Gives the signs close to a change; it is used for bisection.
+        A function that returns the signs close to a change; it is used for bisection.
     """
     steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
     edges = segment.edges
@@ -184,7 +191,8 @@ def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: C
 
 
 def crossings(timed: TimedSegment, phi: Array, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a timed segment passes phase angles, in the order of time; those outside it are left out.
+    """Return the times at which a timed segment passes phase angles, in the order of time; phase angles outside of it
+    are omitted.
 
     ``time_scale_error`` is that of the trajectory (`Trajectory`). Each item is a time in s as two doubles, and a phase
     angle.
@@ -205,7 +213,7 @@ def crossings(timed: TimedSegment, phi: Array, time_scale_error: float) -> list[
 
 
 def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: float, low: float) -> list[float]:
-    """Times in s at which timed segments pass the place lam + low, the first time on each of them."""
+    """Return the times in s at which timed segments pass the place lam + low, the first time on each of them."""
     out = []
     for timed in segments:
         segment = timed.segment
@@ -225,9 +233,9 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
 
 
 def corner_crossings(timed: TimedSegment, corners: Array, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a timed segment passes some corners of the curve, each with its phase angle.
+    """Return the times at which a timed segment passes some corners of the curve, each with its phase angle.
 
-    With losses segments end at corners, and the body passes to the next.
+    In motions with losses, segments end at corners, and the body passes to the next segment.
     """
     segment, f = timed.segment, timed.segment.functions
     places = f.between(corners, segment.a, segment.b)
@@ -240,9 +248,10 @@ def corner_crossings(timed: TimedSegment, corners: Array, time_scale_error: floa
 
 
 def liftoff(formulas: "Formulas", timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
-    """When and where contact is lost on a timed segment: time from the segment's end ``a``, and phase angle.
+    """Return the time, from the segment's end ``a``, and the phase angle at which contact is lost on a timed segment.
 
-    The result is None if contact lasts. It is lost where N changes its sign, and at corners where the track bends away.
+    The result is None if contact lasts. Contact is lost where N changes its sign, and at corners at which the track
+    bends away.
 
     Parameters
     ----------
@@ -257,8 +266,8 @@ def liftoff(formulas: "Formulas", timed: TimedSegment, side: int, *, first: bool
         start, stop, share = timed.phi_start, timed.phi_stop, _launch_share(timed)
         crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > share * timed.segment.stop]
         ahead = crossed[0][1] if crossed else stop
-        # N may vanish at the launch itself; its sign half-way to the first change then decides.
-        # At a cusp it is infinity times zero, so that places a little ahead are looked at.
+        # N may vanish at the launch itself; its sign half-way to the first change then decides. At a cusp it is
+        # infinity times zero, so places a little ahead are examined.
         near = start + share * (stop - start)
         here, then = contact_signs(formulas, timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:

@@ -1,4 +1,4 @@
-"""Extremes of a function on an interval by ever finer grids, and of speed and contact force along a motion."""
+"""Extremes of a function on an interval by successively finer grids, and of speed and contact force along a motion."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -18,23 +18,26 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
-# Points of each of the finer grids, and how many of them follow each other: each is 64 times as fine as the one before.
+# The number of points of each of the finer grids, and the number of these grids, each of which is 64 times as fine as
+# the one before.
 GRID_POINTS, GRIDS = 129, 8
 
-# Samples on each panel of a segment, and of how many of the largest ones the surroundings are searched.
+# The number of samples on each panel of a segment, and the number of the largest ones near which an extreme is searched
+# for.
 SAMPLES_PER_PANEL, MAX_PEAKS = 16, 4
 
-# Nodes of the polynomial by which a peak is located, and the share of its last coefficients below which it is exact.
+# The number of nodes of the polynomial by which a peak is located, and the share of its last coefficients below which
+# it counts as exact.
 PEAK_NODES, MAX_TAIL = 13, 1e-12
 
-# The distance from an end of a segment at which a peak is at the end, as a share of the segment.
+# The distance from an end of a segment within which a peak counts as being at the end, as a share of the segment.
 END_SHARE = 1e-9
 
-# The share of a segment that a load is not looked for in before a corner at which contact is lost.
+# The share of a segment before a corner at which contact is lost in which loads are not searched.
 BEFORE_CORNER = 1e-13
 
-# The distance from a sample at which a value belongs to the side that it is on, if the quantity jumps at the sample; as
-# a share of the phase angle.
+# The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
+# of the phase angle.
 BESIDE_JOINT = 64.0 * ULP
 
 # Values that differ by less than so many roundings count as equal, and the earlier one is returned.
@@ -47,7 +50,7 @@ class Peak(NamedTuple):
     Attributes
     ----------
     place, value : float
-        Where it is, and the value.
+        The place of the largest value, and the value.
     low, high : float
         The neighbouring grid points, between which the next grid lies.
     """
@@ -61,12 +64,13 @@ class Peak(NamedTuple):
 def grid_peaks(
     function: Callable[[Array], Array], low: float, high: float, points: int = GRID_POINTS, grids: int = GRIDS
 ) -> Iterator[Peak]:
-    """Yield the largest values of a function on ever finer grids, each between the neighbours of the peak before.
+    """Yield the largest values of a function on successively finer grids, each between the neighbours of the peak
+    before.
 
     Parameters
     ----------
     function : callable
-        Takes an array of places and returns an array of values. A NaN counts as the largest value.
+        A function that takes an array of places and returns an array of values. A NaN counts as the largest value.
     low, high : float
         The ends of the first grid.
     points, grids : int
@@ -106,7 +110,7 @@ class Quantity(NamedTuple):
     at : callable
         ``at(timed, phi)`` gives the values at phase angles of a timed segment.
     of_state : callable
-        Its value in a state.
+        ``of_state(state)`` gives the value in a state.
     """
 
     at: Callable[[TimedSegment, Array], Array]
@@ -118,21 +122,21 @@ SPEED = Quantity(lambda timed, phi: timed.segment.speeds(phi), lambda state: abs
 
 
 def force_of(problem: "Problem") -> Quantity:
-    """The contact force in N, as a quantity along motions."""
+    """Return the contact force in N, as a quantity along motions."""
     return Quantity(partial(contact_force_on, problem), lambda state: float(state.normal_force))
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
-    """The largest (sign 1) or least (-1) value over one period, or from launch to the end.
+    """Find the largest (sign 1) or least (-1) value over one period, or from launch to the end.
 
-    It is looked for in phase angles, in which panels resolve the motion also where it is slow or short.
+    The search is over phase angles, for which panels resolve the motion even where it is slow or short.
 
     Parameters
     ----------
     motion : motion.Motion
         The motion.
     quantity : Quantity
-        What is looked for.
+        The quantity whose extreme is found.
     sign : int
         1 for the largest value, -1 for the least.
 
@@ -141,7 +145,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     SolutionError
         If the motion goes on for ever without repeating.
     """
-    if motion.kind == "rest" or motion.t_end == 0.0:  # it stays, or lifts off at once
+    if motion.kind == "rest" or motion.t_end == 0.0:  # the body stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
     trajectory, end = whole_trajectory(motion)
@@ -161,7 +165,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
 
 
 def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
-    """The trajectory of one period, or from launch to the end, and the time in s at which that is over.
+    """Return the trajectory of one period, or from launch to the end, and the time in s of its end.
 
     Raises
     ------
@@ -180,11 +184,11 @@ def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
 def _on_segment(
     timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
 ) -> tuple[float, list[Extreme]]:
-    """The size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
+    """Return the size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
     segment = timed.segment
     start, stop = phases(timed, trajectory, end)
     if timed.end == "liftoff" and quantity is not SPEED and _ends_at_corner(timed):
-        stop -= BEFORE_CORNER * (stop - start)  # the body has left before the load on the next plane
+        stop -= BEFORE_CORNER * (stop - start)  # the body leaves before the load on the next plane acts
     low, high = min(start, stop), max(start, stop)
     edges = segment.edges
     steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
@@ -201,7 +205,7 @@ def _on_segment(
     found = []
     for k in sorted(peaks.tolist(), key=lambda k: -float(values[k]))[:MAX_PEAKS]:
         angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
-        # A peak at an end of the segment, which is flat there, is found beside it within rounding.
+        # Since a peak at an end of the segment may be flat, it may be found next to the end within rounding.
         near = min((start, stop), key=lambda end: abs(end - angle))
         if abs(near - angle) < END_SHARE * (high - low):
             angle = near
@@ -212,14 +216,14 @@ def _on_segment(
 
 
 def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:
-    """The phase angles at which a timed segment begins, and at which it or the time ``end`` stops."""
+    """Return the phase angles at which a timed segment begins, and at which it or the time ``end`` stops."""
     if timed.t_stop[0] <= end:
         return timed.phi_start, timed.phi_stop
     return timed.phi_start, float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
 
 
 def _ends_at_corner(timed: TimedSegment) -> bool:
-    """Whether a timed segment ends at a corner of the curve, to rounding."""
+    """Return whether a timed segment ends at a corner of the curve, to rounding."""
     f, segment = timed.segment.functions, timed.segment
     place = float(segment.places(np.array([timed.phi_stop]))[0])
     near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
@@ -227,7 +231,7 @@ def _ends_at_corner(timed: TimedSegment) -> bool:
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:
-    """Where a function is largest between two places, given its largest sample between them."""
+    """Return the place at which a function is largest between two places, given its largest sample between them."""
     if low == high:
         return middle
     nodes = np.cos(np.pi * (np.arange(PEAK_NODES) + 0.5) / PEAK_NODES)
@@ -246,25 +250,27 @@ def _peak(function: Callable[[Array], Array], low: float, middle: float, high: f
 
 
 def _largest(function: Callable[[Array], Array], places: list[float]) -> float:
-    """The place with the largest value; of equal ones within rounding the last, which was computed most carefully."""
+    """Return the place with the largest value; if several are equal within rounding, the last one, which was computed
+    most carefully.
+    """
     values = function(np.array(places))
     limit = values.max() - 2.0 * ULP * _size(values)
     return [place for place, value in zip(places, values, strict=True) if value >= limit][-1]
 
 
 def _size(values: Array) -> float:
-    """The largest absolute value where a quantity is finite."""
+    """Return the largest absolute value among the finite values of a quantity."""
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:
-    """An extreme with the time and the place of a phase angle."""
+    """Return an extreme with the time and the place of a phase angle."""
     lam = float(timed.segment.places(np.array([phi]))[0]) + timed.laps * trajectory.lap
     return Extreme(value, time_of(timed, trajectory, phi), lam)
 
 
 def time_of(timed: TimedSegment, trajectory: Trajectory, phi: float) -> float:
-    """The time in s from launch of a phase angle of a timed segment."""
+    """Return the time in s from launch of a phase angle of a timed segment."""
     if phi == timed.phi_start:
         return timed.t_start[0]
     if phi == timed.phi_stop:

@@ -1,4 +1,4 @@
-"""One answer at a time: a motion computes answers on request and keeps them, and many threads may request them."""
+"""A lock for objects that compute answers on request and keep them, while many threads may request them."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -19,7 +19,7 @@ L = TypeVar("L", bound=HasLock)
 
 
 def locked(method: Callable[Concatenate[L, P], R]) -> Callable[Concatenate[L, P], R]:
-    """Let a method run while its object's lock is held, so that no other thread sees what is half computed."""
+    """Return a method that holds its object's lock while it runs, so that no other thread sees incomplete results."""
 
     @wraps(method)
     def one_at_a_time(self: L, *args: P.args, **keywords: P.kwargs) -> R:

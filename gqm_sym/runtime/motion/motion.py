@@ -1,4 +1,4 @@
-"""The motion that begins with a launch, with all its answers."""
+"""The motion that begins with a launch, with all its properties."""
 
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
@@ -89,7 +89,7 @@ class Motion(History, Derivatives):
         raise SolutionError(f"period: this motion is of kind {self.kind!r} and does not repeat")
 
     def period_to(self, digits: int) -> str:
-        """The period in s as a decimal string.
+        """Return the period in s as a decimal string.
 
         Parameters
         ----------
@@ -153,11 +153,11 @@ class Motion(History, Derivatives):
         Parameters
         ----------
         load : {"vertical", "lateral", "longitudinal"}
-            Which load.
+            The load.
         levels : number or array_like
             Levels in units of 9.80665 m/s**2.
         side : {"above", "below"}
-            Which side of a level is beyond it.
+            The side of a level that counts as beyond it.
         limits : sequence of pairs, optional
             Permitted loads: pairs of a duration in s and a level, both numbers. Levels decrease with increasing
             duration (increase, if the side is "below"), and the limit is linear between them.
@@ -257,17 +257,17 @@ class Motion(History, Derivatives):
         return f"<{self.kind} of {self.problem.formulas.name}: lam0 = {launch.lam0.text}, v0 = {launch.v0.text}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its model, launch and parameters: the copy is solved again, and answers with the same digits."""
+        """Pickle the motion by its model, launch and parameters; the copy is solved again, and has the same digits."""
         problem = self.problem
         return _solved_again, (problem.formulas, problem.launch, tuple(problem.p))
 
     def _shown_time(self) -> float:
-        """The time in s up to which a motion without an end is shown in pictures and tables."""
+        """Return the time in s up to which a motion without an end is shown in pictures and tables."""
         return max((leg.t_end for leg in self.legs if isfinite(leg.t_end)), default=1.0)
 
 
 def _solved_again(model: Any, launch: Launch, parameters: tuple[Number, ...]) -> "Motion":
-    """The motion that a launch of a compiled model begins, as it began before."""
+    """Return the motion that begins with a launch of a compiled model, in the same way as the original one."""
     lam0, v0, direction, contact, t_max, point = launch
     place = (lam0, None) if point is None else (None, point)
     request = LaunchRequest(place[0], v0, direction, place[1], t_max, contact)
@@ -276,7 +276,9 @@ def _solved_again(model: Any, launch: Launch, parameters: tuple[Number, ...]) ->
 
 
 def horizon(motion: "Motion") -> float:
-    """The time in s from launch up to which a motion is shown: one period, its end, or what has been computed of it."""
+    """Return the time in s from launch up to which a motion is shown: one period, its end, or the end of its computed
+    part.
+    """
     if motion.kind in ("libration", "circulation"):
         return motion.period
     if isfinite(motion.t_end):

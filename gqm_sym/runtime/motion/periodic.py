@@ -15,7 +15,7 @@ from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for, without_formulas
 from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
-from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
+from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
@@ -27,13 +27,14 @@ from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
-# The largest difference between a turning point and the rounded end of the segment, as a share of its value.
+# The largest difference between a turning point and the rounded end of the segment, as a share of the turning point's
+# value.
 MAX_TURN_ROUNDING = 1e-14
 
-# The least distance between two edges of a chart, as a share of the phase; at a smaller one they are the same edge.
+# The smallest distance between two edges of a chart, as a share of the phase; closer ones are the same edge.
 MIN_PANEL = 1e-13
 
-# The most events that `events_between` lists.
+# The largest number of events that `events_between` lists.
 MAX_EVENTS = 1_000_000
 
 
@@ -62,7 +63,8 @@ class PeriodicMotion(PeriodicTimes):
         direction = self.direction if self.kind == "circulation" else 0
         if self.problem.formulas.chart is not None:
             return self._derivatives_along_chart(direction)
-        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+        segment = self._segment  # its panels, which are laid when edges are read, are needed near a separatrix only
+        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, lambda: segment.edges)
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
@@ -71,7 +73,7 @@ class PeriodicMotion(PeriodicTimes):
         passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
         if passage is None:
             raise SolutionError(UNDECIDED)
-        # Where pieces of the chart meet; the seam of a closed one is its first edge and its last.
+        # The places where pieces of the chart meet; on a closed chart the first and the last edge are the same place.
         ends = segment.a, segment.b
         places = f.between(self.problem.formulas.charted(self.problem.p).edges, *ends)
         last, edges = 1.0, np.sort((places - ends[0]) / (ends[1] - ends[0]))
@@ -111,32 +113,43 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        points = self._phase_points(times, low)
-        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
-        chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
-        return Sensitivity(tuple(rows), *chosen)
+        points, phi, shape = self._orbit_points(t)
+        found = self._orbit_sensitivity.at(self, points, phi, list(rows.values()))
+        return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
     def place_changes(self, t: Any, wrt: Any) -> Array:
-        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         if self.problem.formulas.chart is not None:
             return super().place_changes(t, wrt)
         rows = selected(self.problem.formulas.parameters, wrt)
-        times, low, shape = self._times(t)
-        points, f = self._phase_points(times, low), self.problem.functions
-        v = self._velocities(points)
-        ds = path_and_force_at(f.addresses, f.p, self._places(points), v**2)[2]
-        found = self._orbit_sensitivity.places_at(self, points, v, ds)
+        (points, phi, shape), f = self._orbit_points(t), self.problem.functions
+        ds = path_and_force_at(f.addresses, f.p, points[PLACE], points[SPEED] ** 2)[2]
+        found = self._orbit_sensitivity.places_at(self, points, phi, ds)
         return found[list(rows.values())].reshape(len(rows), *shape)
+
+    def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
+        """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""
+        time = plain_time(t)
+        given = plain_times(t) if time is None else (np.array([time]), time, time)
+        # The speeds of some segments can be computed from their panels only.
+        from_panels = given is None or self._segment.from_multiprecision
+        sampler = None if given is None or from_panels else self._sampler_for(*given[1:])
+        if given is not None and sampler is not None:
+            trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
+            return sampler.phases(given[0].reshape(-1)), trajectory.segments[0].phi_start, shape
+        times, low, shape = self._times(t)
+        found = self._phase_points(times, low)
+        points = points_of(found, self._places(found), self._velocities(found))
+        return points, found.trajectory.segments[0].phi_start, shape
 
     @locked
     def fourier(self, quantity: str, n: int) -> Fourier:
-        """The Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
+        """Return the Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
         return fourier(self, quantity, n)
 
     def lam(self, t: Any) -> Any:
-        """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
+        """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         time = plain_time(t)
         if time is not None:
             sampler = self._sampler_for(time, time)
@@ -148,13 +161,14 @@ class PeriodicMotion(PeriodicTimes):
         return sampler.places(times[0].reshape(-1)).reshape(times[0].shape)
 
     def state(self, t: Any) -> State:
-        """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
+        """Return the state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         time = plain_time(t)
         times = plain_times(t) if time is None else (NOWHERE, time, time)
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        # The speeds of some segments can be computed from their panels only, and what is in space by places in a lap.
+        # The speeds of some segments can be computed only from their panels, and the additional fields in space only
+        # from places within a lap.
         in_space = self.problem.formulas.path_in_space is not None
         if self._segment.from_multiprecision or (in_space and self.kind == "circulation"):
             return super().state(t)._replace(lam=self.lam(t))
@@ -165,7 +179,9 @@ class PeriodicMotion(PeriodicTimes):
         return self._state_of(times[0], sampler.states(times[0].reshape(-1)))
 
     def _sampler_for(self, least: float, greatest: float) -> Sampler | None:
-        """The sampler for times from ``least`` to ``greatest``; None if they are impossible or too late for doubles."""
+        """Return the sampler for times from ``least`` to ``greatest``; None if they are impossible or too late for
+        doubles.
+        """
         end_time = max(-least, greatest)
         if not (end_time < inf and greatest <= self.t_end):
             return None
@@ -176,7 +192,7 @@ class PeriodicMotion(PeriodicTimes):
 
     @locked
     def _new_sampler_for(self, end_time: float) -> Sampler | None:
-        """The sampler for times up to ``end_time``, made if there is none yet."""
+        """Return the sampler for times up to ``end_time``, which is made if there is none yet."""
         times = self._times_until(end_time)
         if times.sampler is None:
             of_states = partial(self._constants_of_states, times)
@@ -191,7 +207,7 @@ class PeriodicMotion(PeriodicTimes):
 
     @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
-        """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
+        """Return the events from time t1 to t2 over as many periods as necessary; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
         lap, within = self._listed_trajectory.lap, self._one_period()
@@ -207,7 +223,7 @@ class PeriodicMotion(PeriodicTimes):
         for k in range(first, last + 1):
             for event in within:
                 if k and event.kind == "slip" and event.t == 0.0:
-                    continue  # a body that slips at launch begins to slip then, and once only
+                    continue  # a body that slips at launch begins to slip only then
                 t = event.t + k * period
                 if start <= t <= min(stop, self.t_end):
                     out.append(Event(event.kind, t, event.lam + k * lap, event.x, event.z))
@@ -217,7 +233,9 @@ class PeriodicMotion(PeriodicTimes):
         return tuple(event for event in self.events if event.kind != "horizon")
 
     def _at_end(self, lam: float, low: float) -> float:
-        """The end of the segment if a place is a turning point as `turning_points` rounds it, else the place."""
+        """Return the end of the segment if a place is a turning point as rounded by `turning_points`, else the
+        place.
+        """
         for end in (self._segment.a, self._segment.b):
             is_near = 0.0 < abs(lam - end) <= MAX_TURN_ROUNDING * abs(end)
             if is_near and low == 0.0 and lam in self.turning_points:

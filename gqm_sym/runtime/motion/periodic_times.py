@@ -1,4 +1,4 @@
-"""The times of motions that repeat, from the arithmetic that each question needs."""
+"""The times of motions that repeat, computed in the arithmetic that each question requires."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +26,7 @@ from gqm_sym.runtime.quadrature.time_panels import slopes
 # on splines (14 roundings were measured).
 CHART_ROUNDING = 16 * ULP
 
-# The latest time that doubles answer where double-double arithmetic does not suffice, in periods from launch.
+# The latest time that is computed in doubles if double-double arithmetic does not suffice, in periods from launch.
 EARLY = 0.999
 
 # The largest number of pieces of a chart on a segment for which times are computed in extended precision by default.
@@ -35,20 +35,21 @@ MAX_CHART_PIECES = 250
 
 @dataclass(slots=True)
 class Times:
-    """The times of a motion to some accuracy, with the trajectory that has them.
+    """The times of a motion to some accuracy, with the trajectory that has these times.
 
     Attributes
     ----------
     timing : Timing
         The times.
     repeated : Repeated
-        What repeats itself.
+        The part of the motion that is repeated.
     span : (float, float)
-        The distances in s from launch, later or earlier, that they answer: above the first, up to the second.
+        The range of distances in s from launch, later or earlier, for which they serve: above the first, up to the
+        second.
     sampler : Sampler, optional
-        What reads them at many times, once that was asked for.
+        The sampler that reads them at many times, once it has been asked for.
     trajectory : Trajectory, optional
-        One period, once that was asked for.
+        One period, once it has been asked for.
     """
 
     timing: timing.Timing
@@ -59,11 +60,12 @@ class Times:
 
 
 class PeriodicTimes(Motion):
-    """A motion that repeats, with its segment, its turning points and its times; `PeriodicMotion` answers from these.
+    """A motion that repeats, with its segment, its turning points and its times, from which `PeriodicMotion` answers
+    questions.
 
-    Its times come from double-double arithmetic. Where that does not suffice, doubles answer within the first period,
-    and extended precision beyond it and for what is listed of a period. Which of them answers depends on the latest
-    time in the call, and not on earlier calls.
+    Its times come from double-double arithmetic. If that does not suffice, doubles are used within the first period,
+    and extended precision beyond it and for the legs and events of a period. The choice depends on the latest time in
+    the call, and not on earlier calls.
     """
 
     def __init__(
@@ -79,10 +81,10 @@ class PeriodicTimes(Motion):
 
     @cached_property
     def _segment(self) -> Segment:
-        """Its segment, which ends at the doubles nearest to the true turning points.
+        """The segment, which ends at the doubles nearest to the true turning points.
 
-        Where terms of the force cancel, as in small swings about an equilibrium of large forces, the turning points in
-        doubles are off by more than their rounding.
+        If terms of the force cancel, as in small swings about an equilibrium of large forces, the errors of turning
+        points in doubles exceed their rounding.
         """
         segment = self._segment_in_doubles
         if self.kind != "libration" or segment.ends != (None, None):
@@ -95,7 +97,7 @@ class PeriodicTimes(Motion):
         a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
         b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
         a, b = max(a, self.problem.low), min(b, self.problem.high)
-        if not a < b:  # the same double: extended precision distinguishes their places from those in doubles
+        if not a < b:  # both are the same double, and only extended precision distinguishes their places
             return segment
         self._offsets = behind, ahead
         if a == segment.a and b == segment.b:
@@ -116,7 +118,7 @@ class PeriodicTimes(Motion):
         if orbit is not None and orbit.low.is_decided and orbit.high.is_decided:
             low, high = orbit.low.high, orbit.high.high
         elif self._has_multiprecision:
-            # At an end of the curve a root is a rounding of extended precision beyond it.
+            # At an end of the curve a root may lie beyond it by a rounding of extended precision.
             found = timing.turning_points(self.problem, self._segment)
             low, high = max(found[0], self.problem.low), min(found[1], self.problem.high)
         in_order = (high, low) if self.direction > 0 else (low, high)
@@ -135,9 +137,9 @@ class PeriodicTimes(Motion):
 
     @cached_property
     def _orbit_by_rule(self) -> Orbit | None:
-        """The orbit of a launch from a turning point, or of a circulation, by the trapezoidal rule alone.
+        """The orbit of a launch from a turning point, or of a circulation, found by the trapezoidal rule alone.
 
-        It is None where that rule has not converged in doubles, and along charts.
+        It is None if that rule has not converged in doubles, and along charts.
         """
         is_smooth = self._segment_in_doubles.known_duration is not None and self.problem.formulas.chart is None
         if not is_smooth or (self.kind == "libration" and self.problem.w0 > 0.0):
@@ -146,10 +148,10 @@ class PeriodicTimes(Motion):
 
     @cached_property
     def _orbit(self) -> Orbit | None:
-        """Duration and turning points in double-double arithmetic; None where that does not suffice."""
+        """Duration and turning points in double-double arithmetic; None if that does not suffice."""
         launch = self.problem, self.kind, self.direction, self._offsets
         is_charted = self.problem.formulas.chart is not None
-        # No panels are needed where the trapezoidal rule has converged in doubles.
+        # No panels are needed if the trapezoidal rule has converged in doubles.
         if is_charted or self._segment_in_doubles.known_duration is not None:
             orbit = self._orbit_by_rule or timing.orbit_of(*launch)
             if is_charted or orbit is not None:
@@ -177,13 +179,13 @@ class PeriodicTimes(Motion):
 
     @property
     def _latest_in_doubles(self) -> float:
-        """The largest distance in s of a time from launch for which extended precision would be too dear."""
+        """The largest distance in s of a time from launch for which extended precision would take too long."""
         if self._segment.from_multiprecision:
             return -inf
         return EARLY * self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
 
     def _times_until(self, end_time: float) -> Times:
-        """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
+        """Return the times with as many digits as a phase requires at ``end_time`` in s from launch."""
         known = self._in_double_double
         if known is not None and (end_time <= known.span[1] or not self._has_multiprecision):
             return known
@@ -219,7 +221,9 @@ class PeriodicTimes(Motion):
 
     @locked
     def period_to(self, digits: int) -> str:
-        """The period in s as a decimal string with that many correct digits (up to 1000); see `Motion.period_to`."""
+        """Return the period in s as a decimal string with that many correct digits (up to 1000); see
+        `Motion.period_to`.
+        """
         if self.problem.functions.exact is None:
             raise SolutionError(
                 "period_to: this curve is a chart in doubles, whose period has no more digits than `period`; "
@@ -235,7 +239,7 @@ class PeriodicTimes(Motion):
         return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
     def _repeated(self, times: timing.Timing) -> Repeated:
-        """The repeated part of a motion, with these times."""
+        """Return the repeated part of a motion, with these times."""
         duration = times.duration
         segment = self._segment if times.edge_times is None else self._segment.with_edge_times(times.edge_times)
         total = segment.total_time
@@ -245,7 +249,7 @@ class PeriodicTimes(Motion):
         return Repeated(segment, duration, self.direction * self.problem.period, time_scale_error)
 
     def _trajectory_of(self, times: Times) -> Trajectory:
-        """One period with these times, made on the first request."""
+        """Return one period with these times, which is made on the first request."""
         if times.trajectory is None:
             (segment, period, lap, time_scale_error), duration = times.repeated, times.timing.duration
             if self.kind == "libration":
@@ -264,11 +268,11 @@ class PeriodicTimes(Motion):
         return times.trajectory
 
     def _lap_length(self, times: Times) -> float:
-        """The growth of the arc length in m in one lap; 0 for a libration."""
+        """Return the growth of the arc length in m in one lap; 0 for a libration."""
         return 0.0 if self.kind == "libration" else self.direction * times.repeated.segment.length
 
     def _launch_on(self, times: Times) -> tuple[float, float]:
-        """The phase angle of the launch on the segment, and the arc length in m from there to its end ``a``."""
+        """Return the phase angle of the launch on the segment, and the arc length in m from there to its end ``a``."""
         if self.kind == "circulation":
             return 0.0, 0.0
         segment = times.repeated.segment
@@ -280,10 +284,11 @@ class PeriodicTimes(Motion):
         return at_launch + np.abs(t) * drift
 
     def _time_drift(self, times: Times) -> tuple[float, float]:
-        """Estimated error in s of a trajectory's times at launch, and its growth per second."""
-        if times is not self.__dict__.get("_in_doubles"):  # those are not computed for the question
+        """Return the estimated error in s of a trajectory's times at launch, and its growth per second."""
+        if times is not self.__dict__.get("_in_doubles"):  # these times are accurate at launch
             return 0.0, times.timing.relative_error
-        # The quadrature errors of the time to the launch and of the period; the rounding of the launch's phase angle.
+        # The errors are those of the quadratures of the time to the launch and of the period, and the rounding of the
+        # launch's phase angle.
         segment, start = self._segment, np.array([self._trajectory_of(times).segments[0].phi_start])
         launch = errors.time_error(segment, start) + ULP * start * slopes(segment.edges, segment.panels[3], start)
         rounding = ULP if self.problem.formulas.chart is None else CHART_ROUNDING

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a rolling body begins to slip on a timed segment, each with its phase angle.
+    """Return the times at which a rolling body begins to slip on a timed segment, each with its phase angle.
 
     A body that slips at launch begins to slip then. The motion is computed as if the body rolled on. Only conservative
     motions are examined, since the slope of the effective potential gives the tangential force F.t.
@@ -30,7 +30,7 @@ def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float)
     beta, mu, mass = (values[name].value for name in (*problem.formulas.static_friction_limit, "m"))
 
     def friction_margin(phi: Array) -> Array:
-        """The sign of the largest possible static friction less the friction that rolling needs."""
+        """Return the sign of the largest possible static friction less the friction that rolling requires."""
         f, places = timed.segment.functions, timed.segment.places(phi)
         ds, force = (
             path_and_force_at(f.addresses, f.p, places, np.zeros(phi.size))[2],
@@ -62,7 +62,7 @@ def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
 
 
 def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
-    """Refuse a motion to a place where the body no longer fits: the path of its centre has a cusp there."""
+    """Refuse a motion to a place where the body no longer fits, because the path of its centre has a cusp there."""
     last = legs[-1] if legs else None
     if last is not None and last.end == "cusp":
         what = f"{_what(formulas, last.lam_end)}, where it comes after {last.t_end!r} s"

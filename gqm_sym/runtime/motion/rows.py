@@ -33,14 +33,14 @@ class Rows(tuple[T, ...]):
 
 
 def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
-    """An HTML table; each number is the shortest text that is read back as the same double."""
+    """Return an HTML table; each number is the shortest text that is read back as the same double."""
     head = "".join(f"<th>{escape(title)}</th>" for title in titles)
     body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def text_table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> list[str]:
-    """Aligned lines of text; each number is written as in `table`."""
+    """Return aligned lines of text; each number is written as in `table`."""
     cells = [list(titles), *([repr(float(c) + 0.0) if isinstance(c, float) else str(c) for c in row] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return ["  " + "  ".join(c.ljust(width) for c, width in zip(row, widths, strict=True)).rstrip() for row in cells]

@@ -20,21 +20,24 @@ from gqm_sym.runtime.motion.timing import Timing
 from gqm_sym.runtime.motion.trajectory import Repeated
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
-# The fewest times for which another thread is started.
+# The smallest numbers of times for which another thread is started.
 MIN_PLACES_PER_THREAD, MIN_STATES_PER_THREAD = 2**16, 2**12
 
-# The most periods after which compiled code reduces times exactly; later ones are reduced one by one.
+# The largest number of periods after which compiled code reduces times exactly; later times are reduced one by one.
 MAX_PERIODS = 2.0**50
 
-# The powers of -1, which are those at the start of an interval of the table.
+# The powers of -1, which is the variable of the table's polynomials at the start of an interval.
 ALTERNATING = (-1.0) ** np.arange(TERMS)
 
 # The number of fields of a state other than the time.
 STATE_ROWS = 9
 
+# The number of rows of `records.phases_along`.
+PHASE_ROWS = 6
+
 
 def plain_time(t: Any) -> float | None:
-    """A time that is a double or equal to one; None for any other."""
+    """Return a time that is a double or equal to one; None for any other time."""
     if type(t) is float:
         return t
     if isinstance(t, np.ndarray) and t.ndim == 0 and t.dtype == np.float64:
@@ -43,7 +46,7 @@ def plain_time(t: Any) -> float | None:
 
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Times that are doubles, with the least and the greatest; None if they must be read one by one."""
+    """Return times that are doubles, with the smallest and the largest; None if they must be read one by one."""
     times = doubles_at_once(t)
     if times is None or not times.size or not times.ndim:
         return None
@@ -53,13 +56,14 @@ def plain_times(t: Any) -> tuple[Array, float, float] | None:
 class Sampler:
     """The places and states of one periodic motion.
 
-    ``of_states`` gives what only states need: the length of a lap, arc length at launch, and that of the segment's end
-    ``a`` from there; the error of the time at launch, and its growth with time.
+    ``of_states`` gives the numbers that only states need: the length of a lap, the arc length at launch, and that of
+    the segment's end ``a`` from there; the error of the time at launch, and its growth with time.
 
     Attributes
     ----------
     min_time, max_time : float
-        It answers times whose distance in s from launch, later or earlier, is above the first and up to the second.
+        The sampler serves times whose distance in s from launch, later or earlier, is above the first number and at
+        most the second.
     """
 
     def __init__(
@@ -102,14 +106,14 @@ class Sampler:
 
     @property
     def _record_of_places(self) -> Array:
-        """The record for places; two threads may make the same one."""
+        """The record for places; two threads may both make it."""
         if self._place_record is None:
             self._place_record = records.record(self._sections)
         return self._place_record
 
     @property
     def _record(self) -> Array:
-        """The record for states, which holds more than that for places."""
+        """The record for states, which contains more than that for places."""
         return self._make_state_record() if self._state_record is None else self._state_record
 
     @locked
@@ -139,12 +143,12 @@ class Sampler:
         return self._state_record
 
     def place(self, t: float) -> float:
-        """The curve parameter at one time."""
+        """Return the curve parameter at one time."""
         place: float = records.place_at_time(self._record_of_places, t)
         return place
 
     def places(self, t: Array) -> Array:
-        """The curve parameter at times."""
+        """Return the curve parameter at times."""
         record, out = self._record_of_places, np.empty_like(t)
         run_in_threads(
             lambda part: records.places_along(record, t, out, part.start, part.stop),
@@ -154,14 +158,14 @@ class Sampler:
         return out
 
     def state(self, t: float) -> tuple[float, ...]:
-        """The time, and the items of a column of `states`."""
+        """Return the time, and the items of a column of `states`."""
         row = list(records.state_at_time(self._record, self._problem.functions.p, t))
         if self._problem.formulas.chart is not None:
             row[2] = row[1]
         return tuple(row)
 
     def states(self, t: Array) -> Array:
-        """Rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
+        """Return rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
         record, p, out = self._record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
         run_in_threads(
             lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, MIN_STATES_PER_THREAD
@@ -170,9 +174,15 @@ class Sampler:
             out[1] = out[0]  # the parameter of a chart is its arc length
         return out
 
+    def phases(self, t: Array) -> Array:
+        """Return the rows of `records.phases_along` at times."""
+        out = np.empty((PHASE_ROWS, t.size))
+        records.phases_along(self._record, self._problem.functions.p, t, out)
+        return out
+
 
 def _inverse(period: Pair) -> Pair:
-    """The inverse of a period, as two doubles."""
+    """Return the inverse of a period, as two doubles."""
     inverse = 1.0 / period[0]
     product, rest = two_product.py_func(inverse, period[0])
     return inverse, -((product - 1.0) + rest + inverse * period[1]) * inverse

@@ -8,7 +8,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.rider import FIELDS
 from gqm_sym.runtime.motion.rows import HEADINGS, table, text_table
 
-# The most times that a printed state or its table in a notebook shows.
+# The largest number of times that a printed state or its table in a notebook shows.
 MAX_ROWS_SHOWN = 10
 
 
@@ -102,14 +102,14 @@ class State(dict[str, Any]):
         return state_frame(self)
 
     def _rows(self) -> tuple[list[str], list[tuple[float, ...]]]:
-        """The titles with units, and a row for each of the first times, as they are shown."""
+        """Return the titles with units, and a row for each of the first times, as they are shown."""
         columns = [np.atleast_1d(np.asarray(field)).reshape(-1)[:MAX_ROWS_SHOWN].tolist() for field in self]
         return [HEADINGS.get(name, name) for name in self._fields], list(zip(*columns, strict=True))
 
     def __str__(self) -> str:
-        """A table with units, of the first times."""
+        """Return a table with units, for the first times."""
         titles, rows = self._rows()
-        if len(rows) == 1:  # one under the other
+        if len(rows) == 1:  # several tables, one below the other
             width = max(map(len, titles))
             return "\n".join(f"  {title:<{width}}  {value!r}" for title, value in zip(titles, rows[0], strict=True))
         hidden = np.size(self.t) - len(rows)

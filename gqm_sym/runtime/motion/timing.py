@@ -27,14 +27,14 @@ PERIOD_DIGITS = 34
 PHASE_DIGITS = 22
 MAX_DIGITS = 1000
 
-# Digits of V**2 that may cancel on all of a segment before the working precision is raised.
+# The number of digits of V**2 that may cancel over a whole segment before the working precision is raised.
 MAX_LOST_DIGITS = 4
 
 
 # The largest error of a turning point in double-double arithmetic, as a share of the width of the libration.
 MAX_TURN_ERROR = 2.0**-54
 
-# The relative error of two doubles that were rounded from extended precision.
+# The relative error of a number of two doubles that was rounded from extended precision.
 EXACT_ERROR = 2.0**-104
 
 
@@ -65,26 +65,26 @@ class Timing:
 
     @property
     def max_time(self) -> float:
-        """The time in s up to which a phase is as good as doubles have it, however many periods have gone by."""
+        """The time in s up to which a phase is as accurate as doubles, whatever the number of periods."""
         return inf if self.relative_error <= EXACT_ERROR else self.duration[0] * 2.0**-54 / self.relative_error
 
 
 def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Timing:
-    """The times in doubles, from the segment's own quadrature."""
+    """Return the times in doubles, from the segment's own quadrature."""
     duration = (segment.duration, 0.0)
     if kind == "circulation" or offsets[0] == 0.0:
         return Timing(duration, ZERO, offsets)
     if offsets[1] == 0.0:
         return Timing(duration, duration, offsets)
-    # In the time of the duration, of which the panels' may be off by some roundings.
+    # The time is scaled to the duration, from which that of the panels may differ by some roundings.
     scale = duration[0] / segment.total_time[0]
     phase_time = scale * float(segment.times(np.array([segment.phase_angle_of(*offsets)]))[0])
-    # Beside a turning point it is a rounding longer than the duration; no time from launch is negative.
+    # Next to a turning point it may exceed the duration by a rounding; no time from launch may be negative.
     return Timing(duration, (min(phase_time, duration[0]), 0.0), offsets)
 
 
 def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float, float]) -> ChartPassage | None:
-    """The orbit along a chart in double-double arithmetic; None where that does not suffice, and for formulas."""
+    """Return the orbit along a chart in double-double arithmetic; None if that does not suffice, and for formulas."""
     pieces, formulas, launch = problem.true_pieces, problem.tape, problem.launch
     if pieces is None or formulas is None:
         return None
@@ -96,7 +96,8 @@ def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float
 
 
 def times_along(segment: Segment, *, is_thrown: bool) -> Array:
-    """Room for the times at the launch and, where the trapezoidal rule would not do, at the edges of the panels.
+    """Return an array for the times at the launch and, if the trapezoidal rule does not suffice, at the edges of the
+    panels.
 
     It is for `double_double.orbit_time.fill_times`; a launch from a turning point needs none.
     """
@@ -111,7 +112,7 @@ def times_along(segment: Segment, *, is_thrown: bool) -> Array:
 def orbit_of(
     problem: Problem, kind: str, direction: int, offsets: tuple[float, float], times: Array = NO_TIMES
 ) -> Orbit | None:
-    """The duration and the turning points in double-double arithmetic; None where that does not suffice.
+    """Return the duration and the turning points in double-double arithmetic; None if that does not suffice.
 
     Parameters
     ----------
@@ -132,11 +133,12 @@ def orbit_of(
 def true_turning_points(
     problem: Problem, segment: Segment, offsets: tuple[float, float], orbit: Orbit | None
 ) -> tuple[Pair, Pair] | None:
-    """The lower and the upper turning point of a libration as two doubles each; None where no more is known of them.
+    """Return the lower and the upper turning point of a libration as two doubles each; None if they are known in
+    doubles only.
 
-    They come from double-double arithmetic, and for a curve of formulas from extended precision where that is too
-    little. ``offsets`` are their distances from the launch, as doubles know them, and ``orbit`` what `orbit_of` has
-    found from these, if it has been asked.
+    They come from double-double arithmetic or, if that does not suffice for a curve with formulas, from extended
+    precision. ``offsets`` are their distances from the launch to the accuracy of doubles, and ``orbit`` is the result
+    of `orbit_of` for these, if it has been called.
     """
     low = high = Bounded(nan, nan, nan)
     if problem.formulas.chart is not None:
@@ -148,7 +150,8 @@ def true_turning_points(
     elif problem.tape is not None:
         low, high = find_turning_points(problem.tape, (problem.launch.lam0, problem.launch.v0), offsets)
     largest, error = MAX_TURN_ERROR * (high.high - low.high), max(low.error, high.error)
-    # Along a chart doubles may be off by much more than the error, however large that is for so small a swing.
+    # Along a chart the turning points in doubles may be off by much more than this error, even if it is large for so
+    # small a swing.
     off = max(abs(segment.a - low.high), abs(segment.b - high.high)) if problem.formulas.chart is not None else 0.0
     if error <= largest or off > 2.0 * error:
         return low[:2], high[:2]
@@ -166,9 +169,9 @@ def in_double_double(
     offsets: tuple[float, float],
     known: Orbit | None = None,
 ) -> Timing | None:
-    """The times from double-double arithmetic; None where that does not suffice.
+    """Return the times from double-double arithmetic; None if that does not suffice.
 
-    ``known`` is what `orbit_of` has found without panels, if it has been asked.
+    ``known`` is the result of `orbit_of` without panels, if it has been called.
     """
     is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
     is_thrown, lam0 = kind == "libration" and problem.w0 > 0.0, problem.launch.lam0
@@ -201,7 +204,7 @@ def in_double_double(
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
 def in_multiprecision(problem: Problem, kind: str, direction: int, segment: Segment) -> Timing:
-    """The times from extended precision."""
+    """Return the times from extended precision."""
     a = _arithmetic(problem, segment, PERIOD_DIGITS)
     parts, low, high = _durations(a, problem, kind, direction, segment, PERIOD_DIGITS)
     duration = sum(parts)
@@ -220,13 +223,13 @@ def in_multiprecision(problem: Problem, kind: str, direction: int, segment: Segm
 
 
 def _running_totals(parts: Sequence[Any]) -> tuple[Array, Array]:
-    """The partial sums, beginning with zero, each as two doubles."""
+    """Return the partial sums, beginning with zero, each as two doubles."""
     pairs = np.array([ZERO, *(two_doubles(total) for total in accumulate(parts))])
     return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
 
 
 def turning_points(problem: Problem, segment: Segment) -> tuple[float, float]:
-    """The lower and the upper turning point of a libration, each the double nearest to the exact one."""
+    """Return the lower and the upper turning point of a libration, each the double nearest to the exact one."""
     a = _arithmetic(problem, segment, PERIOD_DIGITS)
     low, high = exact_ends(problem.exact, a.digits, TURN_TURN, segment.a, segment.b, segment.ends)
     return float(low), float(high)
@@ -234,7 +237,7 @@ def turning_points(problem: Problem, segment: Segment) -> tuple[float, float]:
 
 @budget("period_to", 600.0, "ask for fewer digits")
 def period_to(problem: Problem, kind: str, direction: int, segment: Segment, digits: int) -> str:
-    """The period in s as a decimal string with that many correct digits; see `Motion.period_to`."""
+    """Return the period in s as a decimal string with that many correct digits; see `Motion.period_to`."""
     if not isinstance(digits, int) or not 1 <= digits <= MAX_DIGITS:
         raise InputError(f"period_to: digits must be a whole number from 1 to {MAX_DIGITS}, got {short(digits)}")
     a = _arithmetic(problem, segment, digits + 5)
@@ -244,7 +247,7 @@ def period_to(problem: Problem, kind: str, direction: int, segment: Segment, dig
 
 
 def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:
-    """Arithmetic in which V**2, by subtraction of potentials, keeps that many digits at every node."""
+    """Return arithmetic in which V**2, by subtraction of potentials, keeps that many digits at every node."""
     working_digits = digits + 20 + (60 if segment.from_multiprecision else 0)
     rough = problem.exact.at(working_digits)
     middle = 0.5 * (segment.a + segment.b)
@@ -257,7 +260,9 @@ def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:
 def _durations(
     a: Arithmetic, problem: Problem, kind: str, direction: int, segment: Segment, digits: int
 ) -> tuple[list[Any], Any, Any]:
-    """Half period or loop time, in one part or panel by panel, and both ends of the segment in extended precision."""
+    """Return the half period or loop time, as a whole or panel by panel, and both ends of the segment in extended
+    precision.
+    """
     if kind == "circulation":
         low, high, code, stop = a.lam0, a.lam0 + direction * a.track.period(), REGULAR, a.mpf(1)
     else:

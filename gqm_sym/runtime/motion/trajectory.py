@@ -30,7 +30,7 @@ class TimedSegment:
     s_a : float
         Arc length in m from the launch to the segment's end ``a``.
     end : str
-        What ends it, one of `launch.kinds.LEG_ENDS`; empty where the next segment continues it.
+        The name of its end, one of `launch.kinds.LEG_ENDS`; empty if the next segment continues it.
     laps : int
         The number of laps of a closed curve before it; places on the segment are within one lap.
     leg : int
@@ -101,19 +101,19 @@ class Trajectory:
     time_scale_error: float = 0.0
 
     def reduce(self, t: Array, t_low: Array) -> tuple[Array, Array, Array]:
-        """The number of whole periods in each time, and the remaining time as two doubles."""
+        """Return the number of whole periods in each time, and the remaining time as two doubles."""
         if self.period is None:
             return np.zeros_like(t), t, t_low
         count, reduced, reduced_low = reduce_many(t, t_low, *self.period)
         return count, reduced, reduced_low
 
     def segment_indices(self, reduced: Array) -> np.ndarray:
-        """The index of the segment that each reduced time falls on."""
+        """Return the index of the segment on which each reduced time falls."""
         starts = np.array([timed.t_start[0] for timed in self.segments])
         return np.clip(np.searchsorted(starts, reduced, side="right") - 1, 0, len(self.segments) - 1)
 
     def phase_angles(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> Array:
-        """The phase angles on a timed segment at reduced times."""
+        """Return the phase angles on a timed segment at reduced times."""
         s, e = two_sum.py_func(reduced, -timed.t_start[0])
         e = e + (reduced_low - timed.t_start[1])
         r, low = two_sum.py_func(timed.r_start[0], timed.sense * s)
@@ -126,7 +126,7 @@ class Trajectory:
 def libration(
     segment: Segment, direction: int, duration: Pair, phase_time: Pair, phi: float, s_a: float
 ) -> tuple[TimedSegment, ...]:
-    """One period between two turning points, from the launch.
+    """Return one period between two turning points, beginning with the launch.
 
     ``duration`` is the half period, and ``phase_time`` the time from the end ``a`` to the launch place, whose phase
     angle is ``phi``; ``s_a`` is the arc length from there to the end ``a``.
@@ -160,7 +160,7 @@ def libration(
 
 
 def circulation(segment: Segment, duration: Pair) -> TimedSegment:
-    """One lap from the launch, in ``duration``."""
+    """Return one lap from the launch, which takes the time ``duration``."""
     return TimedSegment(
         segment=segment,
         sense=1,
@@ -181,13 +181,13 @@ class PhasePoints:
     Attributes
     ----------
     segments : tuple
-        For each timed segment that times fall on: the segment, which of the times these are, and the phase angles.
+        For each timed segment on which times fall: the segment, a mask of these times, and their phase angles.
     at_launch : array of bool
-        Which times are those of the launch, or of a return to it after whole periods.
+        A mask of the times that are those of the launch, or of a return to it after whole periods.
     laps : array
         The number of laps at each time.
     trajectory : Trajectory
-        The trajectory that the segments are of.
+        The trajectory to which the segments belong.
     """
 
     segments: tuple[tuple[TimedSegment, NDArray[np.bool_], Array], ...]
@@ -196,7 +196,7 @@ class PhasePoints:
     trajectory: Trajectory
 
     def places(self, launch: float) -> Array:
-        """The curve parameter within the lap; at launch it is exactly the launch place."""
+        """Return the curve parameter within the lap; at launch it is exactly the launch place."""
         lam = np.full_like(self.laps, launch)
         for timed, mask, phi in self.segments:
             lam[mask] = timed.segment.places(phi)
@@ -221,7 +221,7 @@ class PhasePoints:
 
 
 def locate(trajectory: Trajectory, t: Array, t_low: Array) -> PhasePoints:
-    """The segments and phase angles that times fall on; a time is t + t_low."""
+    """Return the segments and phase angles on which times fall; a time is t + t_low."""
     laps, reduced, reduced_low = trajectory.reduce(t, t_low)
     which = trajectory.segment_indices(reduced)
     segments = []

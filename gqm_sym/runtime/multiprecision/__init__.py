@@ -1,1 +1,1 @@
-"""The same problem in mpmath, where doubles cannot decide or more digits are wanted."""
+"""The same problem in mpmath, for decisions that doubles cannot make and for more digits."""

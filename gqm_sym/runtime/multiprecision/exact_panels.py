@@ -1,7 +1,8 @@
-"""Panels of time and arc length laid in extended precision, where doubles cannot resolve V**2 (near a separatrix).
+"""Panels of time and arc length laid in extended precision, for segments on which doubles cannot resolve V**2 (near a
+separatrix).
 
 The panels are those of `time_panels`, but the integrands at their nodes are accurate to the last bit. They are computed
-in double-double arithmetic, and with mpmath where too many of its digits cancel.
+in double-double arithmetic, or with mpmath if too many of its digits cancel.
 """
 
 from typing import Any
@@ -27,7 +28,7 @@ from gqm_sym.runtime.quadrature.time_panels import (
     antiderivative,
 )
 
-# Decimal digits: enough for all digits of a double at a distance of 1e-30 from a barrier.
+# The number of decimal digits, which is enough for all digits of a double at a distance of 1e-30 from a barrier.
 DIGITS = 80
 
 ALL_NODES = np.concatenate([-NODES[:0:-1], NODES])
@@ -47,15 +48,15 @@ def exact_ends(
     kind : int
         The segment's kind (`substitution`).
     a, b : float
-        Its ends as doubles. An end that is the launch place is taken as it was given.
+        Its ends as doubles. For an end that is the launch place, the exact launch place is used.
     known : pair
-        Its ends in extended precision, or None where they are not known.
+        Its ends in extended precision, or None for each that is not known.
     """
     scale = exact.at(digits)
     turns = {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
     out = []
     for place, is_turn, more in zip((a, b), turns, known, strict=True):
-        # The other end may have the same double.
+        # The other end may be the same double.
         if more is None and place == exact.lam0.value and not (is_turn and exact.v0.value):
             out.append(scale.lam0)
         elif is_turn:
@@ -86,7 +87,7 @@ class _Rates:
         for i, x in enumerate(ALL_NODES.tolist()):
             try:
                 duration, w = rate(middle + reach * x)
-            except ZeroDivisionError:  # V**2 is zero in so many digits
+            except ZeroDivisionError:  # V**2 is zero to this number of digits
                 duration = w = self.scale.mpf(0)
             if duration.imag or w.imag or not (duration > 0 and w > 0):
                 raise SolutionError(
@@ -121,14 +122,16 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
     time_terms, length_terms = [], []
-    # The last phase angle is pi itself, not its nearest double: near a barrier, that difference takes a long time.
+    # The last phase angle is pi itself and not its nearest double, because near a barrier the body takes a long time
+    # for the difference.
     end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
     joints = scale.phase_angles(kind, *ends, scale.track.joints(*ends) or ())
     pending = [stop, *reversed([phi for phi in joints if 0 < phi < stop])]
     left, error, status, max_panels = 0.0, 0.0, CONVERGED, MAX_PANELS + len(pending)
     while pending:
         right = pending[-1]
-        # The nodes are not rounded to doubles: next to a peak of width 1e-6 that would be noise.
+        # The nodes are not rounded to doubles, because the rounding would be visible as noise next to a peak of width
+        # 1e-6.
         high = end if right == stop else scale.mpf(right)
         reach, middle = (high - left) / 2, (high + left) / 2
         half, values = float(reach), rates_on(middle, reach)

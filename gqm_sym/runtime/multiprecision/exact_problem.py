@@ -1,4 +1,4 @@
-"""One launch in extended precision, for what doubles cannot decide, and for more digits than a double has.
+"""One launch in extended precision, for decisions that doubles cannot make and for more digits than a double has.
 
 A generated module contains its formulas as plain Python over a namespace of operations. Here they are evaluated with
 mpmath, for exactly the numbers that the user gave. mpmath is imported when it is first needed, not with the runtime.
@@ -22,19 +22,21 @@ from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TUR
 
 NOWHERE: Array = np.empty(0)
 
-# Decimal digits with which a sign is determined, one after the other; what is zero with the last counts as zero.
+# The numbers of decimal digits with which a sign is determined, tried in turn; a value that is zero with the last one
+# counts as zero.
 PRECISIONS = (40, 80, 210)
 
-# Digits that rounding and cancellation may cost.
+# The number of digits that rounding and cancellation may cost.
 GUARD_DIGITS = 15
 
 # A segment with more panels than this has a peak for which the trapezoidal rule would need too many nodes.
 MAX_SMOOTH_PANELS = 8
 
-# Steps of Newton's method to a turning point; where a potential is flat, each of them gains a small share only.
+# The largest number of Newton steps to a turning point; if the potential is flat there, each of them reduces the error
+# only by a small share.
 MAX_NEWTON_STEPS = 2000
 
-# Nodes of the trapezoidal rule at up to 128 digits, if the curve is not smooth.
+# The largest number of nodes of the trapezoidal rule at up to 128 digits, if the curve is not smooth.
 MAX_NODES = 1 << 13
 
 
@@ -53,7 +55,7 @@ class ExactProblem:
     Attributes
     ----------
     track
-        Makes the curve with its forces at a precision.
+        A function that makes the curve with its forces at a given precision.
     edges : array
         Edges of the pieces of a charted curve, in arc length; each piece must be integrated by itself.
     parameters : tuple of Number
@@ -61,7 +63,8 @@ class ExactProblem:
     lam0, v0 : Number
         Launch place and speed in m/s.
     tape : callable
-        Returns the formulas for double-double arithmetic; None for charted curves, and where they are too long.
+        A function that returns the formulas for double-double arithmetic; None for charted curves, and if they are too
+        long.
     """
 
     track: TrackMaker
@@ -73,7 +76,7 @@ class ExactProblem:
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":
-        """Return the problem at a working precision of so many decimal digits."""
+        """Return the problem at a working precision of this number of decimal digits."""
         if digits not in self._scales:
             self._scales[digits] = Arithmetic(self, digits)
         return self._scales[digits]
@@ -89,7 +92,7 @@ class ExactProblem:
 
     @budget("search for turning points", 60.0, "launch a little farther from the equilibrium")
     def resolve(self, near: float, far: float, direction: int) -> End:
-        """Decide what lies between two places that doubles cannot distinguish from an equilibrium.
+        """Decide which obstacle lies between two places that doubles cannot distinguish from an equilibrium.
 
         Parameters
         ----------
@@ -103,8 +106,8 @@ class ExactProblem:
             here, there = a.track.place(near), a.track.place(far)
             top = a.equilibrium(here, there)
             if top is not None and (top - here) * direction <= 0:
-                top = None  # it lies behind the first place
-            if top is None:  # V**2 is monotone: its sign at the far place decides
+                top = None  # the equilibrium lies behind the first place
+            if top is None:  # V**2 is monotone, so its sign at the far place decides
                 w = a.speed_squared(there)
                 guess = here + (there - here) / 2
             else:
@@ -112,11 +115,11 @@ class ExactProblem:
                 curvature = abs(a.potential_curvature(top))
                 guess = top - direction * a.sqrt(abs(w) / curvature) if curvature else here
             lost = a.mpf(10) ** (2 * GUARD_DIGITS - digits) * a.size
-            # A launch this slow turns where the potential cancels to fewer digits than a double has.
+            # So slow a body turns at a place where cancellation leaves fewer digits of the potential than a double has.
             if abs(w) <= lost or (0 < a.w0 <= lost and digits < PRECISIONS[-1]):
                 continue
             if w > 0 and top is not None and a.speed_squared(there) < 0:
-                guess, w = there, -w  # a minimum of the potential, and a turning point behind it
+                guess, w = there, -w  # there is a minimum of the potential, and a turning point beyond it
             if w > 0:
                 return End("clear")
             return End("turn", a.turning_point(guess))
@@ -138,7 +141,7 @@ class Arithmetic:
     base
         The effective potential at the launch place.
     size
-        The size of V**2 and of the effective potential, against which rounding is judged.
+        The size of V**2 and of the effective potential, with which rounding errors are compared.
     """
 
     problem: ExactProblem
@@ -171,17 +174,17 @@ class Arithmetic:
         return self.context.sqrt(value)
 
     def effective_potential(self, lam: Any) -> Any:
-        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
+        """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
         spend()
         return self.track.effective_potential(lam)
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return its derivative by lam."""
+        """Return the derivative of U by lam."""
         spend()
         return self.track.effective_potential_slope(lam)
 
     def potential_curvature(self, lam: Any) -> Any:
-        """Return its second derivative by lam, to about half of the digits."""
+        """Return the second derivative of U by lam, to about half of the digits."""
         h = self.mpf(10) ** (-(self.digits // 3))
         return (self.effective_potential_slope(lam + h) - self.effective_potential_slope(lam - h)) / (2 * h)
 
@@ -208,7 +211,7 @@ class Arithmetic:
             below = first**2 - slope * second
             if below == 0:
                 return None
-            step = slope * first / below  # Schroeder's method: quadratic at a flat maximum as well
+            step = slope * first / below  # Schroeder's method converges quadratically at a flat maximum too
             y -= step
             if abs(y - near) > 1000 * width + abs(far) * self.mpf(10) ** -6:
                 return None
@@ -221,7 +224,7 @@ class Arithmetic:
         x = self.mpf(guess)
         tolerance = self.mpf(10) ** (
             -(self.digits // 2)
-        )  # convergence is quadratic: after such a step only rounding remains
+        )  # convergence is quadratic, so after such a step only rounding remains
         for _ in range(MAX_NEWTON_STEPS):
             slope = 2 * self.effective_potential_slope(x)
             if slope == 0:
@@ -233,7 +236,7 @@ class Arithmetic:
         raise SolutionError(f"turning point near {float(guess)!r}: extended precision does not converge to it")
 
     def time_rate(self, kind: int, a: Any, b: Any) -> Callable[[Any], tuple[Any, Any]]:
-        """Return a function of phi that gives dt/dphi and V**2 on a segment, by subtraction."""
+        """Return a function of phi that gives dt/dphi and V**2 on a segment, by subtraction of potentials."""
         context = self.context
 
         def turn_turn(phi: Any) -> tuple[Any, Any]:
@@ -277,7 +280,7 @@ class Arithmetic:
             change = abs(new - value)
             value = new
             if before is not None:
-                # If the changes fall geometrically, the next one is at most this one times their ratio.
+                # If the changes decrease geometrically, the next one is at most this one times their ratio.
                 ratio = change / before if change < before / 1000 else 1
                 if change * ratio <= abs(value) * self.mpf(10) ** (-digits - 2):
                     return value
@@ -314,6 +317,6 @@ class Arithmetic:
 
 
 def two_doubles(value: Any) -> tuple[float, float]:
-    """Return a number of extended precision as two doubles, whose sum it is."""
+    """Return a number of extended precision as the sum of two doubles."""
     high = float(value)
     return high, float(value - high)

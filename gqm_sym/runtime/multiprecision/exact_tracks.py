@@ -19,10 +19,10 @@ class Track(Protocol):
         """Return the place that a double stands for."""
 
     def effective_potential(self, lam: Any) -> Any:
-        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
+        """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return its derivative by lam."""
+        """Return the derivative of U by lam."""
 
     def ds(self, lam: Any) -> Any:
         """Return ds/dlam."""
@@ -31,7 +31,7 @@ class Track(Protocol):
         """Return the period of lam on a closed curve."""
 
     def elsewhere(self) -> Any:
-        """Return a place away from the launch, where the size of the effective potential is taken."""
+        """Return a place away from the launch, at which the size of the effective potential is evaluated."""
 
     def joints(self, low: Any, high: Any) -> Sequence[Any] | None:
         """Return the places between two others at which the curve is not analytic; None if there are none anywhere."""
@@ -57,15 +57,15 @@ class FormulaTrack:
         return self.launch.at(self.context)
 
     def place(self, lam: float) -> Any:
-        """Return the number that a double is."""
+        """Return the exact value of a double."""
         return self.context.mpf(lam)
 
     def effective_potential(self, lam: Any) -> Any:
-        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
+        """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
         return self.formulas.effective_potential(self.context, lam, self.values)
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return its derivative by lam."""
+        """Return the derivative of U by lam."""
         return self.formulas.effective_potential_slope(self.context, lam, self.values)
 
     def ds(self, lam: Any) -> Any:
@@ -77,9 +77,11 @@ class FormulaTrack:
         return self.domain(self.context, self.values)[2]
 
     def elsewhere(self) -> Any:
-        """Return a place at a distance that is not a round number, because potentials may agree at round distances."""
+        """Return a place whose distance from the launch is not a round number, because potentials may agree at round
+        distances.
+        """
         return self.lam0 + self.context.mpf("0.7390851332151607")
 
     def joints(self, low: Any, high: Any) -> None:
-        """Return None: formulas are analytic."""
+        """Return None, because formulas are analytic."""
         return

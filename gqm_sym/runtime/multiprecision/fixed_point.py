@@ -1,4 +1,6 @@
-"""Polynomials in extended precision, evaluated in integers, which takes a tenth of the time of mpmath's floats."""
+"""Polynomials in extended precision that are evaluated in integers, which takes a tenth of the time of mpmath's
+floats.
+"""
 
 from collections.abc import Sequence
 from typing import Any

@@ -8,19 +8,19 @@ from typing import Any
 
 from gqm_sym.errors import SolutionError
 
-# Nodes of the first rule, and of the smallest one.
+# The number of nodes of the first rule, and of the smallest one.
 FIRST_NODES, MIN_NODES = 20, 8
 
-# A function that is not resolved after so many halvings of a panel is not analytic.
+# A function that is not resolved after this number of halvings of a panel is not analytic.
 MAX_HALVINGS = 40
 
 
 def gauss(context: Any, rate: Callable[[Any], Any], edges: Sequence[Any], digits: int) -> list[Any]:
     """Integrate a function over each panel between edges, on which it is analytic.
 
-    The error of the rule with n nodes is about the coefficient 2n of the Legendre series. The coefficients fall
+    The error of the rule with n nodes is about the coefficient 2n of the Legendre series. The coefficients decrease
     geometrically, so this is about the square of coefficient n. The last two coefficients that the nodes give decide
-    whether the rule has converged, and how many nodes the next panel gets.
+    whether the rule has converged, and the number of nodes for the next panel.
 
     Raises
     ------
@@ -46,7 +46,8 @@ def gauss(context: Any, rate: Callable[[Any], Any], edges: Sequence[Any], digits
                 continue
             else:
                 raise SolutionError("extended precision: the integrand of the time of flight is not analytic")
-            # From how fast the coefficients fall; a multiple of four, because every new rule must be computed.
+            # This follows from the rate at which the coefficients decrease; it is a multiple of four, because every new
+            # rule must be computed.
             fall = -float(context.log10(tail)) / count if tail else 2.0
             count = min(max(4 * ceil((digits / 2 + 4) / fall / 4), MIN_NODES), max_nodes)
         parts.append(total)
@@ -88,6 +89,6 @@ def legendre_rule(count: int, digits: int) -> tuple[tuple[Any, Any, Any], ...]:
             step = here / slope
             x -= step
             if abs(step) <= context.mpf(10) ** -digits:
-                break  # slope and P_(count-1) are those at the node, up to this negligible step
+                break  # slope and P_(count-1) are known at the node up to this negligible step
         rule.append((x, 2 / ((1 - x * x) * slope**2), before))
     return tuple(rule)

@@ -1,9 +1,9 @@
 """Integrands of time and of arc length along one segment of the curve, and the speed there.
 
-A *segment* is a part of the curve that the body runs through in one direction. Its ends decide the substitution
-lam(phi) that makes the integrands smooth; phi is the segment's *phase angle* (`substitution`, MATHS section 4).
-V**2 is computed from divided differences of the effective potential, or, next to an equilibrium where forces dissipate,
-from polynomials in the distance (`equilibrium`).
+A *segment* is a part of the curve that the body passes in one direction. Its ends determine the substitution lam(phi)
+that makes the integrands smooth; phi is the segment's *phase angle* (`substitution`, MATHS section 4). V**2 is computed
+from divided differences of the effective potential or, next to an equilibrium with dissipative forces, from polynomials
+in the distance (`equilibrium`).
 """
 
 from math import cos, exp, fabs, inf, sin, sqrt
@@ -21,7 +21,7 @@ from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.quadrature.equilibrium import speed_and_length_factors
 from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# Where V**2 is given by polynomials, no function of the model is called.
+# If V**2 is given by polynomials, no function of the model is called.
 NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
 
 
@@ -39,10 +39,10 @@ class Integrand(NamedTuple):
     a, b : float
         Values of the curve parameter at both ends.
     ref, w0 : float
-        A place and V**2 there, in (m/s)**2; used by REGULAR segments. Of FROM_SLOW segments the slope of the effective
+        For REGULAR segments a place, and V**2 there in (m/s)**2. For FROM_SLOW segments the slope of the effective
         potential at ``a``, and V**2 there.
     field : (n, m) array
-        V**2 next to the equilibrium ``b`` where forces dissipate (`equilibrium`), else empty.
+        V**2 next to the equilibrium ``b`` with dissipative forces (`equilibrium`), else empty.
     """
 
     fns: Any
@@ -57,7 +57,7 @@ class Integrand(NamedTuple):
 
 @Inner
 def fill_rates_from_place(integrand, phi, work, out):  # type: ignore[no-untyped-def]
-    """`fill_rates` of a segment without turning points, from V**2 at one place."""
+    """Do the work of `fill_rates` for a segment without turning points, from V**2 at one place."""
     fns, p, kind, a, b, ref, w0, _ = integrand
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
@@ -68,7 +68,7 @@ def fill_rates_from_place(integrand, phi, work, out):  # type: ignore[no-untyped
         call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * rows[0, i])
-    else:  # the mean slope from ``a`` is what the slope there and the second difference add up to
+    else:  # the mean slope from ``a`` is the sum of the slope there and a term with the second difference
         for i in range(n):
             da[i] = (b - a) * phi[i]
             db[i] = -da[i]
@@ -136,7 +136,7 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with V in m/s at each phase angle, without cancellation and exactly zero at a turning point.
+    """Fill ``out`` with V in m/s at each phase angle, without cancellation and with exactly zero at a turning point.
 
     ``work`` is a work space of four rows.
     """
@@ -175,16 +175,16 @@ def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
 
 @Inner
 def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def]
-    """How much of V**2 is lost by cancellation at the n places that `fill_rates` filled last.
+    """Return a measure of the cancellation in V**2 at the n places that `fill_rates` filled last.
 
-    Between two turning points this is measured by the regular factor of V**2, its smallest value against its largest.
-    Starting from a place where V**2 is known it is measured by V**2 itself against the largest V**2 so far: a body that
-    has been fast and becomes slow is passing over a barrier.
+    Between two turning points it is the ratio of the smallest to the largest value of the regular factor of V**2. On a
+    segment that starts from a place where V**2 is known, it is the ratio of V**2 itself to the largest V**2 so far,
+    because a body that has been fast and becomes slow is passing over a barrier.
 
     Parameters
     ----------
     work : (4, n) array
-        As `fill_rates` leaves it.
+        The work space after a call of `fill_rates`.
     peak : float
         The largest V**2 before these places.
 
@@ -204,7 +204,7 @@ def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def
         for i in range(n):
             low, high = min(low, work[2, i]), max(high, work[2, i])
     elif kind not in (TO_EQUILIBRIUM, FROM_SLOW):
-        # Towards the place where V**2 is known, its relative error only falls.
+        # Towards the place where V**2 is known, its relative error only decreases.
         outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):
             loss = 2.0 * work[0, i] * work[2, i]
@@ -217,7 +217,7 @@ def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def
 
 @entry(VECTOR(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR))
 def speeds_at(fns, p, kind, a, b, ref, w0, phi):  # type: ignore[no-untyped-def]
-    """V in m/s at many phase angles of a segment; the other arguments are those of `Integrand`."""
+    """Return V in m/s at many phase angles of a segment; the other arguments are those of `Integrand`."""
     out = np.empty(phi.size)
     fill_speeds(Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0))), phi, np.empty((4, phi.size)), out)
     return out
@@ -225,7 +225,9 @@ def speeds_at(fns, p, kind, a, b, ref, w0, phi):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(REAL, REAL, MATRIX, VECTOR))
 def speeds_along(a, b, field, phi):  # type: ignore[no-untyped-def]
-    """V in m/s at many phase angles of a segment from ``a`` to an equilibrium ``b``, with V**2 from `equilibrium`."""
+    """Return V in m/s at many phase angles of a segment from ``a`` to an equilibrium ``b``, with V**2 from
+    `equilibrium`.
+    """
     out, work = np.empty(phi.size), np.empty((4, phi.size))
     fill_speeds(Integrand(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field), phi, work, out)
     return out

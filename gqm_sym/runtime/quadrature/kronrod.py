@@ -1,8 +1,9 @@
 """The 21-point Gauss-Kronrod rule, and Legendre coefficients from values at its nodes.
 
-Made by scripts/make_kronrod.py, in 80-digit arithmetic. Nodes are the eleven that are not negative, in rising order;
-the others mirror them. ``EVEN[j] @ (g(x) + g(-x))`` is the coefficient of P_2j and ``ODD[j] @ (g(x) - g(-x))`` that of
-P_(2j+1) in the interpolant of degree 20 (the first column of ``EVEN`` belongs to the middle node, taken once).
+The tables were made by scripts/make_kronrod.py in 80-digit arithmetic. The nodes are the eleven that are not negative,
+in ascending order; the others are their mirror images. ``EVEN[j] @ (g(x) + g(-x))`` is the coefficient of P_2j and
+``ODD[j] @ (g(x) - g(-x))`` that of P_(2j+1) in the interpolant of degree 20 (the first column of ``EVEN`` belongs to
+the middle node, taken once).
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """The substitution lam(phi) between the curve parameter and the phase angle of a segment (MATHS, section 4).
 
-It depends on which ends of the segment [a, b] are special, such that dt/dphi is smooth:
+The substitution depends on which ends of the segment [a, b] are special; it makes dt/dphi smooth:
 
 =============== ======================================= ================================
 kind            lam                                     phi
@@ -12,8 +12,8 @@ FROM_SLOW       a + (b-a) phi                           0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
-Three forms of it are here: for one place, for an array, and for compiled loops. `integrands` and `trapezoid` need the
-offsets of a place from both ends instead of the place, and compute them where they use them, in loops that vectorise.
+There are three forms of it here: for one place, for an array, and for compiled loops. `integrands` and `trapezoid` need
+the offsets of a place from both ends instead of the place, and compute them in their own loops, which vectorise.
 """
 
 from math import atan2, inf, log, pi, sqrt
@@ -26,7 +26,7 @@ from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.types import Array
 
 # Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium, and
-# from where the body is slowest, such as next to a hilltop that it passes.
+# from a place where the body is slowest, such as next to a hilltop that it passes.
 TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM, FROM_SLOW = range(5)
 
 

@@ -25,21 +25,21 @@ CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
 COUNT = 21
 DEGREE = 22
 
-# A panel is resolved when its last Legendre coefficients are below this share of the largest: they hold rounding noise
-# of about 5e-16.
+# A panel is resolved when its last Legendre coefficients are below this share of the largest; their rounding noise is
+# about 5e-16.
 MAX_TAIL_RATIO = 2e-15
 
-# Coefficients that stop falling below this share of the largest are rounding noise, not structure.
+# Coefficients that stop decreasing below this share of the largest are rounding noise, not structure.
 MAX_NOISE_RATIO = 1e-7
 
-# They have stopped falling when the last ones are at least this share of those in the middle.
+# They have stopped decreasing when the last ones are at least this share of those in the middle.
 MIN_FLAT_RATIO = 0.05
 
-# Noise above FLOOR_RATIO stays when the panel is halved; if less than this share does, it was structure from beyond the
-# panel's end, far below the largest values and falling slowly.
+# Noise above FLOOR_RATIO remains when the panel is halved. If less than KEPT_SHARE of it remains, it was due to
+# structure beyond the panel's end, with small and slowly decreasing coefficients.
 FLOOR_RATIO, KEPT_SHARE = 50.0 * MAX_TAIL_RATIO, 0.1
 
-# Kronrod's and Gauss's value of a resolved panel differ by no more than this share.
+# The values of a resolved panel by the Kronrod and the Gauss rule differ by no more than this share.
 MAX_RULE_DIFFERENCE = 1e-6
 
 MAX_PANELS = 4096
@@ -50,11 +50,13 @@ MIN_USABLE_RATIO = 1e-9
 # If cancellation leaves less than this part of V**2, the half period in doubles is off by more than a few ulp.
 MIN_CANCELLATION_RATIO = 1e-2
 
-# The shortest panel, as a share of its distance from the start of the segment, next to which a slow launch gains its
-# speed over the shortest distance that doubles resolve; and the shortest there, as a share of the whole segment.
+# The narrowest panel, as a share of its distance from the start of the segment; next to the start a slow body gains its
+# speed over the shortest distance that doubles resolve. And the narrowest panel at the start itself, as a share of the
+# whole segment.
 MIN_PANEL_SHARE, MIN_FIRST_PANEL_SHARE = 2.0**-48, 2.0**-960
 
-# How many panels may wait while those before them are halved, besides the first ones: as often as the first is halved.
+# The number of panels, besides the first ones, that may wait while those before them are halved; it limits how often
+# the first panel is halved.
 MAX_WAITING = 1000
 
 # A duration below this share of the time so far does not change it, even as two doubles.
@@ -75,8 +77,8 @@ class Panels(NamedTuple):
     error : float
         Estimated relative error of the whole time by quadrature, rounding included.
     cancellation : float
-        The part of V**2 that cancellation leaves: its smallest regular factor against the largest. It is small near a
-        separatrix.
+        The part of V**2 that cancellation leaves: the ratio of its smallest to its largest regular factor. It is small
+        near a separatrix.
     status : int
         CONVERGED, FLOOR (the coefficients level off above rounding), EXHAUSTED (too many panels), FAILED (an integrand
         is not finite) or ILL_CONDITIONED (V**2 nearly vanishes inside: panels must be laid in extended precision).
@@ -141,7 +143,9 @@ def _accumulate(total, low, value):  # type: ignore[no-untyped-def]
 
 @Inner
 def _panel_sums(values, half):  # type: ignore[no-untyped-def]
-    """Duration and length of a panel by Kronrod's rule, and how far Gauss's rule is from that duration."""
+    """Return duration and length of a panel by the Kronrod rule, and the difference between that duration and the one
+    by the Gauss rule.
+    """
     gauss, duration, length = 0.0, 0.0, 0.0
     for i in range(10, 0, -1):
         pair = values[0, 10 + i] + values[0, 10 - i]
@@ -163,7 +167,7 @@ def _place_nodes(middle, half, phi):  # type: ignore[no-untyped-def]
 
 @Inlined
 def _is_noise(size, tail, middle):  # type: ignore[no-untyped-def]
-    """Whether coefficients have stopped falling at the level of rounding noise."""
+    """Return whether coefficients have stopped decreasing at the level of rounding noise."""
     return middle <= MAX_NOISE_RATIO * size and tail >= MIN_FLAT_RATIO * middle
 
 
@@ -189,10 +193,10 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
     phi, work, values, c = np.empty(COUNT), np.empty((4, COUNT)), np.empty((2, COUNT)), np.empty(DEGREE + 1)
     start, stop = marks[0], marks[-1]
     waiting = marks.size - 1
-    pending = np.empty(waiting + MAX_WAITING)  # right edges of the panels that remain, the next one last
+    pending = np.empty(waiting + MAX_WAITING)  # right edges of the remaining panels, the next one last
     for k in range(waiting):
         pending[k] = marks[waiting - k]
-    before_halving = np.full(pending.size, inf)  # the shares of their last coefficients then
+    before_halving = np.full(pending.size, inf)  # the shares of their last coefficients before they were halved
     max_panels = MAX_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED
@@ -225,7 +229,8 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
         noise = _is_noise(size, tail, level) and (length_resolved or _is_noise(length_size, length_tail, length_middle))
         narrow = fabs(right - left) <= max(MIN_PANEL_SHARE * fabs(right - start), min_width)
         full = count + waiting >= max_panels or waiting >= pending.size - 1
-        # At the end of a spiral, which winds on below the last bit of the time and the length so far.
+        # This occurs at the end of a spiral, whose further turns are below the last bit of the time and the length so
+        # far.
         negligible = (
             duration >= 0.0
             and duration <= NEGLIGIBLE_SHARE * times[count]
@@ -345,9 +350,9 @@ def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
 
 @Inner
 def joints_between(joints, period, low, high):  # type: ignore[no-untyped-def]
-    """The places strictly between ``low`` and ``high`` at which the curve is not smooth, in ascending order.
+    """Return the places strictly between ``low`` and ``high`` at which the curve is not smooth, in ascending order.
 
-    ``joints`` are those within one period; on a closed curve they are repeated with the period.
+    ``joints`` are such places within one period; on a closed curve they are repeated with the period.
     """
     first, laps = 0.0, 1
     if joints.size == 0:
@@ -369,7 +374,7 @@ def joints_between(joints, period, low, high):  # type: ignore[no-untyped-def]
 def orbit_panels(fns, p, kind, a, b, lam0, w0, joints):  # type: ignore[no-untyped-def]
     """Lay panels over half a period of a libration, a lap, or the way to an end of the curve, from joint to joint.
 
-    All share one call of `lay`, because each call takes long to compile.
+    All cases share one call of `lay`, because each call takes long to compile.
 
     Parameters
     ----------
@@ -396,7 +401,7 @@ def orbit_panels(fns, p, kind, a, b, lam0, w0, joints):  # type: ignore[no-untyp
 
 @Inner
 def are_accurate(panels):  # type: ignore[no-untyped-def]
-    """Whether the time by these panels is accurate to a few ulp."""
+    """Return whether the time by these panels is accurate to a few ulp."""
     return not (panels.status >= FLOOR or panels.cancellation < MIN_CANCELLATION_RATIO)
 
 

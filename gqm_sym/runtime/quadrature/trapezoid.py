@@ -23,7 +23,7 @@ MAX_NODES = MIN_INTERVALS * 2**MAX_DOUBLINGS
 
 # The error of the rule is a sum of terms c*r**n times a cosine of the number n of nodes. Each doubling replaces r**n by
 # its square, and c may be as small as 1e-5 because of branch points of ds/dlam. A change between two levels may be
-# small by accident, but two changes in a row hardly are: so both are limited.
+# small by accident, but hardly two changes in a row, so both are limited.
 MAX_LAST_CHANGE, MAX_CHANGE_BEFORE = 1e-11, 3e-6
 
 # Work space of `fill_integrand`, on the stack.
@@ -60,7 +60,9 @@ class Orbit(NamedTuple):
 
 
 def _node_shares() -> np.ndarray:
-    """Return the nodes of all levels as shares of the interval: the first level's, then what each doubling adds."""
+    """Return the nodes of all levels as shares of the interval: those of the first level, then those that each doubling
+    adds.
+    """
     levels = [np.arange(MIN_INTERVALS + 1) / MIN_INTERVALS]
     for k in range(MAX_DOUBLINGS):
         n = MIN_INTERVALS * 2**k
@@ -118,7 +120,7 @@ def fill_integrand(orbit, first, n, work, rates):  # type: ignore[no-untyped-def
 
 @Inner
 def has_converged(before, change):  # type: ignore[no-untyped-def]
-    """Whether the trapezoidal rule has converged, judged by its last two relative changes."""
+    """Return whether the trapezoidal rule has converged, judged by its last two relative changes."""
     return (before <= MAX_CHANGE_BEFORE) & (change <= MAX_LAST_CHANGE)
 
 
@@ -126,7 +128,7 @@ def has_converged(before, change):  # type: ignore[no-untyped-def]
 def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-untyped-def]
     """Return the half period or the lap time in s by the trapezoidal rule; the arguments are those of `Orbit`.
 
-    It is NaN where the rule did not converge, or where V**2 nearly vanishes.
+    It is NaN if the rule does not converge, or if V**2 nearly vanishes.
     """
     orbit = Orbit(fns, p, kind, lam0, w0, a, b, width)
     work, rates = trapezoid_workspace(), trapezoid_rates()

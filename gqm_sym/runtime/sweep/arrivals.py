@@ -18,14 +18,15 @@ from gqm_sym.runtime.quadrature.time_panels import (
 )
 from gqm_sym.runtime.sweep.orbit import Orbit
 
-# Terms of the series that are tried in turn.
+# The numbers of terms of the series that are tried in turn.
 FEW_TERMS, MORE_TERMS, MAX_TERMS = 32, 64, 128
 
-# How many of the last coefficients must be small, and how small against the first. Integration divides a coefficient by
-# its number, so that their share of the time is smaller still.
+# The number of last coefficients that must be small, and their largest ratio to the first. Integration divides each
+# coefficient by its index, so that their share of the time is even smaller.
 TAIL_LENGTH, TAIL_RATIO = 4, 1e-14
 
-# The width of the way to an end of the curve, as a share of its ends, below which their rounding spoils times.
+# The width of a segment to an end of the curve, as a share of the segment's ends, below which their rounding spoils
+# times.
 MIN_WIDTH_SHARE = 2.0**-5
 
 # The share of an orbit's width within which a turning point counts as near the launch.
@@ -33,7 +34,9 @@ NEAR_LAUNCH = 1e-3
 
 
 def _cosines(n: int) -> np.ndarray:
-    """The matrix from values at n + 1 equal steps over [0, pi] to coefficients of cosines, a row for each node."""
+    """Return the matrix that maps values at n + 1 equal steps over [0, pi] to coefficients of cosines, a row for each
+    node.
+    """
     steps = np.outer(np.arange(n + 1), np.arange(n + 1)) % (2 * n)
     matrix = np.array([cos(pi * m / n) for m in range(2 * n)])[steps] * (2.0 / n)
     matrix[[0, n]] *= 0.5
@@ -50,7 +53,7 @@ WIDTH_SHARES = np.sin(0.5 * pi * np.arange(MAX_TERMS + 1) / MAX_TERMS) ** 2
 
 @Inner
 def fill_time_rate_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untyped-def]
-    """Fill the cosine series of dt/dphi over [0, pi]; returns whether it is resolved and V**2 is far from vanishing."""
+    """Fill the cosine series of dt/dphi over [0, pi]; return whether it is resolved and V**2 is far from vanishing."""
     m = n + 1
     da, db, rows = work[:m], work[m : 2 * m], work[2 * m : 4 * m]
     for j in range(m):
@@ -79,10 +82,10 @@ def fill_time_rate_series(fns, p, a, b, width, n, work, series):  # type: ignore
 
 @Inner
 def times_from(series, n, phi, psi, flip):  # type: ignore[no-untyped-def]
-    """The times from an end to two phase angles; ``flip`` is 1 for the lower end and -1 for the upper one.
+    """Return the times from an end to two phase angles; ``flip`` is 1 for the lower end and -1 for the upper one.
 
-    They are the integral of a cosine series, summed by Clenshaw's scheme for sines. Both sums run side by side, because
-    each step of one has to wait for the step before.
+    They are the integral of a cosine series, summed by Clenshaw's recurrence for sines. Both sums are computed at the
+    same time, because each step of one has to wait for the step before.
     """
     two_cos_phi, two_cos_psi, sign = 2.0 * cos(phi), 2.0 * cos(psi), flip if n % 2 else 1.0
     phi_sum, phi_before, psi_sum, psi_before = 0.0, 0.0, 0.0, 0.0
@@ -96,9 +99,10 @@ def times_from(series, n, phi, psi, flip):  # type: ignore[no-untyped-def]
 
 @Inner
 def refined_end(fns, p, orbit, end, work):  # type: ignore[no-untyped-def]
-    """The offset of a turning point from the launch with all its digits.
+    """Return the offset of a turning point from the launch, accurate to all digits.
 
-    One that is near the launch may be known only as a rounded sum; there one step of Newton's method is taken.
+    The offset of a turning point near the launch may be known only as a rounded sum; it is improved by one step of
+    Newton's method.
     """
     width = orbit.high - orbit.low
     if orbit.v2 == 0.0 or fabs(end) > NEAR_LAUNCH * width:
@@ -114,13 +118,13 @@ def refined_end(fns, p, orbit, end, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def phase_of(below, above):  # type: ignore[no-untyped-def]
-    """The phase angle of a place by its distances from the lower and the upper end."""
+    """Return the phase angle of a place, given its distances from the lower and the upper end."""
     return 2.0 * atan2(sqrt(below), sqrt(above))
 
 
 @Inner
 def arrival_on_lap(curve, orbit, ahead):  # type: ignore[no-untyped-def]
-    """The time at which a body on a closed curve has gone the offset ``ahead``; as `arrival` returns it."""
+    """Return the time at which a body on a closed curve has moved by the offset ``ahead``, in the form of `arrival`."""
     lap = orbit.direction * (orbit.high - orbit.low)
     laps = np.floor(ahead / lap)
     if laps < 0.0:
@@ -135,14 +139,14 @@ def arrival_on_lap(curve, orbit, ahead):  # type: ignore[no-untyped-def]
 
 @Inner
 def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no-untyped-def]
-    """The times that a body takes from one end of a libration to the launch and to the offset ``ahead``.
+    """Return the times from one end of a libration to the launch and to the offset ``ahead``.
 
-    The end is the one nearer to the launch, so that the times of a launch close to it have all their digits.
+    The end is the one nearer to the launch, so that times are accurate to all digits for a launch close to it.
 
     Returns
     -------
     half_period, start, stop : float
-        Times in seconds; NaN where they are left to the exact problem.
+        Times in seconds; NaN if they are left to the exact problem.
     from_upper : bool
         Whether the end is the upper one.
     """
@@ -173,7 +177,9 @@ def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no
 
 @Inner
 def arrival_on_way_out(curve, orbit, ahead, work):  # type: ignore[no-untyped-def]
-    """The time to the offset ``ahead``, or for NaN to the end, of a body that leaves the curve; as `arrival`."""
+    """Return the time to the offset ``ahead``, or if that is NaN to the end, for a body that leaves the curve, in the
+    form of `arrival`.
+    """
     end, turn = (orbit.high, orbit.low) if orbit.leaves > 0 else (orbit.low, orbit.high)
     turns = orbit.v2 == 0.0 or orbit.leaves != orbit.direction
     turn = refined_end(curve.fns, curve.p, orbit, turn, work) if turns else 0.0
@@ -198,9 +204,10 @@ def arrival_on_way_out(curve, orbit, ahead, work):  # type: ignore[no-untyped-de
 
 @Inner
 def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
-    """The first time at which the body is at ``place``: NaN if it is left to the exact problem, inf if never.
+    """Return the first time at which the body is at ``place``; NaN if this is left to the exact problem, inf if it
+    never is.
 
-    For NaN it is the time at which a body that leaves the curve comes to the end of it.
+    If ``place`` is NaN, return the time at which a body that leaves the curve reaches its end.
     """
     ahead = place - orbit.lam0
     if ahead == 0.0:

@@ -1,6 +1,8 @@
-"""Sweeps on a Dask cluster: they are cut into jobs, which carry the module's text to the workers, and joined here.
+"""Sweeps on a Dask cluster: they are divided into jobs, which carry the module's text to the workers, and the results
+are joined here.
 
-The cut does not depend on the workers, and a job is answered as it would be here, so that the numbers are the same.
+The division does not depend on the workers, and a job is computed as it would be here, so that the results are the
+same.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -20,7 +22,7 @@ from gqm_sym.runtime.sweep.result import Sweep
 
 T = TypeVar("T")
 
-# The number of launches of one job, and of jobs that wait in the queue for each thread of a worker.
+# The number of launches of one job, and the number of jobs in the queue for each thread of a worker.
 LAUNCHES_PER_JOB, JOBS_PER_THREAD = 2**13, 3
 
 # The seconds within which a scheduler must answer.
@@ -29,7 +31,7 @@ TIMEOUT = 10
 
 @require("dask")
 def connected(address: str) -> Any:
-    """A client of the cluster whose scheduler is at an address.
+    """Return a client of the cluster whose scheduler is at an address.
 
     Raises
     ------
@@ -48,7 +50,8 @@ def connected(address: str) -> Any:
 
 @require("dask")
 def finished(client: Any, work: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, T]]:
-    """Do ``work`` on the arguments of each job on a cluster; yield the number and result of each job once finished.
+    """Call ``work`` with the arguments of each job on a cluster; yield the number and the result of each job when it is
+    finished.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
     source, text, name
         The file of the module, its text, and its name.
     quantity, arguments
-        Those of the module's ``sweep``.
+        The arguments of the module's ``sweep``.
     """
     if stamp != STAMP:
         raise SolutionError("client: a worker runs another version of gqm_sym; install the same one everywhere")
@@ -100,7 +103,7 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
 
 
 def sweep_on(client: Any, module: tuple[str, str, str], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
-    """``module.sweep`` on a cluster; the arguments broadcast against each other.
+    """Call ``module.sweep`` on a cluster; the arguments broadcast against each other.
 
     Parameters
     ----------

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
 
-# What one number is given as, and up to where all integers are doubles.
+# The types of a single number, and the largest integer up to which all integers are doubles.
 ONE_NUMBER, MAX_EXACT_INTEGER = (float, int, str, Number), 2**53
 
 
 def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
-    """The shape that named arrays broadcast to."""
+    """Return the shape to which named arrays broadcast."""
     different = {column.shape for column in columns.values()} - {()}
     if len(different) <= 1:
         return next(iter(different), ())
@@ -34,7 +34,7 @@ def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
 
 
 def as_doubles(value: Any, name: str) -> Array:
-    """Numbers as doubles; text and exact numbers by their nearest."""
+    """Return numbers as doubles; text and exact numbers become the nearest doubles."""
     if type(value) is float or (type(value) is int and abs(value) <= MAX_EXACT_INTEGER):
         return np.array(float(value))
     if type(value) is str:
@@ -57,7 +57,7 @@ def _of_text(value: str, name: str) -> float:
 
 
 def check_launches(v0: Array, direction: Array) -> None:
-    """Refuse what no launch of a sweep may be."""
+    """Refuse speeds and directions that no launch of a sweep may have."""
     if (v0 < 0.0).any():
         raise InputError("v0: is a speed and cannot be negative; use direction=-1 to launch the other way")
     if (np.abs(direction) != 1.0).any():
@@ -65,7 +65,7 @@ def check_launches(v0: Array, direction: Array) -> None:
 
 
 def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
-    """Refuse parameters for which the closed forms do not hold, and those below the limits that the model has."""
+    """Refuse parameters for which the closed forms do not hold, and those below the lower limits of the model."""
     for name in (*formulas.positive, "m"):
         if (columns[name] <= 0.0).any():
             raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
@@ -78,9 +78,10 @@ def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
 def columns_of(
     formulas: "Formulas", given: tuple[Any, ...], launches: dict[str, Array]
 ) -> tuple[list[Array], list[Array]]:
-    """Return the columns of the parameters, with the chart behind them, and those of the curve's domain.
+    """Return the columns of the parameters, followed by the chart, and those of the curve's domain.
 
-    Where all launches have the same parameters, they are found once; otherwise they must broadcast with the launches.
+    If all launches have the same parameters, the columns are found once; otherwise the parameters must broadcast with
+    the launches.
     """
     if all(isinstance(value, ONE_NUMBER) or not (isinstance(value, np.ndarray) or np.ndim(value)) for value in given):
         numbers = formulas.numbers(given)
@@ -99,7 +100,9 @@ def columns_of(
 
 
 def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
-    """The domain and the axes of symmetry of each launch's curve, in the order of `strided`; none of a chart."""
+    """Return the domain and the axes of symmetry of each launch's curve, in the order of `strided`; a chart has no
+    axes.
+    """
     if formulas.chart is not None:
         return
     place, step = formulas.axes(ARRAYS, tuple(p))
@@ -109,7 +112,9 @@ def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
 
 
 def _rounding_of_axis(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
-    """The difference between the axis of symmetry and its nearest double, if the axis is the same for all launches."""
+    """Return the difference between the axis of symmetry and its nearest double, if the axis is the same for all
+    launches.
+    """
     if place is None or np.ndim(place) or not all(column.size for column in p):
         return None
     return _rounding_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))

@@ -1,4 +1,4 @@
-"""One quantity for each of many launches where forces dissipate, by driving all bodies in compiled code."""
+"""One quantity for each of many launches with dissipative forces, by driving all bodies in compiled code."""
 
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,8 +29,8 @@ from gqm_sym.runtime.sweep.quantities import Answers
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
-# How many panels the record of a leg has space for beside one for each break, how many bodies are driven at a time, and
-# from how many on a thread is worth starting.
+# The number of panels for which the record of a leg has space in addition to one for each break; the number of bodies
+# that are driven at a time; and the number from which on a thread is worth starting.
 MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
 # The question to the driver for each quantity, by its name. Motions that lose energy have no period.
@@ -64,7 +64,7 @@ class Asked(NamedTuple):
 
 
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
-    """What compiled code is asked for a quantity; None where motions are solved, or no energy is lost."""
+    """Return the question to compiled code for a quantity; None if motions must be solved, or no energy is lost."""
     loss = formulas.dissipation
     if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
@@ -82,7 +82,7 @@ def answer_driven(
     answers: Answers,
     part: slice,
 ) -> None:
-    """Answer a part of launches on one curve, as far as compiled code decides them.
+    """Fill the answers of a part of launches on one curve, as far as compiled code decides them.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def answer_driven(
 
 
 def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
-    """Which launches are of numbers, and inside the domain; `solve` refuses the others."""
+    """Return which launches consist of finite numbers and lie inside the domain; `solve` refuses the others."""
     possible = np.ones(count, dtype=np.bool_)
     for line in (*lines[: TARGET + 1], *lines[PARAMETERS:]):
         possible &= np.isfinite(line)
@@ -129,7 +129,9 @@ def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
 
 
 def _rows(parameters: list[Array], chart: Array) -> Array:
-    """The parameters of each body as a row; one row where all bodies have the same, the chart behind it."""
+    """Return the parameters of each body as a row, followed by the chart; a single row if all bodies have the same
+    parameters.
+    """
     if chart.size:
         return np.concatenate([*(column[:1] for column in parameters), chart]).reshape(1, -1)
     rows = np.empty((max((column.size for column in parameters), default=1), len(parameters)))

@@ -1,8 +1,9 @@
-"""Half periods, lap times and turning points of single orbits in double-double arithmetic, where doubles lose digits.
+"""Half periods, lap times and turning points of single orbits in double-double arithmetic, for orbits on which doubles
+lose digits.
 
-Next to a hilltop the turning point of a body moves far for a little energy, and so does its time: the rounding of V**2
-in doubles costs as many digits as the body comes close. Few launches of a sweep are so close, and curves with formulas
-have a tape for them (`double_double.orbit_time`).
+Next to a hilltop a small change of the energy moves the turning point of a body far and changes its time much, so that
+the rounding of V**2 in doubles costs more digits the closer the body comes. Few launches of a sweep are so close, and
+curves with formulas have a tape for them (`double_double.orbit_time`).
 """
 
 import numpy as np
@@ -38,7 +39,8 @@ MAX_TURN_ERROR, MAX_RULE_ERROR = 2.0**-54, 1e-19
     nogil=True,
 )
 def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignore[no-untyped-def]
-    """Answer each launch whose status is SPAN_KNOWN; it is UNDECIDED where double-double arithmetic does not suffice.
+    """Fill the answer of each launch whose status is SPAN_KNOWN; the status becomes UNDECIDED if double-double
+    arithmetic does not suffice.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
     quantity : int
         HALF_PERIOD, PERIOD or TURNING_POINTS.
     spans : (n, 2) array
-        For each launch what SPANS asks for.
+        For each launch, the answer to SPANS.
     answers : Answers
         Filled in.
     nodes : (array, array)
@@ -79,7 +81,7 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         if quantity == TURNING_POINTS:
             values[k, 0], values[k, 1] = lower[0], upper[0]
             enough = MAX_TURN_ERROR * (high - low)
-            decided = lower[2] <= enough and upper[2] <= enough  # NaN is not
+            decided = lower[2] <= enough and upper[2] <= enough  # false for NaN
         else:
             values[k, 0] = 2.0 * duration[0] if quantity == PERIOD and not circulates else duration[0]
             decided = duration[2] <= MAX_ERROR * duration[0]
@@ -89,7 +91,7 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
 def answer_exactly(
     exact: RecordedFormulas, columns: NDArray[np.int64], quantity: int, spans: Array, answers: Answers
 ) -> None:
-    """Answer launches of which the spans are known (`fill_orbits`)."""
+    """Call `fill_orbits` for launches whose spans are known."""
     count = 0 if quantity == TURNING_POINTS else None
     nodes = tuple(np.ascontiguousarray(trapezoidal_nodes(kind)[:, :count]) for kind in (LIBRATION, CIRCULATION))
     fill_orbits(exact, columns, quantity, spans, answers, nodes)

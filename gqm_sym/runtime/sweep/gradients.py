@@ -1,7 +1,7 @@
-"""Sweeps with gradients: the values as ever, then the derivatives at the same launches.
+"""Sweeps with gradients: the values as without gradients, then the derivatives at the same launches.
 
-Compiled code has those of periods, turning points and extremes of periodic motions along curves with formulas; for all
-else, and where its digits do not suffice, each launch is solved.
+Compiled code computes those of periods, turning points and extremes of periodic motions along curves with formulas. For
+all other quantities, and if its digits do not suffice, each launch is solved.
 """
 
 from contextlib import suppress
@@ -34,14 +34,14 @@ def sweep_with_gradient(
     solve: Solve,
     wrt: Any,
 ) -> Sweep:
-    """A quantity and its derivatives.
+    """Return a sweep of a quantity with its derivatives.
 
     Parameters
     ----------
     formulas, quantity, launches, parameters, lam, solve
         As for `gqm_sym.runtime.sweep.sweep.sweep`.
     wrt : str or sequence of str
-        What the derivatives are by.
+        The variables of differentiation.
     """
     rows = selected(formulas.parameters, wrt)
     if quantity in LOAD_EXTREMES:
@@ -54,7 +54,7 @@ def sweep_with_gradient(
         np.broadcast_to(as_doubles(v, n), found.status.shape).reshape(-1) for v, n in zip(given, names, strict=True)
     ]
     answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
-    shape = (*found.values.shape[found.status.ndim :], len(rows))  # of turning points one more axis
+    shape = (*found.values.shape[found.status.ndim :], len(rows))  # turning points have one more axis
     gradient, route = np.full((found.status.size, *shape), nan), found.route.reshape(-1)
     is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
     if quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None:

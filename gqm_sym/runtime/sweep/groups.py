@@ -1,4 +1,4 @@
-"""Launches of a sweep on curves of one shape, which share a chart and a table."""
+"""Groups of launches of a sweep on curves of the same shape, which share a chart and a table."""
 
 from collections.abc import Callable, Iterator
 from functools import lru_cache
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
 
-# Into how many pieces a curve with formulas is cut at least before it is tabulated. By which share of itself the range
-# of launch places is extended at first, so that it contains all motions, and how often that is doubled.
+# The smallest number of pieces into which a curve with formulas is cut before it is tabulated; the share by which the
+# range of launch places is first extended in order to contain all motions; and the largest number of times that this
+# share is doubled.
 MIN_PIECES, FIRST_SHARE, MAX_DOUBLINGS = 64, 0.125, 10
 
 # The factors of a potential and a load that are tabulated as a whole.
@@ -35,22 +36,22 @@ _WHOLE = [np.ones(1), np.ones(1)]
 
 
 class Group(NamedTuple):
-    """Launches on curves of one shape, which share a table.
+    """Launches on curves of the same shape, which share a table.
 
     Attributes
     ----------
     columns : list of arrays
         The launches, in the order of `strided`; each array has one number, or one for each launch.
     chart, joints, corners, drops : arrays
-        What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth, or at which pieces of the chart meet, at which its tangent jumps, and at which contact is lost; all are
+        The chart, which compiled code reads after the parameters; and the places within one period at which the curve
+        is not smooth or pieces of the chart meet, at which the tangent jumps, and at which contact is lost. All are
         empty for a curve with formulas.
     table : CurveTable
-        The curve tabulated, where no energy is lost.
+        The table of the curve, if no energy is lost.
     factors : list of arrays
-        What each launch multiplies the parts of potential and load in the table with.
+        The factors of each launch for the parts of potential and load in the table.
     ends : int
-        What both ends of the table, or of the curve where there is none, are (`SweptCurve`).
+        The kind of both ends of the table, or of the curve if there is no table (`SweptCurve`).
     """
 
     columns: list[Array]
@@ -66,9 +67,10 @@ class Group(NamedTuple):
 def groups_of(
     formulas: "Formulas", columns: list[Array], domain: list[Array], shape: tuple[int, ...], only_sign: int
 ) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
-    """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
+    """Return the launches grouped by the shape of their curve, with their indices; None instead of indices if all have
+    the same shape.
 
-    Launches whose curve cannot be made are in no group. Curves with formulas are tabulated if bodies may lift off.
+    Launches whose curve cannot be made belong to no group. Curves with formulas are tabulated if bodies may lift off.
     """
     if formulas.chart is None:
         may_lift_off = only_sign and not formulas.dissipation
@@ -86,7 +88,7 @@ def groups_of(
         try:
             chart = chart_with(formulas.chart, values)
         except GQMError:
-            continue  # `solve` says why
+            continue  # `solve` reports the reason
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         table = NO_TABLE
         if not formulas.dissipation:
@@ -105,7 +107,8 @@ def groups_of(
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:
-    """The run-time parameters, with the chart behind them, that the launches of one group have in common.
+    """Return the indices of the run-time parameters, and of the chart after them, that the launches of one group have
+    in common.
 
     The curve and its table depend on no others; bodies that lose energy are driven with all parameters the same.
     """
@@ -116,7 +119,7 @@ def _held(formulas: "Formulas", count: int) -> list[int]:
 
 
 def _source(formulas: "Formulas") -> Source:
-    """The formulas from which a table of the model's potential and load is made."""
+    """Return the functions from which a table of the model's potential and load is made."""
     terms, mass = formulas.separated, list(formulas.parameters).index("m")
     if terms is None:
         return Source(formulas.functions.addresses(), 0, 1, 1, mass)
@@ -124,7 +127,7 @@ def _source(formulas: "Formulas") -> Source:
 
 
 def rests_on_corner(group: Group) -> NDArray[np.bool_]:
-    """Whether each launch is from rest on a corner, so that it takes the direction of launch."""
+    """Return whether each launch is from rest on a corner, so that the body starts in the direction of launch."""
     lam0, v0, period = group.columns[LAM0].reshape(-1), group.columns[V0].reshape(-1), group.columns[DOMAIN_PERIOD]
     near, found = CORNER_ROUNDINGS * np.spacing(np.abs(lam0)), np.zeros(1, dtype=np.bool_)
     for corner in group.corners if np.any(v0 == 0.0) else ():
@@ -137,9 +140,9 @@ def rests_on_corner(group: Group) -> NDArray[np.bool_]:
 def _tabulated_range(
     formulas: "Formulas", columns: list[Array], domain: list[Array], only_sign: int
 ) -> tuple[CurveTable, int]:
-    """The table of a curve with formulas on the range of all motions, and what its ends are.
+    """Return the table of a curve with formulas over the range of all motions, and the kind of its ends.
 
-    It is empty if launches differ in parameters.
+    The table is empty if launches differ in parameters.
     """
     low, high, period = domain[:3]
     if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
@@ -154,7 +157,8 @@ def _tabulated_range(
     else:
         if not np.isfinite(places).all():
             return NO_TABLE, NO_ENDS
-        # From all launches outwards, until the potential is above the energy of each or none is in contact any more.
+        # The range grows from the launches outwards, until the potential exceeds the energy of each body or no body is
+        # in contact any more.
         fns, closed, reach = formulas.functions.addresses(), 0, [float(places.min()), float(places.max())]
         heights, energies = potential_at(fns, p, places)[0], 0.5 * columns[1] ** 2
         energy = np.array([np.min(heights) + np.min(energies), np.max(heights) + np.max(energies)])
@@ -165,7 +169,7 @@ def _tabulated_range(
                 reach[side] = max(place, limit) if side == 0 else min(place, limit)
                 both = np.repeat(reach[side], 2)
                 v2 = 2.0 * (energy - potential_at(fns, p, both)[0])
-                force = path_and_force_at(fns, p, both, np.maximum(v2, 0.0))[4]  # it is linear in the energy
+                force = path_and_force_at(fns, p, both, np.maximum(v2, 0.0))[4]  # N is linear in the energy
                 if not v2[1] > 0.0 or (only_sign * force < 0.0).all():
                     closed += 1
                     break
@@ -177,16 +181,16 @@ def _tabulated_range(
 
 @lru_cache(maxsize=8)
 def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
-    """The table of a curve with formulas between two places; it is made once for the same parameters.
+    """Return the table of a curve with formulas between two places; it is made once for the same parameters.
 
-    The exact formulas distinguish modules whose functions used the same memory one after the other.
+    The exact formulas distinguish modules whose functions have successively used the same memory.
     """
     pieces = np.linspace(first, last, MIN_PIECES + 1)
     return CurveTable(*tabulate(source, NO_PARTS, np.array(values), pieces))
 
 
 def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:
-    """The function that gives the parts of the potential by coordinates, and perhaps more behind them."""
+    """Return the function that gives the parts of the potential from coordinates, possibly followed by other values."""
     if formulas.separated is not None:
         return formulas.separated.parts
     return formulas.exact.effective_potential if isinstance(formulas.exact, ExactPotential) else None
@@ -201,7 +205,7 @@ def tabulated(
     parameters: int,
     values: tuple[float, ...],
 ) -> CurveTable:
-    """The table of a chart; it is made once for the same parameters. These are followed by functions of them."""
+    """Return the table of a chart; it is made once for the same parameters, which are followed by functions of them."""
     chart, true = chart_with(maker, values), None
     if exact_parts is not None and maker.is_exact(chart):
         p = tuple(read_number(value, where="p") for value in values)
@@ -209,7 +213,7 @@ def tabulated(
             pieces = true_pieces_of(maker, p[:parameters], chart)
             true = pieces and parts_along(pieces, exact_parts, source.potentials, p, (radius, 0.0))
         except GQMError:
-            true = None  # then the table has the digits of the chart
+            true = None  # the table then has the accuracy of the chart
     p_and_chart = np.concatenate([values, chart.block])
     return CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
 
@@ -217,7 +221,9 @@ def tabulated(
 def _distinct(
     columns: list[Array], shape: tuple[int, ...]
 ) -> Iterator[tuple[tuple[float, ...], NDArray[np.intp] | None]]:
-    """The different sets of values that columns have, and which elements have each; None where all have the same."""
+    """Return the different sets of values of columns, each with the elements that have it; None if all elements have
+    the same values.
+    """
     if all(column.size == 1 for column in columns):
         yield tuple(float(column.flat[0]) for column in columns), None
         return
@@ -229,5 +235,5 @@ def _distinct(
 
 
 def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> Array:
-    """Elements of a column, which is broadcast to a shape."""
+    """Return elements of a column that is broadcast to a shape."""
     return column if column.size == 1 else np.broadcast_to(column, shape).reshape(-1)[chosen]

@@ -10,33 +10,36 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS
 
-# Intervals of the first grid, in equal steps of the phase angle, and the factor by which the step shrinks each time
-# that the best point is refined, or grows if a parabola has its vertex beyond it.
+# The number of intervals of the first grid, in equal steps of the phase angle; the factor by which the step shrinks
+# each time that the best point is refined; and the factor by which it grows if the vertex of a parabola lies outside of
+# it.
 GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
 
-# A grid that does not resolve the orbit is followed by one that is so many times as fine, up to so many grids of the
-# first size beside each other.
+# A grid that does not resolve the orbit is followed by one that is finer by this factor, up to so many grids of the
+# first size side by side.
 FINER, MAX_GRIDS = 4, 256
 
-# A grid resolves a function if its mean over every second point is the same up to this share of its range, and for
-# rounding. The mean of the contact force itself converges later than those of the coordinates and of ds, which turn
-# where the curve bends: a bend that is shorter than the grid's steps is seen in these alone.
+# A grid resolves a function if its mean over every second point is the same up to this share of its range, and up to
+# rounding. The mean of the contact force converges later than those of the coordinates and of ds, which vary where the
+# curve bends; only these show a bend that is shorter than the grid's steps.
 MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
 
-# How often the best point is refined at least and at most. In between that ends if the value changes by less than this
-# share of the largest on the grid: its error is far smaller then, because it falls with the fourth power of the step.
+# The smallest and the largest number of refinements of the best point. In between, refinement ends if the value changes
+# by less than this share of the largest on the grid: its error is then far smaller, because it decreases with the
+# fourth power of the step.
 REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
 WIDTH_SHARES = np.sin(0.5 * pi * LAP_SHARES) ** 2
 GRID_POINTS = GRID_INTERVALS + 1
-# What is known of each function on a grid: the sums over all points and over every second one, the least value and the
-# largest. The functions are what is looked for, and beside the contact force x, z and ds.
+# The data of each function on a grid: the sums over all points and over every second one, the smallest value and the
+# largest. The functions are the quantity whose extreme is searched for and, with the contact force, x, z and ds.
 SUM, COARSE_SUM, LEAST, LARGEST = range(4)
 FUNCTIONS, COORDINATES = 4, 3
-# The highest peaks of a grid: the top of the parabola, the point of the grid, and the values before it, at it and after
-# it. Those within this share of the range from the highest are refined, because the grid does not distinguish them.
+# The number of highest peaks of a grid that are kept, and the number of values for each: the top of the parabola, the
+# point of the grid, and the values before, at and after it. Peaks within the third share of the range from the highest
+# are refined, because the grid does not distinguish them.
 PEAKS, PEAK_ROW, TIED = 4, 5, 0.02
 line_buffer, pair_buffer, frame_buffer, point_buffer, sum_buffer, peak_buffer = (
     on_stack(n) for n in (GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, 3, 4 * FUNCTIONS, PEAKS * PEAK_ROW)
@@ -45,11 +48,11 @@ line_buffer, pair_buffer, frame_buffer, point_buffer, sum_buffer, peak_buffer = 
 
 @Inner
 def sample_loads(fns, p, orbit, force, shares, n, out, frame):  # type: ignore[no-untyped-def]
-    """Fill V**2, or the contact force where ``force`` is set, at n shares of an orbit's width from its lower end.
+    """Fill V**2, or the contact force if ``force`` is set, at n shares of an orbit's width from its lower end.
 
-    For the contact force, and only then, ``frame`` is filled with the path.
-    V**2 is its value at launch less what it loses from there. Next to a turning point this has the digits of the
-    largest V**2 on the orbit, not those of the small value itself.
+    For the contact force, and only then, ``frame`` is filled with the path. V**2 is its value at launch less its
+    decrease from there. Next to a turning point its error is a rounding of the largest V**2 on the orbit, not of the
+    small value itself.
     """
     offsets, lam, rows = line_buffer(), line_buffer(), pair_buffer()
     width = orbit.high - orbit.low
@@ -67,7 +70,7 @@ def sample_loads(fns, p, orbit, force, shares, n, out, frame):  # type: ignore[n
 
 @Inner
 def take_in(sums, at, value, weight, is_coarse):  # type: ignore[no-untyped-def]
-    """Add the value of a function at a point of the grid to what is known of it, from the index ``at`` on."""
+    """Add the value of a function at a point of the grid to the function's data, which begin at the index ``at``."""
     sums[at + SUM] += weight * value
     if is_coarse:
         sums[at + COARSE_SUM] += 2.0 * weight * value
@@ -76,7 +79,7 @@ def take_in(sums, at, value, weight, is_coarse):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_resolved(sums, intervals, force):  # type: ignore[no-untyped-def]
-    """Whether a grid of so many intervals resolves what it was laid for."""
+    """Return whether a grid of so many intervals resolves the functions sampled on it."""
     for k in range(FUNCTIONS if force else 1):
         at = k * FUNCTIONS
         share = MAX_FORCE_MEAN_CHANGE if force and k == 0 else MAX_MEAN_CHANGE
@@ -89,7 +92,9 @@ def is_resolved(sums, intervals, force):  # type: ignore[no-untyped-def]
 
 @Inner
 def note_peak(peaks, sign, j, f0, f1, f2):  # type: ignore[no-untyped-def]
-    """Keep the point ``j`` of the grid if its value is between no larger ones, and among the highest so far."""
+    """Keep the point ``j`` of the grid if its value is not exceeded by its neighbours and is among the highest so
+    far.
+    """
     if sign * f1 < max(sign * f0, sign * f2):
         return
     curvature = sign * (f0 - 2.0 * f1 + f2)
@@ -106,7 +111,7 @@ def note_peak(peaks, sign, j, f0, f1, f2):  # type: ignore[no-untyped-def]
 
 @Inner
 def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
-    """Find the highest peaks of a grid, which is ``grids`` of the first size side by side.
+    """Find the highest peaks of a grid that consists of ``grids`` grids of the first size side by side.
 
     A libration passes the grid there and back, so that a turning point has the same neighbour on both sides. In the
     phase angle, any function is even about the end of a curve too.
@@ -140,7 +145,7 @@ def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[
 
 @Inner
 def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-untyped-def]
-    """The value at a peak of a grid with steps of ``step``; NaN where no parabola settles on it."""
+    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it."""
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
     share, value = peak[1] * step, f1
@@ -163,12 +168,12 @@ def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-unt
 
 @Inner
 def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
-    """The largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force where ``force`` is set.
+    """Return the largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force if ``force`` is set.
 
-    Parabolas through three points are laid again and again with a smaller step. At an extreme the function is flat, so
-    its value has all digits as soon as the place has half of them. They are laid through V**2, for V has a kink where
-    the body all but stops. In a well that is even, V is largest in the middle. The value is NaN where the finest grid
-    is too coarse.
+    Parabolas through three points are repeated with smaller and smaller steps. At an extreme the function is flat, so
+    its value is accurate to all digits as soon as the place has half of them. The parabolas are fitted to V**2, because
+    V has a kink where the body almost stops. In an even well, V is largest in the middle. The value is NaN if the
+    finest grid is too coarse.
     """
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
     if meets_turn and not (force or sign > 0.0):

@@ -15,8 +15,8 @@ from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.launch import kinds
 from gqm_sym.runtime.motion.extremes import Extreme
 
-# The quantities that compiled code computes. SPANS is for batches only, on the way to another quantity: the offsets of
-# both turning points from the launch, or for a circulation the length of a lap and NaN.
+# The quantities that compiled code computes. SPANS serves batches only, as a step towards another quantity: the offsets
+# of both turning points from the launch, or for a circulation the length of a lap and NaN.
 HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME, MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE, SPANS, END_TIME = range(
     10
 )
@@ -38,8 +38,8 @@ STATUS_SENTENCES = (
 )
 SPAN_KNOWN = -1
 
-# The route by which a launch was answered, and a name for each: in a batch of orbits side by side, alone in a compiled
-# loop, or solved as `solve` does it.
+# The route by which a launch was answered, and a name for each: in a batch of orbits, alone in a compiled loop, or
+# solved as by `solve`.
 BATCH, SINGLE, SOLVE = range(3)
 ROUTES = ("batch", "single", "solve")
 
@@ -52,7 +52,7 @@ class Answers(NamedTuple):
     route: NDArray[np.int8]
 
     def part(self, which: Any) -> "Answers":
-        """The same of some of the launches: views for a slice, copies for indices."""
+        """Return the answers of some of the launches: views for a slice, copies for indices."""
         return Answers(self.values[which], self.status[which], self.route[which])
 
     def put(self, which: Any, some: "Answers") -> None:
@@ -71,9 +71,9 @@ class Quantity(NamedTuple):
     code : int
         The number of the quantity in compiled code, or NOT_COMPILED.
     width : int
-        The number of numbers compiled code fills in for each launch.
+        The number of values that compiled code fills in for each launch.
     columns : slice or int
-        Which of these numbers are the quantity; a slice gives the values one more axis.
+        The columns of these values that are the quantity; a slice gives the result one more axis.
     of_motion : callable
         ``of_motion(motion, lam)`` is the quantity of one solved motion.
     """
@@ -85,7 +85,9 @@ class Quantity(NamedTuple):
 
 
 def _number(name: str) -> Callable[[Any, Any], float]:
-    """A quantity that is an attribute of a motion, NaN where it is infinite; or the value of an extreme."""
+    """Return a function for a quantity that is an attribute of a motion or the value of an extreme; NaN if it is
+    infinite.
+    """
 
     def of_motion(motion: Any, _: Any) -> float:
         found = getattr(motion, name)

@@ -13,13 +13,13 @@ from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.motion.rows import table, text_table
 from gqm_sym.runtime.sweep.quantities import ROUTES, STATUS_SENTENCES
 
-# What public names of earlier versions are called now.
+# The present names of attributes that earlier versions had.
 RENAMED = {"reasons": "status", "why": "status_counts()"}
 
-# The unit of whatever is a value of the curve's parameter: that of the launch place.
+# The unit of all values of the curve's parameter, which is that of the launch place.
 PLACE = "lam0"
 
-# What each column holds, and the unit of it.
+# The description of each column, and its unit.
 DESCRIBED = {
     "half_period": ("time from one turning point to the other", "s"),
     "period": ("time after which the motion repeats", "s"),
@@ -44,12 +44,12 @@ DESCRIBED = {
     "lam": ("place asked about, as a value of the curve's parameter", PLACE),
 }
 
-# The most rows that a printed sweep or its table in a notebook shows.
+# The largest number of rows that a printed sweep or its table in a notebook shows.
 MAX_ROWS_SHOWN = 10
 
 
 class SweepArrays(NamedTuple):
-    """The arrays of a sweep, of which those of its parts are concatenated."""
+    """The arrays of a sweep; those of its parts are concatenated."""
 
     values: Array
     status: NDArray[np.int8]
@@ -71,7 +71,7 @@ class Sweep(SweepArrays):
         has one more axis of length 2, for the lower and the upper one.
     status : int8 array
         0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
-        sentences, which stand in `quantities.STATUS_SENTENCES`.
+        sentences, which are those of `quantities.STATUS_SENTENCES`.
     route : int8 array
         How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits; 1 "single",
         alone in a compiled loop; 2 "solve", solved as by ``solve``. The route affects the time that a launch takes, and
@@ -136,14 +136,14 @@ class Sweep(SweepArrays):
         return sweep_dataset(self)
 
     def _rows(self) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """The titles and the first rows of the table that is shown."""
+        """Return the titles and the first rows of the table that is shown."""
         columns = columns_of(self)
         units = {name: unit for name, (_, unit) in DESCRIBED.items() if unit not in ("", PLACE)}
         titles = [f"{name} ({units[name]})" if name in units else name for name in columns]
         return titles, list(zip(*(column[:MAX_ROWS_SHOWN].tolist() for column in columns.values()), strict=True))
 
     def _summary(self) -> str:
-        """One line about the sweep as a whole."""
+        """Return one line about the sweep as a whole."""
         size = prod(self.status.shape)
         missing = "; ".join(f"{count} without a value: {why}" for why, count in self.status_counts().items())
         fixed = ", ".join(f"{name} = {value}" for name, value in self.arguments.items() if not np.ndim(value))
@@ -151,7 +151,7 @@ class Sweep(SweepArrays):
         return "; ".join([f"{self.quantity or 'values'} of {launches}", *([missing] if missing else [])])
 
     def __str__(self) -> str:
-        """One line about the sweep, and its first rows."""
+        """Return one line about the sweep, and its first rows."""
         titles, rows = self._rows()
         hidden = self.status.size - len(rows)
         end = [f"  ... and {hidden} more"] if hidden else []
@@ -167,7 +167,7 @@ class Sweep(SweepArrays):
         return self.values.astype(dtype or self.values.dtype, copy=bool(copy))
 
     def __getattr__(self, name: str) -> Any:
-        """Say what an attribute of an earlier version is called now.
+        """Raise an error that gives the present name of an attribute of an earlier version.
 
         Raises
         ------
@@ -179,7 +179,7 @@ class Sweep(SweepArrays):
 
 
 def told(sweep: Sweep, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
-    """The same values with the quantity and the launches that they belong to."""
+    """Return the same values with the quantity and the launches to which they belong."""
     out = Sweep(*sweep)
     out.quantity, out.gradient = quantity, sweep.gradient
     out.arguments = {name: value for name, value in arguments.items() if value is not None}
@@ -187,7 +187,9 @@ def told(sweep: Sweep, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
 
 
 def columns_of(sweep: Sweep) -> dict[str, Any]:
-    """Each argument that is an array, the values and the status, as one-dimensional arrays of equal length by name."""
+    """Return each argument that is an array, the values and the status, as one-dimensional arrays of equal length by
+    name.
+    """
     shape = sweep.status.shape
     varied = {name: value for name, value in sweep.arguments.items() if np.ndim(value)}
     columns = {name: np.broadcast_to(np.asarray(value), shape).reshape(-1) for name, value in varied.items()}

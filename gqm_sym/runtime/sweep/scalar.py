@@ -1,7 +1,7 @@
 """One quantity for each of many launches, in one compiled loop over the launches.
 
-The loop answers the launches that batches leave, in doubles and without tables. An orbit that doubles cannot decide,
-or whose time they cannot give to the last places, stays undecided, and `sweep` solves it by itself.
+The loop answers the launches that batches leave, in doubles and without tables. An orbit that doubles cannot decide, or
+whose time is not accurate to the last places, stays undecided, and `sweep` solves it separately.
 """
 
 from math import inf, isfinite, nan
@@ -72,7 +72,7 @@ from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_slacks
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
-# What only motions have that repeat themselves.
+# The quantities that only motions that repeat have.
 PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
 
 
@@ -82,25 +82,25 @@ class GivenCurve(NamedTuple):
     Attributes
     ----------
     parameters : array
-        A buffer for the parameters of one launch, and behind it the chart if the curve has one.
+        A buffer for the parameters of one launch, followed by the chart if the curve has one.
     joints : array
         The places at which the curve is not smooth, within one period.
     table : CurveTable
-        The curve tabulated; empty if it is not.
+        The table of the curve; empty if it is not tabulated.
     factor_columns : (n, 2) array
-        For each part of its potential and load the factors of the launches, as `strided.pointers` gives them.
+        For each part of the potential and the load, the factors of the launches, as `strided.pointers` gives them.
     factors, rows, levels : arrays
-        Buffers for what `SweptCurve` has under these names; the levels are 0.
+        Buffers for the attributes of `SweptCurve` with these names; the levels are 0.
     mass : int
-        Which run-time parameter is the mass of the body.
+        The index of the mass of the body among the run-time parameters.
     ends : int
-        What both ends of the table are (`SweptCurve`).
+        The kind of both ends of the table (`SweptCurve`).
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
         The last time in s, infinite if there is none; only END_TIME depends on it.
     exact : RecordedFormulas
-        The formulas as a tape; none at first, for few launches need it.
+        The formulas as a tape; empty at first, because few launches need it.
     """
 
     parameters: Array
@@ -124,7 +124,7 @@ GIVEN = types.NamedTuple(
 
 
 class Buffers(NamedTuple):
-    """Work space: for the trapezoidal rule (``work``, ``series``), and V**2/2 at the edges of panels."""
+    """Work space for the trapezoidal rule (``work``, ``series``), and for V**2/2 at the edges of panels."""
 
     work: Any
     series: Any
@@ -133,7 +133,7 @@ class Buffers(NamedTuple):
 
 @Inner
 def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignore[no-untyped-def]
-    """The orbit of a body that leaves the curve; `Orbit.leaves` is 0 where it stays, or where that is not certain."""
+    """Return the orbit of a body that leaves the curve; `Orbit.leaves` is 0 if it stays, or if that is not certain."""
     last, turn = (ahead, 0.0) if ahead.what == LIMIT else (behind, ahead.near)
     end, leaves = last.near, direction if ahead.what == LIMIT else -direction
     none = Orbit(False, False, direction, lam0, v2, 0.0, 0.0, 0)
@@ -152,9 +152,10 @@ def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignor
 
 @Inlined
 def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
-    """The status of launch k, ANSWERED where it has an orbit, that orbit, and the panels that it passes in a table.
+    """Return the status of launch k, which is ANSWERED if it has an orbit, this orbit, and the panels that it passes in
+    a table.
 
-    The orbit's span is looked up where ``known``.
+    The orbit's span is taken from ``spans`` if it is ``known``.
     """
     lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
     first, last, period = (
@@ -198,7 +199,9 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
 
 @Inner
 def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
-    """The half period of a libration, or the time of a circulation's lap; NaN where doubles cannot give it."""
+    """Return the half period of a libration, or the time of a circulation's lap; NaN if it is not accurate in
+    doubles.
+    """
     kind, width = LIBRATION, orbit.high - orbit.low
     a, b = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
     if orbit.circulates:
@@ -213,19 +216,19 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 
 @Inner
 def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: ignore[no-untyped-def]
-    """The half period or lap time, the arrival or an extreme on a tabulated curve; NaN where that is not accurate."""
+    """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
     if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
         return passage_extreme(curve, orbit, passage, slacks, force, sign)
     low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
     if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
-        return nan  # the orbit itself has more digits than a part of a panel
+        return nan  # the orbit computed without the table is more accurate than a part of a panel
     return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
 
 @Inner
 def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """The same without a table."""
+    """Return the same as `value_from_table`, without a table."""
     if quantity in (HALF_PERIOD, PERIOD):
         return orbit_time(curve, orbit)
     if quantity == ARRIVAL_TIME:
@@ -239,7 +242,9 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
 
 @Inner
 def value_in_parts(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """A time where V**2 all but vanishes on the way; NaN where that is not accurate, or not at hand."""
+    """Return a time on an orbit on which V**2 almost vanishes; NaN if it is not accurate, or if this method does not
+    apply.
+    """
     if curve.exact.work.size == 0 or quantity not in (HALF_PERIOD, PERIOD, ARRIVAL_TIME):
         return nan
     low, high = orbit.low, orbit.high
@@ -254,7 +259,9 @@ def value_in_parts(curve, orbit, quantity, target, buffers):  # type: ignore[no-
 
 @Inner
 def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """A number of an orbit in the first way that is accurate: on the table, without it, in parts; NaN if none is."""
+    """Return a quantity of an orbit by the first method that is accurate: on the table, without it, or in parts; NaN if
+    none is.
+    """
     value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks) if tabulated else nan
     if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
         value = time_on_panel_of_both(curve, passage)
@@ -268,9 +275,9 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
 
 @Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
-    """Fill the row ``out`` with a quantity of an orbit; returns the status, SPAN_KNOWN of SPANS.
+    """Fill the row ``out`` with a quantity of an orbit; return the status, which is SPAN_KNOWN for SPANS.
 
-    ``asked`` is the quantity, the place of ARRIVAL_TIME, and side and last time as `GivenCurve` has them.
+    ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side and the last time as in `GivenCurve`.
     """
     (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
     by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
@@ -280,7 +287,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
         place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 and tabulated else nan
-        if side != 0 and not tabulated:  # as a small swing: it keeps contact if its least force is one of the track
+        if side != 0 and not tabulated:  # a small swing keeps contact if the track pushes at the extreme force
             least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
             if orbit.leaves != 0 or not side * least > 0.0:
                 return UNDECIDED
@@ -317,7 +324,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     nogil=True,
 )
 def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given):  # type: ignore[no-untyped-def]
-    """Answer each launch whose status is UNDECIDED or SPAN_KNOWN so far, as far as doubles decide it.
+    """Fill the answer of each launch whose status is UNDECIDED or SPAN_KNOWN so far, if doubles decide it.
 
     Parameters
     ----------
@@ -330,11 +337,11 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     quantity : int
         One of HALF_PERIOD to END_TIME.
     spans : (n, 2) array
-        For each launch of status SPAN_KNOWN what batches answered to SPANS.
+        For each launch of status SPAN_KNOWN, the answer of batches to SPANS.
     answers : Answers
         Filled in: both turning points or spans, or one number in the first column.
     given : GivenCurve
-        What all launches share.
+        The data that all launches share.
     """
     panels, count = given.levels.size, given.factors.size
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(panels + 1))

@@ -1,8 +1,9 @@
-"""The time between two places of an orbit on which V**2 all but vanishes, where a body just passes a hilltop.
+"""The time between two places of an orbit on which V**2 almost vanishes, because the body only just passes a hilltop.
 
-There V**2 is a small difference of large terms. The way is cut into parts, each of which begins where V**2 is smallest
-around. There V**2 and the slope of the potential are found in double-double arithmetic, from the module's formulas as a
-tape. From there V**2 only grows, by second divided differences in doubles, so that nothing cancels.
+Near a hilltop V**2 is a small difference of large terms. The orbit is cut into parts, each of which begins at a local
+minimum of V**2. There V**2 and the slope of the potential are found in double-double arithmetic, from the module's
+formulas as a tape. From there on V**2 only grows; its growth is found from second divided differences in doubles, so
+that nothing cancels.
 """
 
 from math import fabs, nan, sqrt
@@ -24,15 +25,18 @@ from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_a
 from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.orbit_extremes import GRID_INTERVALS, GRID_POINTS, WIDTH_SHARES, sample_loads
 
-# The least V**2 between turning points, as a share of the largest, from which its place and times are accurate.
+# The smallest V**2 between turning points for which its place and times are accurate, as a share of the largest V**2.
 MIN_V2_SHARE = 1e-9
 
-# The most parts of a way, and how often the interval of the grid in which V**2 is smallest is halved.
+# The largest number of parts of an orbit, and the number of times that the interval of the grid in which V**2 is
+# smallest is halved.
 MAX_PARTS, HALVINGS = 16, 36
 
 
 class RecordedFormulas(NamedTuple):
-    """A module's formulas as a tape, with registers and parameters (`recording.BoundTape`); no registers: no tape."""
+    """A module's formulas as a tape, with registers and parameters (`recording.BoundTape`). If there are no registers,
+    there is no tape.
+    """
 
     tape: Any
     work: Any
@@ -67,7 +71,7 @@ def fill_exactly(curve, lam0, places, count, v2, slopes):  # type: ignore[no-unt
 
 @Inner
 def slope_at(curve, place):  # type: ignore[no-untyped-def]
-    """The slope of the effective potential at a place."""
+    """Return the slope of the effective potential at a place."""
     point = point_buffer()
     point[0] = place
     call_effective_potential(curve.fns.effective_potential, 1, point, curve.p, point[1:])
@@ -76,7 +80,7 @@ def slope_at(curve, place):  # type: ignore[no-untyped-def]
 
 @Inner
 def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
-    """The place between two others at which the potential stops rising."""
+    """Return the place between two others at which the potential stops rising."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         if slope_at(curve, middle) > 0.0:
@@ -88,7 +92,9 @@ def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
 
 @Inner
 def rate_at(curve, orbit, place):  # type: ignore[no-untyped-def]
-    """Return the time per unit of the parameter where V**2 does not vanish; 0 if doubles do not resolve it."""
+    """Return the time per unit of the parameter at a place where V**2 does not vanish; 0 if doubles do not resolve
+    it.
+    """
     point = point_buffer()
     point[0], point[1] = place, place - orbit.lam0
     call_potential_divdiff1(curve.fns.potential_divdiff1, 1, orbit.lam0, point[:1], point[1:2], curve.p, point[2:])
@@ -98,7 +104,7 @@ def rate_at(curve, orbit, place):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_steep(curve, turn, place, slope):  # type: ignore[no-untyped-def]
-    """Whether the potential falls from a turning point so steeply that its divided differences do not cancel."""
+    """Return whether the potential falls from a turning point so steeply that its divided differences do not cancel."""
     point = point_buffer()
     point[0], point[1] = place, place - turn
     call_potential_divdiff1(curve.fns.potential_divdiff1, 1, turn, point[:1], point[1:2], curve.p, point[2:])
@@ -107,7 +113,7 @@ def is_steep(curve, turn, place, slope):  # type: ignore[no-untyped-def]
 
 @Inner
 def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
-    """The time that the body takes from one place of its orbit to a higher one; NaN where it is not accurate.
+    """Return the time that the body takes from one place of its orbit to a higher one; NaN if it is not accurate.
 
     Parameters
     ----------
@@ -118,7 +124,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
     ends : (float, float)
         The offsets of both places from the launch.
     turns : (bool, bool)
-        Which of them are turning points.
+        Whether each of them is a turning point.
     """
     fns, p, none, last = curve.fns, curve.p, curve.joints[:0], GRID_INTERVALS
     (begin, end), lam0 = ends, orbit.lam0
@@ -128,7 +134,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
     slowest, slopes = place_buffer(), place_buffer()
     way = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
     sample_loads(fns, p, way, False, WIDTH_SHARES, GRID_POINTS, v2, v2)
-    # The places with their roundings; those in between are doubles.
+    # The ends are known with their rounding errors; the places in between are doubles.
     (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
     count, peak, at_peak, largest = 0, -1.0, 0, 0.0
     for i in range(GRID_POINTS):
@@ -172,7 +178,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
 
 @Inner
 def turns_at(orbit):  # type: ignore[no-untyped-def]
-    """Whether the lower and the upper end of an orbit are turning points that the body comes to."""
+    """Return whether the lower and the upper end of an orbit are turning points that the body reaches."""
     if orbit.leaves == 0:
         return not orbit.circulates, not orbit.circulates
     turns = orbit.v2 == 0.0 or orbit.leaves != orbit.direction
@@ -181,9 +187,10 @@ def turns_at(orbit):  # type: ignore[no-untyped-def]
 
 @Inner
 def passing_time(curve, orbit, place):  # type: ignore[no-untyped-def]
-    """The first time at ``place``, or for NaN that of half a period, of a lap or until the body leaves; NaN if unsure.
+    """Return the first time at ``place`` or, if that is NaN, the time of half a period, of a lap or until the body
+    leaves; NaN if it is not certain.
 
-    The orbit's turning points have all digits, and the body comes to the place.
+    The orbit's turning points must be accurate to all digits, and the body must reach the place.
     """
     low, high, direction, turns = orbit.low, orbit.high, orbit.direction, turns_at(orbit)
     if place != place and orbit.leaves == 0:

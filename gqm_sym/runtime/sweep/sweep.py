@@ -1,7 +1,7 @@
 """One quantity over arrays of launches and parameters.
 
-Most orbits are answered side by side in batches, others by a compiled loop over single launches (`scalar`); those that
-both leave undecided are solved one by one, as `solve` does it.
+Most orbits are computed side by side in batches, others by a compiled loop over single launches (`scalar`). Those that
+both leave undecided are solved one by one, as by `solve`.
 """
 
 from collections.abc import Callable
@@ -37,16 +37,17 @@ from gqm_sym.runtime.sweep.tables.panel_forces import ROW
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
-# From how many launches on a thread is worth starting, and how many are laid out at a time.
+# The number of launches from which on a thread is worth starting, and the number of launches that are laid out at a
+# time.
 MIN_LAUNCHES_PER_THREAD, CHUNK = 2**11, 2**16
 
-# The motion of one launch with given parameters.
+# The type of a function that returns the motion of one launch with given parameters.
 Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
-# Quantities that are answered by batches themselves; for others batches find the span of an orbit.
+# Quantities that batches compute themselves; for others they find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
-# Quantities that are found from a tape of the formulas where doubles do not suffice.
+# Quantities that are found from a tape of the formulas if doubles do not suffice.
 FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME)
 
 
@@ -58,7 +59,8 @@ def sweep(
     lam: Any,
     solve: Solve,
 ) -> Sweep:
-    """One quantity of the motion of each launch; all arguments but contact and t_max broadcast against each other.
+    """Compute one quantity of the motion of each launch; all arguments except contact and t_max broadcast against each
+    other.
 
     Parameters
     ----------
@@ -71,16 +73,16 @@ def sweep(
     parameters : tuple
         A number or an array for each run-time parameter.
     lam : number or array, optional
-        The place that "time_at" asks about.
+        The place for "time_at".
     solve : callable
         ``solve(request, parameters)`` is the motion of one launch.
 
     Raises
     ------
     InputError
-        If the quantity, the contact or ``lam`` cannot be, shapes do not broadcast, or a launch is impossible.
+        If the quantity, the contact or ``lam`` is not valid, shapes do not broadcast, or a launch is impossible.
     ParameterError
-        If a parameter is missing or outside of what the closed forms hold for.
+        If a parameter is missing, or outside of the range in which the closed forms hold.
     """
     lam0, v0, direction, _, t_max, contact = launches
     found = QUANTITIES[one_of(quantity, tuple(QUANTITIES), where="quantity")]
@@ -134,11 +136,11 @@ def sweep(
 
 
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
-    """Whether compiled loops answer most launches.
+    """Return whether compiled loops can compute the quantity for most launches.
 
-    They do not do so for motions that lose energy, and for motions with a last time they know only the end. The grid on
-    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere,
-    and they do not distinguish the sides of a space curve.
+    They cannot for motions that lose energy, and for motions with a last time they compute only the end. The grid on
+    which they search for extremes is too coarse for the length of a vector, which may be almost zero somewhere, and
+    they do not distinguish the sides of a space curve.
     """
     of_force = quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE)
     if not formulas.signed and (of_force or ONLY_SIGN[contact]):
@@ -148,9 +150,9 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, con
 
 
 class Asked(NamedTuple):
-    """The question for all launches: the code of a quantity, and side and last time in the form of `GivenCurve`.
+    """The question for all launches: the code of a quantity, and the side and the last time as in `GivenCurve`.
 
-    ``lows`` is by how much each run-time parameter differs from its double, 0 of those that are arrays.
+    ``lows`` are the differences of the run-time parameters from their doubles; they are 0 for arrays.
     """
 
     code: int
@@ -160,7 +162,7 @@ class Asked(NamedTuple):
 
 
 def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, part: slice) -> None:
-    """Answer a part of a group of launches by compiled loops, as far as they decide them."""
+    """Fill the answers of a part of a group of launches by compiled loops, as far as these decide them."""
     columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
     mass = list(formulas.parameters).index("m")
     code, batches = asked.code, formulas.batch if asked.side == 0 and asked.code != quantities.END_TIME else None
@@ -192,7 +194,9 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
 
 
 def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:
-    """The formulas of a curve as a tape, with registers of its own; none of a chart, or where they are too long."""
+    """Return the formulas of a curve as a tape with its own registers; an empty tape for a chart, or if they are too
+    long.
+    """
     exact, domain, count = formulas.exact, formulas.domain_of, lows.size
     recorded = record(exact, domain, count) if isinstance(exact, ExactFormulas) and domain is not None else None
     if recorded is None:
@@ -202,7 +206,7 @@ def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:
 
 
 def _rounded_off(formulas: "Formulas", parameters: tuple[Any, ...]) -> Array:
-    """By how much each run-time parameter differs from its double, 0 of those that are arrays."""
+    """Return the differences of the run-time parameters from their doubles, which are 0 for arrays."""
     lows = np.zeros(len(parameters))
     for k, (name, value) in enumerate(zip(formulas.parameters, parameters, strict=True)):
         if isinstance(value, (str, Number)):
@@ -217,7 +221,7 @@ def _solved(
     t_max: Any,
     contact: str,
 ) -> tuple[Any, int]:
-    """The quantity of one launch that is solved by itself, and its status."""
+    """Return the quantity of one launch that is solved separately, and its status."""
     lam0, v0, direction, place, *parameters = here
     try:
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, t_max, contact), tuple(parameters))

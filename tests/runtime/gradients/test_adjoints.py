@@ -8,7 +8,8 @@ from mpmath import mp, mpf
 
 from gqm_sym.runtime.double_double.recording import Recorder
 from gqm_sym.runtime.gradients.adjoints import gradient
-from gqm_sym.runtime.gradients.orbit import pairs, values
+from gqm_sym.runtime.gradients.evaluation import values
+from gqm_sym.runtime.gradients.orbit import pairs
 from gqm_sym.runtime.gradients.programs import assemble
 
 # Each for places between 1.1 and 1.9, and a parameter of 1.4.

@@ -9,8 +9,8 @@ from paths import ROOT
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
+from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
-from gqm_sym.runtime.gradients.orbit import values
 
 ULP = 2.0**-52
 
@@ -48,7 +48,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     direction = motion.direction if motion.kind == "circulation" else 0
     fast, slow = (
         motion._derivatives,
-        FormulaOrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
+        FormulaOrbitDerivatives(motion.problem, None, direction, motion._offsets, lambda: motion._segment.edges),
     )
     assert fast._means[2]
     assert not slow._means[2]

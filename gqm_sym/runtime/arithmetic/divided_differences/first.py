@@ -146,7 +146,7 @@ def root_beyond(x):  # type: ignore[no-untyped-def]
 
 @Inner
 def one_less_product(x, y):  # type: ignore[no-untyped-def]
-    """1 - xy with all its digits, |x| and |y| at most 1."""
+    """Return 1 - xy with all its digits, for |x| <= 1 and |y| <= 1."""
     return (1.0 - x) + x * (1.0 - y) if x + y > 0.0 else (1.0 + x) - x * (1.0 + y)
 
 
@@ -198,7 +198,7 @@ def divdiff1_atanh(x, y, h):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff1_abs(x, y, h):  # type: ignore[no-untyped-def]
-    """|u|[x,y]: 1 or -1 where the points have one sign, else (x+y)/|h|."""
+    """|u|[x,y]: 1 or -1 if the points have the same sign, else (x+y)/|h|."""
     if min(x, y) >= 0.0:
         return 1.0
     return -1.0 if max(x, y) <= 0.0 else (x + y) / fabs(h)
@@ -214,7 +214,7 @@ def divdiff1_ipow(x, y, h, n):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff1_ipow_sum(x, y, n):  # type: ignore[no-untyped-def]
-    """The sum of x**i y**j over i+j = n-1, by (u**(k+1))[x,y] = y (u**k)[x,y] + x**k."""
+    """Return the sum of x**i y**j over i+j = n-1, by (u**(k+1))[x,y] = y (u**k)[x,y] + x**k."""
     first, value = 0.0, 1.0
     for _ in range(n):
         first = first * y + value

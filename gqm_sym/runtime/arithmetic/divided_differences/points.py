@@ -1,4 +1,4 @@
-"""Three points in any order, and even series over two arguments: what second divided differences are made of."""
+"""Helpers of second divided differences: three points in any order, and even series over two arguments."""
 
 from math import fabs
 
@@ -8,19 +8,20 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 @Inlined
 def series_pair(c, s, t):  # type: ignore[no-untyped-def]
-    """The polynomial's values at s and t, added, and its divided difference [s,t]."""
+    """Return the sum of a polynomial's values at s and t, and its divided difference [s,t]."""
     value, slope = polynomial_pair(c, s, t)
     return fma(s - t, slope, 2.0 * value), slope
 
 
 @Inner
 def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """The points in ascending order and the two gaps between them."""
+    """Return the points in ascending order and the two gaps between them."""
     if h1 >= 0.0 and h2 >= 0.0:
         return x, y, w, h1, h2
     if h1 <= 0.0 and h2 <= 0.0:
         return w, y, x, -h2, -h1
-    # y is an end. The gap between x and w comes from those two if they are small against the gaps.
+    # Here y is the lowest or the highest point. The gap between x and w is w - x if x and w are small compared with the
+    # gaps.
     rest = h1 + h2 if fabs(h1) <= fabs(x) + fabs(w) else w - x
     if h1 > 0.0:
         return (x, w, y, rest, -h2) if rest >= 0.0 else (w, x, y, -rest, h1)
@@ -35,7 +36,8 @@ def around(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """
     y_between = h1 * h2 >= 0.0
     x_between, w_between = (not y_between) & (fabs(h1) < fabs(h2)), (not y_between) & (fabs(h1) >= fabs(h2))
-    # Where y is an end, the gap between x and w comes from those two if they are small against the gaps.
+    # If y is the lowest or the highest point, the gap between x and w is w - x if these are small compared with the
+    # gaps.
     rest = choose(fabs(h1) <= fabs(x) + fabs(w), h1 + h2, w - x)
     return (
         *(x, choose(w_between, w, y), choose(w_between, rest, h1)),

@@ -1,18 +1,17 @@
 """Second divided differences of the elementary functions, without subtracting nearly equal numbers.
 
-``divdiff2_f(x, y, w, h1, h2)`` is ``f[x,y,w]``, the points in any order, coincident or not. The gaps
-``h1 = y - x`` and ``h2 = w - y`` are trusted to their last digit and never formed again from the
-points (MATHS, section 3).
+``divdiff2_f(x, y, w, h1, h2)`` is ``f[x,y,w]``. The points may have any order and may coincide. The gaps ``h1 = y - x``
+and ``h2 = w - y`` are trusted to their last digit and never formed again from the points (MATHS, section 3).
 
-Points near each other have a closed form, good in any order: the sum of two products of
-well-conditioned numbers, one of which holds a divided difference of an even series.
+For points near each other there is a closed form that holds in any order: the sum of two products of well-conditioned
+numbers, one of which is a divided difference of an even series.
 
 - sin, cos, sinh, cosh, exp, tan, tanh take it from `trigonometric.symmetric_parts`;
 - log, atan, asin, acos, asinh, acosh, atanh from `divdiff2_of_quotients`: their differences are the atanh or
   the atan of a quotient.
 
-Farther points are sorted, and ``(f[b,c] - f[a,b])/(c - a)`` does no harm. Roots, whole powers and
-the absolute value have closed forms everywhere; real powers of near points take quadrature.
+Points farther apart are sorted; there ``(f[b,c] - f[a,b])/(c - a)`` loses no digits. Roots, integer powers and the
+absolute value have closed forms everywhere; real powers of points near each other are found by quadrature.
 """
 
 from math import fabs
@@ -43,7 +42,8 @@ NEAR_SQUARE = 1.0 / 9.0
 # Coefficients of atanh(t)/t in t**2, highest power first.
 ATANH_SERIES = tuple(1.0 / (2 * k + 1) for k in reversed(range(17)))
 
-# Gauss-Legendre on [0, 1], weights times the place: to the last digit for powers on [x, 2x].
+# The Gauss-Legendre rule on [0, 1], whose weights are multiplied by the node. It is exact to the last digit for powers
+# on [x, 2x].
 _LEGENDRE = np.polynomial.legendre.leggauss(12)
 NODES = tuple(float(0.5 + 0.5 * t) for t in _LEGENDRE[0])
 WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, strict=True))
@@ -51,7 +51,7 @@ WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, str
 
 @Inner
 def quotients_are_small(h1, h2, p, q):  # type: ignore[no-untyped-def]
-    """Whether `divdiff2_of_quotients` may be used: r1 = h1/P and r2 = h2/Q are small."""
+    """Return whether `divdiff2_of_quotients` may be used: r1 = h1/P and r2 = h2/Q are small."""
     return h1 * h1 <= NEAR_SQUARE * p * p and h2 * h2 <= NEAR_SQUARE * q * q
 
 
@@ -144,7 +144,7 @@ def divdiff2_atanh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff2_abs(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """|u|[x,y,w]: 0 where the points have one sign, otherwise from the point with the other sign."""
+    """|u|[x,y,w]: 0 if all points have the same sign, otherwise computed from the point whose sign differs."""
     a, b, c, u, v = ordered(x, y, w, h1, h2)
     if a >= 0.0 or c <= 0.0:
         return 0.0
@@ -162,7 +162,7 @@ def divdiff2_ipow(x, y, w, h1, h2, n):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff2_ipow_sum(x, y, w, n):  # type: ignore[no-untyped-def]
-    """The sum of x**i y**j w**k, i+j+k = n-2: (u**(k+1))[x,y,w] = w (u**k)[x,y,w] + (u**k)[x,y]."""
+    """Return the sum of x**i y**j w**k, i+j+k = n-2: (u**(k+1))[x,y,w] = w (u**k)[x,y,w] + (u**k)[x,y]."""
     second, first, value = 0.0, 0.0, 1.0
     for _ in range(n):
         second = second * w + first
@@ -189,7 +189,7 @@ def divdiff2_rpow(x, y, w, h1, h2, p):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff2_rpow_far(a, b, c, u, v, p):  # type: ignore[no-untyped-def]
-    """(u**p)[a,b,c] of sorted points far apart; where p may be near 1, as u times u**(p-1)."""
+    """(u**p)[a,b,c] of sorted points far apart; for p >= 0.5, which may be near 1, from u times u**(p-1)."""
     if p < 0.5:
         return (divdiff1_rpow(b, c, v, p) - divdiff1_rpow(a, b, u, p)) / (u + v)
     return (c * divdiff1_rpow(b, c, v, p - 1.0) - a * divdiff1_rpow(a, b, u, p - 1.0)) / (u + v)

@@ -1,9 +1,9 @@
 """Second divided differences of sin, cos, sinh, cosh, exp, tan and tanh.
 
-As in `second`, near points have a closed form, here by `symmetric_parts`, and farther ones take the difference of two
-first differences. For sin, cos, sinh and cosh both values are computed and one is chosen, so that a loop over them
-fills vector registers. ``divdiff2_sin_near`` and its like are the closed forms alone: they are NaN for points too far
-apart.
+As in `second`, there is a closed form for points near each other, here by `symmetric_parts`, and for others the
+difference of two first differences is taken. For sin, cos, sinh and cosh both values are computed and one is chosen, so
+that a loop over them fills vector registers. ``divdiff2_sin_near`` and its like are the closed forms alone: they are
+NaN for points too far apart.
 """
 
 from math import fabs, factorial, nan
@@ -35,12 +35,12 @@ def _even(shift: int, terms: int) -> tuple[float, ...]:
     return tuple((-1.0) ** k / factorial(2 * k + shift) for k in reversed(range(terms)))
 
 
-# sinc, and sinc and cosine of half the argument: cut for NEAR, and for WIDE.
+# The series of sinc, and of sinc and cosine of half the argument, with as many terms as NEAR and WIDE require.
 NEAR_SERIES = (_even(1, 10), _even(1, 8), _even(0, 9))
 WIDE_SERIES = (_even(1, 16), _even(1, 12), _even(0, 12))
 
-# sinc in the square of its argument, highest power first: the polynomial through its values at Chebyshev's nodes for
-# arguments up to WIDE, rounded; off by less than 3e-17.
+# sinc as a polynomial in the square of its argument, highest power first. It interpolates at Chebyshev nodes for
+# arguments up to WIDE, and its error with rounded coefficients is below 3e-17.
 SINC = (
     -3.4909674184529875e-23,
     1.947320408026163e-20,
@@ -59,7 +59,7 @@ SINC = (
 
 @Inlined
 def symmetric_parts(h1, h2, sign, sums):  # type: ignore[no-untyped-def]
-    """The parts A and B of a second difference that are even and odd when the gaps h1 and h2 are swapped.
+    """Return the parts A and B of a second difference that are even and odd when the gaps h1 and h2 are swapped.
 
     A = S(H/2)*(S(h1) + S(h2))/2 and B = C(H/2)*(h2 - h1)*S~[h1**2, h2**2], with H = h1 + h2 and S~(t**2) = S(t). S and
     C are sinc and cosine (``sign`` 1) or their hyperbolic counterparts (``sign`` -1), and ``sums`` are their series
@@ -164,7 +164,7 @@ def divdiff2_cosh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 
 @Inner
 def divdiff2_exp(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """exp[x,y,w] = exp(M) (A + B)/2; far points share the factor exp(w)."""
+    """exp[x,y,w] = exp(M) (A + B)/2; points far apart share the factor exp(w)."""
     u, v = 0.5 * h1, 0.5 * h2
     if fabs(u) + fabs(v) <= NEAR:
         even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)

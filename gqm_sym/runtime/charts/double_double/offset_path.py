@@ -1,4 +1,4 @@
-"""The path of a body beside a chart in double-double arithmetic: that of a rolling body's centre."""
+"""The path of a rolling body's centre, which lies beside a chart, in double-double arithmetic."""
 
 from math import fabs
 

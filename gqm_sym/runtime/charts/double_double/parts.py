@@ -33,7 +33,7 @@ class TrueParts(NamedTuple):
     Attributes
     ----------
     curve : TrueCurve
-        The curve, of which all pieces have been made; it has no pieces if nothing more than the chart is known.
+        The curve, all pieces of which have been made; it has no pieces if only the chart is known.
     origins : (n+1, 2) array
         Arc lengths from the start point to the edges of its pieces, two doubles each.
     tape, work, parameters
@@ -79,7 +79,7 @@ def fill_values(parts, number, n, u, values):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_differences(parts, number, span, points, differences, ends):  # type: ignore[no-untyped-def]
-    """Fill divided differences of the functions over arc length on a part of a piece; returns half the part's length.
+    """Fill divided differences of the functions over arc length on a part of a piece; return half the part's length.
 
     Parameters
     ----------
@@ -88,14 +88,15 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     number : int
         The piece.
     span : (float, float)
-        The start and the end of the part, as shares of the piece whose difference is a double.
+        The start and the end of the part, as shares of the piece. Their difference is exact in doubles.
     points : (RULE,) array
         Places in [-1, 1] on the part.
     differences : (2, m, 2, RULE) array
-        Filled: for each function those between the left edge of the part and the places, then between these and the
-        right edge, two doubles each.
+        Filled with the differences of each function between the left edge of the part and the places, then between the
+        places and the right edge, two doubles each.
     ends : (m, 2, 2) array
-        Filled: for each function two doubles of the values, then at which edge.
+        Filled with the values of each function at the edges of the part. The second axis is that of the high and the
+        low double, the third that of the left and the right edge.
     """
     u, values = stacked_places(), np.empty((parts.values.size, 2, RULE))
     length, length_low, _ = parts.curve.lengths[number]
@@ -130,9 +131,11 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
 def parts_along(
     pieces: TruePieces, function: Callable[..., Any], count: int, p: Sequence[Number], offset: Pair = ZERO
 ) -> TrueParts | None:
-    """Return the first functions that ``function(op, x, z, p)`` gives, along a curve; None where they are too long.
+    """Return the first functions that ``function(op, x, z, p)`` gives, along a curve; None if their formulas are too
+    long.
 
-    ``offset`` is how far to the left of the curve the body's path lies (`TrueCurve`), on which x and z are.
+    ``offset`` is the distance of the body's path to the left of the curve (`TrueCurve`); x and z are coordinates of
+    that path.
     """
     found = bind(record_values_in_plane(function, len(p), count), p)
     if found is None:

@@ -1,4 +1,6 @@
-"""One orbit along a chart in double-double arithmetic: half period or lap time, turning points and times on the way."""
+"""One orbit along a chart in double-double arithmetic: half period or lap time, turning points, and times along the
+orbit.
+"""
 
 from functools import cached_property
 from math import nan
@@ -32,18 +34,19 @@ from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, TAPE, Bounded, O
 from gqm_sym.runtime.double_double.recording import BoundTape
 
 # The largest difference between distances of turning points from the launch and those in doubles, as a share of the
-# orbit's width. More means another turning point.
+# orbit's width. A larger one means that another turning point was found.
 MAX_MISMATCH = 1e-6
 
-# Launches more laps away than this are left to multiprecision.
+# Launches that are more laps away than this are left to multiprecision.
 MAX_LAPS = 100
 
 
 @entry(types.void(TRUE_CURVE, MATRIX, VECTOR, types.UniTuple(REAL, 3), MATRIX), checked=False)
 def fill_stops(curve, found, phases, width, stops):  # type: ignore[no-untyped-def]
-    """Fill the places (piece, place as two doubles) at phase angles, or shares of a lap.
+    """Fill the places (piece, place as two doubles) at phase angles, or at shares of a lap.
 
-    ``width`` is the orbit's width in arc length as two doubles, negative for a lap backwards; then 1 for a libration.
+    ``width`` contains the orbit's width in arc length as two doubles, negative for a lap backwards, and then 1 for a
+    libration and 0 for a lap.
     """
     curve, found = unshared(curve), uncounted(found)
     row = LOWER if width[2] != 0.0 else LAUNCH
@@ -68,11 +71,11 @@ def fill_passage(curve, tape, work, p, found, stops, times, middle):  # type: ig
     curve, tape, work, p, found
         As for `locate`.
     stops : (n, 3) array
-        Places, in ascending order; of a lap backwards in descending order.
+        Places, in ascending order; for a lap backwards in descending order.
     times : (n, 3) array
         Filled.
     middle : int
-        The number of the stop from which on the upper turning point is the nearer one; -1 for a lap.
+        The number of the first stop that is nearer to the upper turning point; -1 for a lap.
     """
     curve, work, found = unshared(curve), uncounted(work), uncounted(found)
     stops, times = uncounted(stops), uncounted(times)
@@ -113,11 +116,11 @@ class ChartPassage:
     formulas : BoundTape
         The effective potential as a function of the plane.
     found : (ROWS, COLUMNS) array
-        What `locate` has found; it is an attribute, too.
+        The result of `locate`; it is an attribute, too.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     offset : pair of float
-        How far to the left of the curve the body's path lies (`TrueCurve`).
+        The distance of the body's path to the left of the curve (`TrueCurve`).
     """
 
     def __init__(
@@ -127,7 +130,7 @@ class ChartPassage:
         self._given = pieces.curve._replace(offset=offset), *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
-        """The times to stops, with errors (`fill_passage`)."""
+        """Return the times to stops, with errors (`fill_passage`)."""
         times = np.empty((len(stops), 3))
         fill_passage(*self._given, stops, times, middle)
         return times
@@ -148,7 +151,7 @@ class ChartPassage:
 
     @cached_property
     def orbit(self) -> Orbit | None:
-        """Duration and turning points; None where double-double arithmetic does not suffice."""
+        """Return duration and turning points; None if double-double arithmetic does not suffice."""
         found = self.found
         if self._direction:
             count = len(self._pieces.curve.counts)
@@ -161,14 +164,16 @@ class ChartPassage:
         return Orbit(duration, *ends) if duration.error <= MAX_ERROR * duration.high else None
 
     def times_at(self, phases: Array, *, is_thrown: bool) -> Array | None:
-        """The times at phase angles, or shares of a lap, in ascending order, and last that of the launch.
+        """Return the times at phase angles, or at shares of a lap, in ascending order, followed by the time of the
+        launch.
 
-        The last one means nothing unless the body is thrown: it is at rest at a turning point else.
+        The time of the launch has no meaning unless the body is thrown: otherwise it starts from rest at a turning
+        point.
 
         Returns
         -------
         (n+1, 3) array or None
-            Two doubles each, with a bound on the error; None where one is not found.
+            Two doubles each, with a bound on the error; None if one of them is not found.
         """
         found, curve = self.found, self._pieces.curve
         if self._direction and not len(phases):
@@ -197,7 +202,7 @@ def pass_along(
     direction: int,
     offset: Pair = ZERO,
 ) -> ChartPassage | None:
-    """Return an orbit along a chart; None where double-double arithmetic does not suffice.
+    """Return an orbit along a chart; None if double-double arithmetic does not suffice.
 
     Parameters
     ----------
@@ -212,7 +217,7 @@ def pass_along(
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     offset : pair of float
-        How far to the left of the curve the body's path lies.
+        The distance of the body's path to the left of the curve.
     """
     lam0, v0, point = launch
     begin, count = pieces.begin, len(pieces.curve.counts)

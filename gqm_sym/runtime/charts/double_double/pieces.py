@@ -37,27 +37,28 @@ from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 # Chebyshev points of the first kind at which a piece is sampled.
 NODES = 32
 
-# Decimal digits in which mpmath gives what double-double arithmetic begins with.
+# The number of decimal digits to which mpmath computes the starting values of double-double arithmetic.
 DIGITS = 40
 
 # Powers of u whose coefficients are below this share of those of u itself are summed in doubles.
 MAX_DOUBLE_SHARE = 2.0**-57
 
-# A place on a piece has converged when Newton's method moves it by less than this; then the next step is rounding.
+# A place on a piece has converged when Newton's method moves it by less than this, because the next step would be
+# rounding.
 MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each; and of
-# `offset_path.fill_path` the length of the path over that of the curve.
+# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
+# `offset_path.fill_path` adds the length of the path over that of the curve.
 X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
 
 stacked_points, stacked_places = on_stack(9 * RULE), on_stack(2 * RULE)
 
 
 class TrueCurve(NamedTuple):
-    """The pieces of a curve, as compiled code takes them; those that have not been made have lengths of NaN.
+    """The pieces of a curve as compiled code takes them. Pieces that have not been made have the length NaN.
 
     Attributes
     ----------
@@ -78,7 +79,7 @@ class TrueCurve(NamedTuple):
     tails : (2, RULE) array
         Factors that take weighted values at its nodes to the last two Legendre coefficients.
     offset : (float, float)
-        How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0.
+        The distance of the body's path to the left of the curve, as two doubles: the radius of a rolling body, else 0.
     """
 
     terms: Any
@@ -110,7 +111,7 @@ def nearly_add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
 
 @Inlined
 def unshared(curve):  # type: ignore[no-untyped-def]
-    """Return a curve whose arrays numba does not count references to."""
+    """Return a curve to whose arrays numba does not count references."""
     return TrueCurve(
         uncounted(curve.terms),
         uncounted(curve.counts),
@@ -126,7 +127,7 @@ def unshared(curve):  # type: ignore[no-untyped-def]
 
 @Inner
 def piece_of(curve, number):  # type: ignore[no-untyped-def]
-    """Return the index of a piece; on a closed curve pieces are numbered on beyond the last one."""
+    """Return the index of a piece; on a closed curve the numbers continue beyond the last piece."""
     return number % curve.counts.shape[0]
 
 
@@ -158,7 +159,8 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
 def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
     """Return the arc length from one place on a piece to another, with its error.
 
-    Errors of the coordinates along the tangent count at both ends, and others by the angle that the tangent turns by.
+    Errors of the coordinates along the tangent count at both ends; errors across it count in proportion to the angle by
+    which the tangent turns.
     """
     rule, u, points = curve.rule, stacked_places(), stacked_points()
     width, width_low = add(right[0], right[1], -left[0], -left[1])
@@ -196,7 +198,7 @@ def speed_at(curve, number, at):  # type: ignore[no-untyped-def]
 def place_at(curve, number, length):  # type: ignore[no-untyped-def]
     """Return the piece and the place on it at an arc length (two doubles) from the left edge of a piece.
 
-    The place is NaN where a piece on the way has not been made.
+    The place is NaN if a piece between them has not been made.
     """
     count, lengths = curve.counts.shape[0], curve.lengths
     while length[0] < 0.0 and (curve.period > 0.0 or number > 0):
@@ -298,7 +300,7 @@ def fill_piece(curve, k, samples, error, fit, powers):  # type: ignore[no-untype
     error : float
         A bound on their errors.
     fit, powers : arrays
-        What takes values to Chebyshev coefficients, and these to powers.
+        The matrices that map values to Chebyshev coefficients, and these to coefficients of powers.
     """
     terms, series, count, rounding = curve.terms[k], np.zeros((2, NODES)), 2, error
     for row in range(2):

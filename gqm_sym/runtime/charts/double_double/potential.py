@@ -27,8 +27,8 @@ from gqm_sym.runtime.double_double.nodes import RULE
 class Path(NamedTuple):
     """The inputs of the time along a curve: the curve, the tape of the potential, its registers, and the level.
 
-    The energy level is two doubles, a bound on what differences from it are off by at turning points, and one on its
-    own error, by which turning points are shifted.
+    The energy level consists of two doubles, a bound on the error of differences from it at turning points, and a bound
+    on its own error, which shifts the turning points.
     """
 
     curve: Any
@@ -49,9 +49,10 @@ def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def
 
 @Inner
 def energy_at(path, number, at):  # type: ignore[no-untyped-def]
-    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length.
+    """Return the potential (two doubles, error) at a place on a piece, its derivative by u, and the derivative of arc
+    length by u.
 
-    The potential is that of the body's path, arc length that of the curve.
+    The potential is that on the body's path; the arc length is that of the curve.
     """
     curve, tape, work, _ = path
     address, operations, parts, registers = tape
@@ -70,7 +71,7 @@ def energy_at(path, number, at):  # type: ignore[no-untyped-def]
 
 @Inner
 def position(curve, number, at):  # type: ignore[no-untyped-def]
-    """Return a place in arc length, roughly."""
+    """Return the approximate arc length of a place."""
     count = curve.counts.shape[0]
     k = piece_of(curve, number)
     low, high = curve.edges[k], curve.edges[k + 1]

@@ -1,9 +1,9 @@
 """The time along a chart in double-double arithmetic, with a bound on its error.
 
-V**2 is the plain difference of effective potentials, as for curves with formulas. The time is integrated piece by
-piece (`pieces`) by Gauss-Legendre rules. Near a turning point the rules' nodes are spread by ``u = c + y**2``,
-where c is the zero of V**2, or on a later piece where V**2 would vanish if the force were constant; there ``y/V`` is
-smooth.
+V**2 is the plain difference of effective potentials, as for curves with formulas. The time is integrated piece by piece
+(`pieces`) by Gauss-Legendre rules. Near a turning point the rules' nodes are spread by ``u = c + y**2``, so that
+``y/V`` is smooth. Here c is the zero of V**2, or on a later piece the place at which V**2 would vanish if the force
+were constant.
 """
 
 from math import fabs, nan, sqrt
@@ -27,16 +27,17 @@ from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_inte
 from gqm_sym.runtime.double_double.nodes import RULE
 
 # A panel is resolved if its last two Legendre coefficients are below this share of the first: the error of the rule is
-# about the square of that. Others are halved, as often as this.
+# about the square of that. Other panels are halved, at most this many times.
 MAX_TAIL, MAX_HALVINGS = 1e-13, 40
 
-# The largest ratio of the values of y at both ends of a panel behind a turning point on another piece; a power of 2.
+# The largest ratio of the values of y at both ends of a panel after a turning point on another piece; a power of 2.
 MAX_RATIO = 2.0
 
-# On a piece that is nearer to a turning point than so many of its lengths, the nodes are spread for that.
+# The nodes on a piece are spread for a turning point if that is nearer than so many lengths of the piece.
 MAX_NEAR = 4.0
 
-# On a panel from a turning point, how much more the force changes than its mean over the distance from there.
+# On a panel that begins at a turning point, a bound on the change of the force relative to the mean change over the
+# distance from there.
 MAX_FORCE_RATIO = 4.0
 
 stacked_sums = on_stack(3 * RULE)
@@ -46,7 +47,8 @@ stacked_sums = on_stack(3 * RULE)
 def fill_places(curve, left, width, spread, u, factors):  # type: ignore[no-untyped-def]
     """Fill the places of a panel's nodes, and the factors (two doubles each) of the integrand there.
 
-    ``spread`` is (sign, origin, origin_low): with sign 0 the panel is one of u, else of y, u = origin + sign*y**2.
+    ``spread`` is (sign, origin, origin_low). If the sign is 0, the panel is an interval of u; else it is one of y, with
+    u = origin + sign*y**2.
     """
     rule, (sign, origin, origin_low) = curve.rule, spread
     for i in range(RULE):
@@ -66,7 +68,8 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     """Return the time on a panel of a piece, its error, and its last Legendre coefficients as a share of the first.
 
     Where the panel begins at a turning point, V**2/2 is q*d at the distance d from there. An error e of the level moves
-    the turning point by e/q, so that V**2 changes, at the same distance, only as the force does on the way.
+    the turning point by e/q. At the same distance from the turning point, V**2 then changes only as much as the force
+    changes over the shift.
     """
     curve, tape, work, level = path
     address, operations, parts, registers = tape
@@ -111,10 +114,11 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
 
 @Inner
 def time_by_panels(path, number, left, right, spread):  # type: ignore[no-untyped-def]
-    """Return the time between two places of a piece, in panels that are halved until resolved, with its error.
+    """Return the time between two places of a piece with its error, by panels that are halved until they are resolved.
 
-    Behind a turning point very near the edge of another piece the integrand has terms in 1/y**2 if the curvature jumps
-    there: no panel has ends of too different y, because its nodes would miss them.
+    After a turning point very near the edge of another piece, the integrand has terms in 1/y**2 if the curvature jumps
+    at that edge. The values of y at the ends of a panel must not differ too much, because its nodes would miss these
+    terms.
     """
     ends = np.empty((2 * MAX_HALVINGS + 1, 2))
     ends[0, 0], ends[0, 1] = right
@@ -142,7 +146,7 @@ def time_by_panels(path, number, left, right, spread):  # type: ignore[no-untype
 
 @Inner
 def root_of_gap(one, other):  # type: ignore[no-untyped-def]
-    """Return the square root of the distance of two places of a piece."""
+    """Return the square root of the distance between two places of a piece."""
     gap, gap_low = add(one[0], one[1], -other[0], -other[1])
     sign = -1.0 if gap < 0.0 else 1.0
     return square_root(sign * gap, sign * gap_low) if gap != 0.0 else (0.0, 0.0)

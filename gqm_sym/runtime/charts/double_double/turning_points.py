@@ -12,24 +12,25 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
 
-# Steps of Newton's method to a turning point, of which the last but one moves it by less than this; and how often it
-# may go to a neighbouring piece.
+# The number of Newton steps to a turning point; the largest change in the last but one; and the number of times that
+# the search may pass to a neighbouring piece.
 MAX_STEPS, MAX_LAST_STEP, MAX_MOVES = 12, 1e-15, 4
 
-# A place this close to the edge of a piece is at the edge.
+# A place this close to the edge of a piece counts as the edge.
 AT_EDGE = 2.0**-98
 
-# Rows of what `locate` finds: the launch, the lower and the upper turning point, and a place between them (number of
-# the piece, place on it as two doubles, error); the energy level with both errors of `Path`, and the arc lengths from
-# the lower turning point to the launch, from there to the upper one, and from the left edge of the piece where it
-# begins to the launch (two doubles, error).
+# Rows of the array that `locate` fills. LAUNCH, LOWER, UPPER and MIDDLE are the launch, the lower and the upper turning
+# point and a place between them (number of the piece, place on it as two doubles, error). LEVEL is the energy level
+# with both errors of `Path`. BEHIND, AHEAD and PLACE are the arc lengths from the lower turning point to the launch,
+# from the launch to the upper turning point, and from the left edge of the starting piece to the launch (two doubles,
+# error).
 LAUNCH, LOWER, UPPER, MIDDLE, LEVEL, BEHIND, AHEAD, PLACE = range(8)
 ROWS, COLUMNS = 8, 4
 
 
 @Inner
 def find_turn(path, number, at, inward):  # type: ignore[no-untyped-def]
-    """Return the turning point near a place (piece, place), and a bound on half V**2 there with its slope.
+    """Return the turning point (piece, place) near a place, a bound on half V**2 there, and its slope.
 
     ``inward`` is 1 if the motion lies above it, -1 if below. The place is NaN where Newton's method fails.
     """
@@ -41,7 +42,7 @@ def find_turn(path, number, at, inward):  # type: ignore[no-untyped-def]
         at = add(at[0], at[1], step, step_low)
         over = side * at[0] - 1.0 + side * at[1]
         if fabs(step) < 0.5 and moves < MAX_MOVES and (over >= -AT_EDGE or over < -2.0 - AT_EDGE):
-            # The turning point lies on a neighbouring piece, or on the edge that it has in common with it.
+            # The turning point lies on a neighbouring piece, or on the edge between the two pieces.
             way = inward if over >= -AT_EDGE else -inward
             if path.curve.period > 0.0 or 0 <= number + way < path.curve.counts.shape[0]:
                 number, at, before, moves = number + way, (-float(way), 0.0), 0.0, moves + 1
@@ -60,7 +61,7 @@ def find_turn(path, number, at, inward):  # type: ignore[no-untyped-def]
     checked=False,
 )
 def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no-untyped-def]
-    """Find the launch of an orbit, its energy level, and its turning points; what is not found is NaN.
+    """Find the launch of an orbit, its energy level, and its turning points; values that are not found are NaN.
 
     Parameters
     ----------
@@ -71,14 +72,15 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
     work, p
         As for `orbit_time.orbit_time`.
     launch : tuple of float
-        The launch's arc length from the left edge of the piece ``start``, and its speed, two doubles each; whether it
-        is given by coordinates (then the arc length is a guess), and x and z, two doubles each.
+        The launch's arc length from the left edge of the piece ``start``, and its speed, two doubles each; 1 if the
+        launch is given by coordinates (the arc length is then a guess), else 0; and x and z, two doubles each.
     ends : (low, high, is_closed)
-        Both turning points in arc length as doubles know them; or whether the motion goes round instead.
+        Both turning points in arc length, to the accuracy of doubles. ``is_closed`` is 0 for a libration; otherwise
+        there are no turning points to be found.
     start : int
         The piece from whose left edge arc length is measured.
     found : (ROWS, COLUMNS) array
-        Filled; of the launch the error in arc length is given.
+        Filled. On entry it contains the error of the launch in arc length.
     """
     curve, work, found = unshared(curve), uncounted(work), uncounted(found)
     address, operations, parts, registers = tape

@@ -4,8 +4,8 @@ The frame is the tangent t, the direction l to the left and u upwards; along a p
 
     t' = yaw l + pitch u,   l' = -yaw t - roll u,   u' = -pitch t + roll l.
 
-Its Taylor series on parts of the piece is found with a longer mantissa than that of doubles, which the coordinates,
-integrals of t, keep as two doubles each.
+Its Taylor series on parts of the piece is found with a longer mantissa than that of doubles. The coordinates, which are
+integrals of t, keep these digits as two doubles each.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,13 +32,14 @@ POWERS = 6
 # The numbers that define each piece: the length of a transition, followed by the coefficients of its rates.
 PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
 
-# On a part of a piece the frame turns by less than a half even where distances are RADIUS times as long: terms of its
-# series fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
-RADIUS, MAX_GROWTH, TERMS = 4.0, 0.5, 36
+# The frame turns by less than MAX_TURN over RADIUS times the length of a part, also where distances are complex: terms
+# of its series on the part fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
+RADIUS, MAX_TURN, TERMS = 4.0, 2.0, 36
 
-# A piece is cut into so many times as many parts until the last coefficients of its roll angle are below MAX_TAIL.
+# The number of parts of a piece is multiplied by one of these, the first for which the last coefficients of its roll
+# angle are below MAX_TAIL.
 FINER, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
-# Takes values at the nodes to those of the derivative.
+# The matrix that maps values at the nodes to those of the derivative.
 DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
 
 # Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
@@ -55,7 +56,8 @@ class Pen(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes.
+    """The n pieces of the chart of one part of the rail: their lengths, coordinates at left edges, and t, t', t'' at
+    nodes.
 
     The coordinates are followed by the roll angle of a banked rail.
     """
@@ -74,12 +76,12 @@ class SpaceRail:
     Attributes
     ----------
     numbers
-        ``f(op, p)``: x, y and z, heading, climb and roll at the start where the rail is ``placed``, then for each piece
-        as many as `PIECE_NUMBERS` says.
+        ``f(op, p)``: x, y and z, heading, climb and roll at the start if the rail is ``placed``, then for each piece as
+        many numbers as `PIECE_NUMBERS` says.
     pieces : tuple of str
         "line", "arc", "clothoid", "transition" or "curve".
     placed : bool
-        Whether the start is given; else the first piece is a curve, whose place is known.
+        Whether the start is given; otherwise the first piece is a curve, which has a place of its own.
     segments : tuple of int
         Addresses of the compiled functions of the curves among the pieces, in order.
     closed : bool
@@ -153,11 +155,11 @@ class SpaceRail:
         return False
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Any:
-        """Return None: there is no such thing."""
+        """Return None, because the rail is known in doubles only."""
         return None
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> Any:
-        """Return None: there is no such thing."""
+        """Return None, because the rail is known in doubles only."""
         return None
 
 
@@ -211,7 +213,7 @@ def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
 
 
 def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tuple[Pieces, Pen]:
-    """Return a piece by its rates, in as many parts as its roll angle needs too, and its right end."""
+    """Return a piece with given rates, in enough parts to resolve its roll angle too, and its right end."""
     for finer in FINER if banked else FINER[:1]:
         pieces, end, spin, leaning = _turned(length, rates, pen, where, finer)
         if not banked:
@@ -219,11 +221,11 @@ def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tu
         with np.errstate(all="ignore"):
             across, along, up = np.moveaxis(pieces.slopes, 1, 0)
             change = (across * pieces.bends[:, 1] - along * pieces.bends[:, 0]) / (across**2 + along**2)
-            # The frame rolls, and the level turns about the tangent where a climbing track turns.
+            # The frame rolls; and where a climbing track turns, the horizontal direction turns about the tangent.
             slopes = spin + up * change
         half = 0.5 * pieces.lengths[:, None]
         leans = np.cumsum(np.append(pen.lean, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
-        # Behind a vertical tangent the level is another one.
+        # Beyond a vertical tangent, the roll angle is measured from another horizontal direction.
         off = np.abs(np.sin(0.5 * (leans[1:] - leaning))).max()
         if np.abs(half * (slopes @ FIT[-2:].T)).max() <= MAX_TAIL and off <= MAX_MISMATCH:
             bends = slopes @ DERIVATIVE / half
@@ -240,25 +242,22 @@ def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tu
 
 
 def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tuple[Pieces, Pen, Array, Long]:
-    """Return a piece by its rates, its right end, the roll rate at the nodes, and roll angles where parts end."""
+    """Return a piece with given rates, its right end, the roll rate at the nodes, and the roll angles at the ends of
+    its parts.
+    """
     orders = np.arange(POWERS)
     sizes = np.sqrt((rates.astype(np.float64) ** 2).sum(axis=0))
     turned = float((sizes * length ** (orders + 1)).sum())
     if not turned <= MAX_TOTAL_TURN:
         raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
-    # Bounds of the rates' Taylor coefficients anywhere on the piece.
-    most = np.array([sum(comb(i, j) * sizes[i] * length ** (i - j) for i in range(j, POWERS)) for j in range(POWERS)])
-    count = 1
-    while (most * (length / count) ** (orders + 1) * RADIUS**orders).sum() > MAX_GROWTH:
+    count, scaled = 1, _on_parts(length, rates, 1)
+    while (np.sqrt((scaled**2).sum(axis=1)) @ (RADIUS ** (orders + 1) / (orders + 1))).max() > MAX_TURN:
         count = ceil(1.25 * count)
-    count *= finer
+        scaled = _on_parts(length, rates, count)
+    if finer > 1:
+        count *= finer
+        scaled = _on_parts(length, rates, count)
     step = np.longdouble(length) / count
-    left = step * np.arange(count)
-    scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
-    for j in range(POWERS):
-        for i in range(j, POWERS):
-            scaled[:, :, j] += comb(i, j) * rates[:, i] * (left ** (i - j))[:, None]
-        scaled[:, :, j] *= step ** (j + 1)
     yaw, pitch, roll = np.moveaxis(scaled, 1, 0)
     turn = np.zeros((POWERS, count, 3, 3), dtype=np.longdouble)
     for (row, column), rate in {(0, 1): yaw, (0, 2): pitch, (2, 1): roll}.items():
@@ -291,6 +290,18 @@ def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tup
     return pieces, Pen(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
 
 
+def _on_parts(length: float, rates: Long, count: int) -> Long:
+    """Return the rates on equal parts of a piece: for each part their coefficients in powers of its share passed."""
+    step = np.longdouble(length) / count
+    left = step * np.arange(count)
+    scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
+    for j in range(POWERS):
+        for i in range(j, POWERS):
+            scaled[:, :, j] += comb(i, j) * rates[:, i] * (left ** (i - j))[:, None]
+        scaled[:, :, j] *= step ** (j + 1)
+    return scaled
+
+
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
 def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
     """Return the rows of a curve with formulas."""
@@ -318,7 +329,7 @@ def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Piece
 
 
 def _level(tangent: Array) -> Long:
-    """Return the frame of a tangent that leans to no side; where it is vertical, that with l along y."""
+    """Return the frame of a tangent without roll; for a vertical tangent, the frame with l along y."""
     ahead = tangent.astype(np.longdouble)
     width = np.hypot(ahead[0], ahead[1])
     left = np.array([-ahead[1] / width, ahead[0] / width, 0.0]) if width > MAX_MISMATCH else np.array([0.0, 1.0, 0.0])

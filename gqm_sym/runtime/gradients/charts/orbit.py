@@ -1,7 +1,7 @@
 """A periodic orbit along a chart with its derivatives: Gauss's rules on panels of the phase angle.
 
-Displacements of the curve's points come from neighbouring curves (`shaped_pieces`). All else are tangents of formulas
-(`programs`).
+Displacements of the curve's points come from neighbouring curves (`shaped_pieces`). All other derivatives are those of
+formulas (`programs`).
 """
 
 from fractions import Fraction
@@ -32,9 +32,10 @@ from gqm_sym.runtime.gradients.charts.programs import (
     speed_program,
 )
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
-from gqm_sym.runtime.gradients.evaluation import fill_values
+from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows, SeriesOf, pairs, values
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
+from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
@@ -43,16 +44,16 @@ from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # A panel is resolved if the last two Legendre coefficients of all integrands are below this share of the integrals of
-# the absolute values; others are halved, as often as this.
+# the absolute values; other panels are halved, at most this many times.
 MAX_TAIL, MAX_HALVINGS = 1e-14, 40
 
-# The largest rounding error of an integral, as a share of that of the absolute values.
+# The largest rounding error of an integral, as a share of the integral of the absolute values.
 MAX_ROUNDING = 1e-16
 
-# A place this near to the edge of a piece is there.
+# A place this near to the edge of a piece counts as the edge.
 AT_EDGE = 1e-15
 
-# How far from an extreme its second derivative is looked for, as a share of the orbit's width.
+# The step of the difference quotient for the second derivative at an extreme, as a share of the orbit's width.
 BESIDE = 2.0**-20
 
 
@@ -69,12 +70,11 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
     panels : (m, 3) array
         The start of each panel, as a phase angle or as a share of the lap, and its width as two doubles.
     orbit : tuple of float
-        The piece and the place on it where the phase begins are the first of ``places`` before; here are the orbit's
-        width in arc length, two doubles with a sign, and the piece.
+        The orbit's width in arc length as two doubles with a sign, and the piece on which the phase begins.
     shares : (2, n) array
         Filled: the share of the orbit's width at each node.
     places : (PLACE, n) array
-        Filled. Its first column is where the phase begins.
+        Filled. On entry, its first column is the place at which the phase begins.
     """
     curve, width, width_low, number = unshared(curve), orbit[0], orbit[1], int(orbit[2])
     base, _ = arc_between(curve, number, (-1.0, 0.0), number, (places[1, 0], places[2, 0]))
@@ -90,7 +90,7 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
 
 
 def source_along(problem: Problem) -> ChartSource:
-    """The formulas from which the programs of motions along the chart of a module are recorded."""
+    """Return the formulas from which the programs of motions along the chart of a module are recorded."""
     formulas = problem.formulas
     assert isinstance(formulas.exact, ExactPotential)
     names = list(formulas.parameters)
@@ -111,7 +111,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     direction : int
         0 for a libration, else the sign of ds/dt.
     edges : array
-        Phase angles between which the speed changes smoothly, or shares of a lap, from the first to the last.
+        Phase angles, or shares of a lap, between which the speed changes smoothly, from the first to the last.
     """
 
     source: ChartSource
@@ -137,14 +137,14 @@ class ChartOrbitDerivatives(OrbitDerivatives):
 
     @property
     def launch_moves(self) -> Array:
-        """How the place of the launch changes, at the points of the curve, which do not move."""
+        """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
         moves[list(self.source.shaping)] = -self._shifts
         return moves
 
     def _values(self, program: Program, inputs: Array, shares: Array, places: Array) -> Array:
-        """The results of a program at places: values as two doubles, and bounds on the errors."""
+        """Return the results of a program at places: values as two doubles, and bounds on the errors."""
         rows = np.ascontiguousarray(np.concatenate([shares, self._shape.coordinates(places)]))
         found = np.empty((program.outputs.size, 3, places.shape[1]))
         fill_values(program.operands, program.work, np.ascontiguousarray(inputs), rows, found)
@@ -152,9 +152,10 @@ class ChartOrbitDerivatives(OrbitDerivatives):
 
     @cached_property
     def _turns(self) -> Array:
-        """The places of both turning points; one where two pieces meet is on the piece that the motion passes.
+        """The places of both turning points; one at which two pieces meet is given on the piece that the motion passes.
 
-        So rounding of the displacements, which differs between pieces, does not count beside the small V**2 near there.
+        In this way the rounding of the displacements, which differs between pieces, does not spoil the small V**2
+        nearby.
         """
         turns = self._found[[LOWER, UPPER], :PLACE].T.copy()
         for column, edge in zip(turns.T, (1.0, -1.0), strict=True):
@@ -257,8 +258,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return self._panels[2][first : first + count]
 
     @property
-    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
-        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+    def series(self) -> tuple[SeriesOf, Array]:
+        """As `OrbitDerivatives.series`."""
         edges, samples, _ = self._panels
         n = self.source.variables
         arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
@@ -268,7 +269,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             left, rule = edges[:-1, None], panel_rule()
             arcs *= 0.5 * self.width * np.sin(left + np.diff(edges)[:, None] * rule[0])
             edges = edges / (2.0 * np.pi)
-        return PanelSeries(edges, samples[: 1 + n]), PanelSeries(edges, arcs), np.zeros((n, 1))
+        return PanelSeries(edges, np.concatenate([samples[: 1 + n], arcs])), np.zeros(n)
 
     @property
     def width(self) -> float:
@@ -279,19 +280,22 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return high - low
 
     def at_places(self, lam: Array) -> PathRows:
-        """`path_rows` at arc lengths, with derivatives at the points of the curve."""
+        """Return `path_rows` at arc lengths, with derivatives at the points of the curve."""
         path = self._shape.path(self._shape.places(lam))
-        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:])[:, 0]
-        return PathRows(*found.reshape(6, self.source.parameters + 2, lam.size))
+        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:], parts=1)
+        return PathRows(found.reshape(6, self.source.parameters + 2, lam.size))
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """As `OrbitDerivatives.extreme_rows`, at the points of the curve; the second is a difference quotient."""
+        """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
+        difference quotient.
+        """
         steps = BESIDE * self.width * np.array([[0.0], [-1.0], [1.0]])
         lam = (place + steps).ravel()
         places = self._shape.places(lam)
         rows = self._values(speed_program(self.source), self._inputs, np.zeros((2, lam.size)), places)[:, 0]
         if not of_speed:
-            mass_curvature, load = self.at_places(lam)[3:5]
+            path = self.at_places(lam)
+            mass_curvature, load = path.curvature, path.load
             by_variables = np.zeros((LAUNCH_VARIABLES, lam.size))
             force = [2.0 * rows[0] * mass_curvature[0] + load[0]]
             force.append(2.0 * (rows[1] * mass_curvature[0] + rows[0] * mass_curvature[-1]) + load[-1])
@@ -302,21 +306,21 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return np.vstack([here[:2], curvature, here[2:]])
 
     def without_shift(self, moved: Array, lam: Array) -> Array:
-        """As `OrbitDerivatives.without_shift`."""
+        """Return the change that `OrbitDerivatives.without_shift` describes."""
         moved = moved.copy()
         moved[list(self.source.shaping)] -= self._shape.shifts(self._shape.places(lam))[:, 0]
         return moved
 
 
 def _sum(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
-    """The sum of two numbers of two doubles each."""
+    """Return the sum of two numbers of two doubles each."""
     exact = sum(map(Fraction, (*a.tolist(), *b.tolist())), Fraction(0))
     high = float(exact)
     return high, float(exact - Fraction(high))
 
 
 def _total(high: Array, low: Array) -> float:
-    """The sum of numbers, rounded once."""
+    """Return the sum of numbers, rounded once."""
     from math import fsum
 
     return fsum([*high.ravel().tolist(), *low.ravel().tolist()])

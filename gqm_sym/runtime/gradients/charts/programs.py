@@ -1,10 +1,11 @@
 """The programs of gradients along charts: the formulas of a motion over coordinates of the plane, recorded as tapes.
 
-A chart has no formula of its coordinates, and so they come with each place: x and z, their derivatives by the parameter
-u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter that shapes
-the curve moves its points, each across the curve: of a displacement only the part along the normal counts. Arc lengths
-between such points change by the curvature times the displacement. How much farther from the start point of the curve
-the point of the launch then lies is known (``shift``); its arc length is given, and so it is another point.
+A chart has no formulas for its coordinates, so they are inputs at each place: x and z, their derivatives by the
+parameter u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter
+that shapes the curve moves each of its points across the curve: only the normal part of a displacement counts. Arc
+lengths between such points change by the curvature times the displacement. The arc length of a point from the start
+point of the curve then grows by a known ``shift``. Since the arc length of the launch is given, the launch moves to
+another point.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +16,7 @@ from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Local, Program, assemble
 
-# The coordinates of a point: x, z, their derivatives by u, and the curvature; and those of a displacement.
+# The number of coordinates of a point (x, z, their derivatives by u, and the curvature), and that of a displacement.
 POINT, DISPLACEMENT = 5, 2
 
 
@@ -29,7 +30,7 @@ class ChartSource(NamedTuple):
     inertia : callable or None
         ``f(op, p)`` gives 1 + beta; None where it is 1.
     parameters, mass : int
-        The number of run-time parameters, and which of them is the mass.
+        The number of run-time parameters, and the index of the mass among them.
     shaping : tuple of int
         The parameters that shape the curve.
     """
@@ -42,7 +43,7 @@ class ChartSource(NamedTuple):
 
     @property
     def variables(self) -> int:
-        """How many variables derivatives are taken by."""
+        """The number of variables of differentiation."""
         return self.parameters + LAUNCH_VARIABLES
 
     @property
@@ -61,7 +62,7 @@ class ChartSource(NamedTuple):
         return 1 + self.point
 
     def _at(self, op: Recorder, numbers: Sequence[TapeNumber]) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        """The potential at a point, and its derivatives by arc length and by the run-time parameters."""
+        """Return the potential at a point, and its derivatives by arc length and by the run-time parameters."""
         (x, z, dx, dz), p = numbers[:4], op.values[: self.parameters]
         value, by_x, by_z = map(op.number, self.potential(op, x, z, p))
         partials, speed = gradient(op, value, p), op.sqrt(dx * dx + dz * dz)
@@ -70,7 +71,7 @@ class ChartSource(NamedTuple):
         return value, (by_x * dx + by_z * dz) / speed, partials
 
     def _displacements(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
-        """How far a point is displaced to the left of the curve, by each parameter that shapes it."""
+        """Return the displacement of a point to the left of the curve by each parameter that shapes it."""
         dx, dz = numbers[2:4]
         moves = [numbers[POINT + i : POINT + i + 2] for i in range(0, self.point - POINT, DISPLACEMENT)]
         speed = op.sqrt(dx * dx + dz * dz)
@@ -98,7 +99,8 @@ class ChartSource(NamedTuple):
 
 @lru_cache(maxsize=64)
 def chart_circulation_program(source: ChartSource) -> Program:
-    """What is integrated over a lap, as `programs.circulation_program`; the last input is its length.
+    """Return the integrands over a lap, as `programs.circulation_program` does; the last input is the length of the
+    lap.
 
     The results are dt/dshare with its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives, and
     the derivatives of ds/dlam.
@@ -119,7 +121,8 @@ def chart_circulation_program(source: ChartSource) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(source: ChartSource) -> Program:
-    """Return the program of states at a point, as `programs.path_program`, with derivatives at points of the curve.
+    """Return the program of states at a point, as `programs.path_program` does, with derivatives at points of the
+    curve.
 
     The coordinates are x and z with their first three derivatives by u, and for each parameter that shapes the curve
     the displacement of x and z with its first two.
@@ -152,7 +155,7 @@ def chart_path_program(source: ChartSource) -> Program:
 
 @lru_cache(maxsize=64)
 def speed_program(source: ChartSource) -> Program:
-    """Half of V**2 at a point, and its derivatives by arc length and by all variables."""
+    """Return the program of half of V**2 at a point, and its derivatives by arc length and by all variables."""
     op = Recorder(source.inputs, source.coordinates)
     here = source.local(op, op.place)
     return assemble(op, [here.half, here.half_slope, *here.half_partials])

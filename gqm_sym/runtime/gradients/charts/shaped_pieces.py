@@ -1,8 +1,8 @@
 """The true pieces of a curve and how its points are displaced by the parameters that shape it.
 
 The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). The
-displacements are differences of these polynomials for neighbouring values of a parameter: of some 20 digits, for the
-polynomials have 31.
+displacements are differences of these polynomials for neighbouring values of a parameter; they have some 20 digits,
+because the polynomials have 31.
 """
 
 from fractions import Fraction
@@ -39,11 +39,13 @@ from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.launch.formulas import Formulas, true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
 
-# The step of a difference quotient of the curve's points in double-double arithmetic, as a share of the parameter: a
-# power of 2, of which the square and the rounding over it are some 1e-18 and 1e-20.
+# The step of a difference quotient of the curve's points in double-double arithmetic, as a share of the parameter. It
+# is a power of 2; its square, which is the truncation error, is some 1e-18, and the rounding error divided by it is
+# some 1e-20.
 STEP = 2.0**-29
 
-# Chebyshev coefficients of a displacement below this share of the largest are rounding if so many follow each other.
+# Chebyshev coefficients of a displacement that are below this share of the largest are rounding if at least so many
+# follow each other.
 MAX_NOISE, TERMS_IN_A_ROW = 1e-19, 3
 
 # Rows of a place: the number of its piece, and u on it as two doubles.
@@ -91,7 +93,9 @@ def fill_series(samples, fit, series):  # type: ignore[no-untyped-def]
 
 
 def shaping_of(formulas: Formulas) -> tuple[int, ...]:
-    """The run-time parameters that shape a charted curve, by their place; all of them where that is not known."""
+    """Return the indices of the run-time parameters that shape a charted curve; those of all parameters if that is not
+    known.
+    """
     assert formulas.chart is not None
     shaped_by = formulas.chart.shaped_by
     return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
@@ -117,12 +121,14 @@ class ShapedPieces:
         self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]
 
     def _make(self, first: int, last: int) -> None:
-        """Make the pieces of all curves between two numbers."""
+        """Make the pieces of all curves from one piece number to another."""
         for side in (self.pieces, *(side for _, *sides in self._beside for side in sides)):
             side.make(first, last)
 
     def coordinates(self, places: Array) -> Array:
-        """The points at places with the displacements, two doubles each: the coordinates that programs take."""
+        """Return the points at places with their displacements, two doubles each, which are the coordinates that
+        programs take.
+        """
         self._make(int(places[0].min()), int(places[0].max()))
         rows, curvature = [np.empty((8, places.shape[1]))], np.zeros((2, places.shape[1]))
         fill_coordinates(self.pieces.curve, places, rows[0])
@@ -138,7 +144,7 @@ class ShapedPieces:
         return np.concatenate(rows)
 
     def places(self, high: Array, low: Array | float = 0.0) -> Array:
-        """The places (PLACE rows) at arc lengths from the start point."""
+        """Return the places (PLACE rows) at arc lengths from the start point."""
         pieces, places = self.pieces, np.empty((PLACE, high.size))
         numbers = [pieces.number_of(float(place)) for place in (high.min(), high.max())] if high.size else [0]
         pieces.make(min(*numbers, pieces.begin) - 1, max(*numbers, pieces.begin) + 1)
@@ -149,7 +155,7 @@ class ShapedPieces:
         return places
 
     def lengthened(self, places: Array) -> Array:
-        """How much longer the way from the start point to points of equal u gets: a row for each parameter."""
+        """Return the increase of the arc length from the start point to points of equal u: a row for each parameter."""
         self._make(int(places[0].min()), int(places[0].max()))
         found = []
         for step, *sides in self._beside:
@@ -162,15 +168,19 @@ class ShapedPieces:
         return np.array(found).reshape(-1, places.shape[1])
 
     def shifts(self, places: Array) -> Array:
-        """How much farther from the start point the points of the curve at places get: a row for each parameter."""
+        """Return the increase of the arc length from the start point to the points of the curve at places: a row for
+        each parameter.
+        """
         rows = self.coordinates(places)[::2]
         (dx, dz), moved = rows[2:4], rows[POINT:]
-        # Points of equal u are displaced along the curve, too.
+        # Points of equal u are displaced along the curve as well.
         shifts: Array = self.lengthened(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
         return shifts
 
     def path(self, places: Array, orders: int = 4) -> Array:
-        """The coordinates in doubles, with all derivatives by u below an order; of displacements there are three."""
+        """Return the coordinates in doubles with all derivatives by u below an order, and the displacements with two
+        derivatives.
+        """
         if places.size:
             self._make(int(places[0].min()), int(places[0].max()))
         rows = [_derivatives(self.pieces.curve.terms[:, ::2], places, orders)]
@@ -186,9 +196,9 @@ class ShapedPieces:
         return np.concatenate(rows)
 
     def _smooth(self, k: int) -> Array:
-        """The displacements on a piece as powers of u, for each parameter those of x and of z.
+        """Return the displacements of x and z on a piece, for each parameter, as coefficients of powers of u.
 
-        They are cut where their Chebyshev coefficients are rounding, so that their derivatives are not.
+        The Chebyshev series are cut where their coefficients are rounding, so that derivatives do not amplify it.
         """
         places = np.array([np.full(NODES, float(k)), *sample_places()])
         samples = self.coordinates(places)[2 * POINT :]
@@ -203,7 +213,7 @@ class ShapedPieces:
 
 
 def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, TruePieces, TruePieces]:
-    """A step of a parameter, and the curve for values before and after it."""
+    """Return the step of a parameter, and the curve for its values one step below and above."""
     size = abs(p[k].value) or 1.0
     step = STEP * 2.0 ** np.floor(np.log2(size))
     sides = []
@@ -219,7 +229,7 @@ def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tup
 
 
 def _quotient(before: Array, after: Array, step: float) -> Array:
-    """The difference quotient of rows of two doubles each, over twice the step, which is a power of 2."""
+    """Return the difference quotient of rows of two doubles each, over twice the step, which is a power of 2."""
     high, low = after[::2] - before[::2], after[1::2] - before[1::2]
     total = high + low
     out = np.empty_like(before)
@@ -228,7 +238,7 @@ def _quotient(before: Array, after: Array, step: float) -> Array:
 
 
 def _derivatives(terms: Array, places: Array, count: int) -> Array:
-    """Coordinates at places and their derivatives by u, from those of order 0 on, from coefficients in doubles."""
+    """Return coordinates at places and their derivatives by u, beginning with order 0, from coefficients in doubles."""
     chosen, u = terms[places[0].astype(np.int64) % len(terms)], places[1]
     rows, powers = [], np.vander(u, NODES, increasing=True)
     for _ in range(count):

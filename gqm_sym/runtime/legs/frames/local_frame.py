@@ -1,12 +1,13 @@
-"""Small motions about an equilibrium e that is not at 0: places as distances from e, and the force on them.
+"""Small motions about an equilibrium e that is not at 0, with distances from e as places, and the force at these
+places.
 
 Doubles resolve a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e.
 So the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance
 from e. Functions of the interface then serve the legs with distances for places: P becomes
 ``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
 
-Swings about a stable equilibrium stay so near to it. From an unstable one a launched body departs, the later the nearer
-it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
+Small swings about a stable equilibrium stay near it. A body launched near an unstable equilibrium departs from it,
+later if it was nearer, and leaves the frame; its distance at launch is computed in extended precision (`refined`).
 """
 
 from collections.abc import Callable, Sequence
@@ -36,25 +37,28 @@ from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.multiprecision.exact_problem import GUARD_DIGITS, PRECISIONS
 
-# A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider
-# than a quarter of that distance, it loses two bits at most where its places are rounded as doubles. On the middle
-# quarter of a range the slope of a polynomial has hardly more than DEGREE times its noise, not DEGREE**2 times as at
-# the ends; and the width, which is estimated by the steepness at e, quadruples only where the force is a sixteenth.
+# A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. A
+# motion wider than a quarter of that distance loses at most two bits if its places are rounded to doubles. On the
+# middle quarter of a range the noise of a polynomial's slope is hardly more than DEGREE times that of the polynomial,
+# and not DEGREE**2 times as at the ends. The width, which is estimated from the slope of the force at e, can only be
+# four times as large if the force is a sixteenth of the estimate.
 SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 
-# The places at which the force is fitted, as shares of the range; the degree, the size of the last coefficients of a
-# range that is narrow enough, how often it is halved, and how often the fit is moved to where the force vanishes.
+# The number of places at which the force is fitted; the degree; the size of the last coefficients on a range that is
+# narrow enough; the largest number of times that the range is halved; and the largest number of times that the fit is
+# moved to the zero of the force.
 NODES, DEGREE, RESOLVED, MAX_HALVINGS, MAX_MOVES = 64, 20, 1e-14, 12, 4
 SHARES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 
-# Steps of the secant method to an equilibrium that doubles know, and how far apart its first two places are.
+# The largest number of steps of the secant method to an equilibrium that is known in doubles, and the relative distance
+# of its first two places.
 MAX_SECANTS, SECANT_SHARE = 40, 2.0**-30
 
-# The force without speed may differ between the two directions by this share: there is no friction.
+# There is no friction if the forces on a body at rest in the two directions differ by less than this share.
 FRICTIONLESS_SHARE = 1e-12
 
 # The numbers before the module's parameters: the address of its speed equation, e as two doubles, the range, and the
-# coefficients of C(d)/d by powers of d over the range.
+# coefficients of C(d)/d in powers of d divided by the range.
 ADDRESS, PLACE, PLACE_LOW, RANGE, TERMS = range(5)
 OWN = TERMS + DEGREE
 
@@ -67,7 +71,7 @@ class Frame(NamedTuple):
     Attributes
     ----------
     dissipation : Dissipation
-        Functions that take distances.
+        The functions of the model, which take distances.
     p : array
         Their parameters.
     error : float
@@ -80,11 +84,11 @@ class Frame(NamedTuple):
 
     @property
     def is_stable(self) -> bool:
-        """Whether bodies swing about the equilibrium, and do not depart from it."""
+        """Whether bodies swing about the equilibrium instead of departing from it."""
         return bool(self.p[TERMS] < 0.0)
 
     def size(self, distance: float, v2: float) -> float:
-        """How far a motion is from the equilibrium, by a distance from it and V**2 there."""
+        """Return the size of a motion about the equilibrium, from a distance from it and V**2 there."""
         return float(np.sqrt(distance**2 + 2.0 * v2 / abs(self.p[TERMS])))
 
     @property
@@ -93,12 +97,12 @@ class Frame(NamedTuple):
         return RANGE_SHARE * float(self.p[RANGE])
 
     def distance(self, place: float, low: float) -> tuple[float, float]:
-        """A place, given as two doubles, as a distance from the equilibrium."""
+        """Return the distance from the equilibrium of a place that is given as two doubles."""
         distance: tuple[float, float] = add(place, low, -float(self.p[PLACE]), -float(self.p[PLACE_LOW]))
         return distance
 
     def move(self, record: Array, sense: int) -> None:
-        """Write places for distances in the record of a leg, or distances for places where ``sense`` is -1."""
+        """Replace distances by places in the record of a leg, or places by distances if ``sense`` is -1."""
         place, low = sense * float(self.p[PLACE]), sense * float(self.p[PLACE_LOW])
         for k in (START, END, MIDDLE):
             record[k], record[k + 1] = add(float(record[k]), float(record[k + 1]), place, low)
@@ -108,7 +112,9 @@ class Frame(NamedTuple):
 
 @Inner
 def may_be_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
-    """Whether `frame_near` may find a frame for a body: the force on it at rest changes its sign close by."""
+    """Return whether `frame_near` may find a frame for a body, because the force on it at rest changes its sign
+    nearby.
+    """
     place, reach, point = body[BODY_PLACE], body[FIRST_STEP], point_buffer()
     if dissipation.friction or dissipation.kinked or place == 0.0:
         return False
@@ -124,13 +130,15 @@ def may_be_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
 
 @entry(types.boolean(DISSIPATION, VECTOR, VECTOR, VECTOR))
 def is_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
-    """`may_be_small`, to be called from Python."""
+    """Call `may_be_small` from Python."""
     return may_be_small(dissipation, p, breaks, body)
 
 
 @entry(MATRIX(DISSIPATION, VECTOR, VECTOR))
 def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
-    """By how much V**2 grows per unit of the curve parameter without speed, a row for each direction of motion."""
+    """Return the increase of V**2 per unit of the curve parameter for a body at rest, a row for each direction of
+    motion.
+    """
     out, point = np.empty((2, places.size)), point_buffer()
     for row, v in enumerate((1, -1)):
         forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, v)
@@ -141,7 +149,7 @@ def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
 
 @cache
 def _functions() -> tuple[Any, Any]:
-    """The speed equation and the static balance of all frames."""
+    """Return the speed equation and the static balance of all frames."""
     compiled = compiler(__file__, interface=INTERFACE)
 
     @compiled(SPEED_EQUATION)
@@ -176,7 +184,7 @@ def _functions() -> tuple[Any, Any]:
 
 
 def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:
-    """The frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
+    """Return the frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
 
     Parameters
     ----------
@@ -186,7 +194,7 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     start : (float, float, float)
         A place as two doubles, and V**2 there.
     reach : float
-        The distance from there over which functions may be smooth.
+        The distance from there over which functions are expected to be smooth.
     """
     middle, size = start[0], reach
     for _ in range(MAX_HALVINGS):
@@ -224,7 +232,7 @@ def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array
     Parameters
     ----------
     frame : Frame
-        The frame as doubles know it.
+        The frame to the accuracy of doubles.
     at_rest : callable
         The force on a body at rest, and its derivative by the place, at places that are given as two doubles each.
     """
@@ -242,7 +250,8 @@ def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array
 
 
 def error_of_chart(frame: Frame, dissipation: Dissipation, charts: Array) -> tuple[float, float]:
-    """The error of the place of the equilibrium, and of the force next to it as a share, with those of the chart.
+    """Return the error of the place of the equilibrium and the relative error of the force next to it, including the
+    errors of the chart.
 
     Parameters
     ----------
@@ -251,7 +260,7 @@ def error_of_chart(frame: Frame, dissipation: Dissipation, charts: Array) -> tup
     dissipation : Dissipation
         The module's compiled functions.
     charts : array
-        As of `leg_errors.carry`.
+        As in `leg_errors.carry`.
     """
     reach, terms = frame.reach, frame.p[TERMS:OWN]
     places = float(frame.p[PLACE]) + reach * np.array([-1.0, 0.0, 1.0])
@@ -264,12 +273,12 @@ def error_of_chart(frame: Frame, dissipation: Dissipation, charts: Array) -> tup
 
 
 def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Number) -> tuple[Frame, float] | None:
-    """The frame with its equilibrium from extended precision, and the distance of a launch place from that.
+    """Return the frame with its equilibrium from extended precision, and the distance of a launch place from that.
 
     Parameters
     ----------
     frame : Frame
-        The frame as doubles know it.
+        The frame to the accuracy of doubles.
     law : ExactLaw
         The formulas of the forces, none of which is friction.
     parameters : sequence of Number
@@ -280,7 +289,7 @@ def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Num
     Returns
     -------
     (Frame, float) or None
-        The distance is 0 if the launch is at the equilibrium; None if the secant method does not come to it.
+        The distance is 0 if the launch is at the equilibrium. None if the secant method does not converge to it.
     """
     from mpmath.ctx_mp import MPContext
 
@@ -308,7 +317,7 @@ def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Num
 
 
 def _fit(dissipation: Dissipation, p: Array, middle: float, size: float) -> tuple[float, tuple[Array, float] | None]:
-    """Where the force vanishes, as a share of the range; the coefficients of C(d)/d, and the noise of the force.
+    """Return the zero of the force, as a share of the range; the coefficients of C(d)/d; and the noise of the force.
 
     There are no coefficients if the force is not resolved on the range, or depends on the direction of motion.
     """

@@ -1,14 +1,14 @@
 """V**2 on one panel of a leg, from one linear equation (MATHS, section 2).
 
-On a leg ``dW/dlam = P - Q W``, where W is V**2. The distance run from the *origin*, the place where the leg was begun,
-is ``d = w (g w + c)`` with w the *march variable* (`March`): g is 0 and c is 1 in the regular case; from a turning
-point g is 1 and c is 0, so that W/w**2 and the rate of time are smooth; after a slow launch with W = W0 and W' > 0 they
-are 1 and 2 sqrt(W0/W'). With ``h = g (w + c/2) + 1 - g`` the speed is h Y and ``dt/dw = (1 + g) ds/Y``, where Y is
+On a leg ``dW/dlam = P - Q W``, where W is V**2. The distance from the *origin*, the place at which the leg begins, is
+``d = w (g w + c)``, where w is the *march variable* (`March`). In the regular case g is 0 and c is 1. From a turning
+point g is 1 and c is 0, so that W/w**2 and the rate of time are smooth. After a slow launch with W = W0 and W' > 0, g
+is 1 and c is 2 sqrt(W0/W'). With ``h = g (w + c/2) + 1 - g`` the speed is h Y and ``dt/dw = (1 + g) ds/Y``, where Y is
 smooth.
 
-With q the integral of Q from the panel's start, where W has the value ``v2``, ``W = exp(-q) (v2 + integral of
-exp(q) P)``. The integrals come from running means, so that nothing is subtracted however short they are, and W has all
-its digits next to a turning point too.
+With q the integral of Q from the panel's start, where W has the value ``v2``, ``W = exp(-q) (v2 + integral of exp(q)
+P)``. The integrals come from running means, so that nothing is subtracted however short the intervals are, and W keeps
+all its digits next to a turning point.
 """
 
 from math import fabs, factorial, inf, sqrt
@@ -29,14 +29,14 @@ copy = copied(WIDE)
 # The largest q over a panel: resistance alone may not change V**2 by more than the factor exp(MAX_Q).
 MAX_Q = 2.0
 
-# exp(q) - 1 is summed as a series up to this q; beyond it q is halved and the result squared up again.
+# exp(q) - 1 is summed as a series up to this q; a larger q is halved, and the result is squared again.
 MAX_SERIES_Q = 0.25
 EXPM1_TERMS = tuple(1.0 / factorial(k) for k in range(13, 1, -1))
 
-# The most iterations for forces that are not linear in V**2.
+# The largest number of iterations for forces that are not linear in V**2.
 MAX_ITERATIONS = 40
 
-# A distance larger than all others; nothing could be computed from an infinite one.
+# A distance larger than all others; an infinite one would make results NaN.
 FARTHEST = 1e300
 
 # The work array of a panel is a sequence of rows, each of WIDE numbers: a value at each of the COUNT Chebyshev nodes,
@@ -94,7 +94,7 @@ arc_rate_row = over_rows(lambda ds, y, slope, g: ds * (slope + 2.0 * g * y), WID
 
 
 class Forces(NamedTuple):
-    """The forces on a leg, and which way the body moves.
+    """The forces on a leg, and the direction in which the body moves.
 
     Attributes
     ----------
@@ -117,14 +117,14 @@ class Forces(NamedTuple):
 
 
 class March(NamedTuple):
-    """The march variable w of some panels: the distance from the origin is ``w (g w + c)``.
+    """The march variable w of panels, defined by the distance ``w (g w + c)`` from the origin.
 
     Attributes
     ----------
     origin : (float, float)
         The place where the distance is zero, as two doubles.
     direction : int
-        The sign of dlam/dw; against the motion if a leg is followed back.
+        The sign of dlam/dw, which is opposite to that of the motion if a leg is followed back.
     g, c : float
         The coefficients.
     """
@@ -158,26 +158,26 @@ class Panel(NamedTuple):
 
 @Inner
 def distance(w, march):  # type: ignore[no-untyped-def]
-    """The distance from the origin."""
+    """Return the distance from the origin."""
     return w * (march.g * w + march.c)
 
 
 @Inner
 def slope_at(w, march):  # type: ignore[no-untyped-def]
-    """How fast the distance grows with the march variable."""
+    """Return the derivative of the distance by the march variable."""
     return 2.0 * march.g * w + march.c
 
 
 @Inner
 def marched(d, march):  # type: ignore[no-untyped-def]
-    """The march variable at a distance from the origin."""
+    """Return the march variable at a distance from the origin."""
     d = min(d, FARTHEST)
     return 2.0 * d / (march.c + sqrt(march.c * march.c + 4.0 * march.g * d)) if d > 0.0 else 0.0
 
 
 @Inner
 def fill_expm1(work, q, out):  # type: ignore[no-untyped-def]
-    """Fill the row at ``out`` with exp - 1 of the row at ``q``."""
+    """Fill the row at ``out`` with exp(q) - 1 for the row at ``q``."""
     largest, scale, doublings = max(size_of(work, q), fabs(work[q + COUNT])), 1.0, 0
     while largest * scale > MAX_SERIES_Q:
         scale, doublings = 0.5 * scale, doublings + 1
@@ -198,7 +198,7 @@ def set_nodes(work):  # type: ignore[no-untyped-def]
 
 @Inner
 def begin_panel(forces, march, panel, width, work):  # type: ignore[no-untyped-def]
-    """Lay the nodes of a panel; where forces are linear in V**2, also fill what `sample` fills."""
+    """Lay the nodes of a panel; if the forces are linear in V**2, also fill the rows that `sample` fills."""
     origin, u = march.origin, march.direction
     product(work, OFFSET, NODES, width)
     distance_row(work, D, OFFSET, slope_at(panel.left, march), march.g)
@@ -213,9 +213,9 @@ def begin_panel(forces, march, panel, width, work):  # type: ignore[no-untyped-d
 
 @Inner
 def sample(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Fill the rows DS to KAPPA and Q_RATE at the panel's places, for V**2 as it stands in W.
+    """Fill the rows DS to KAPPA and Q_RATE at the panel's places, for the values of V**2 in the row W.
 
-    The values at the panel's end only fill the registers, and may not be numbers.
+    The values at the panel's end only fill up the registers, and may be NaN.
     """
     v, nu = float(forces.direction), float(panel.contact_sign)
     call_speed_equation(forces.speed_equation, WIDE, work, (ARC_RATE, W, DS), v, nu, forces.params)
@@ -224,7 +224,7 @@ def sample(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_force(march, work):  # type: ignore[no-untyped-def]
-    """Fill the rows EXPM1_Q and FORCE for the forces that were sampled; returns q over the panel, inf if too large."""
+    """Fill the rows EXPM1_Q and FORCE for the sampled forces; return q over the panel, or inf if it is too large."""
     to_means(work, Q_RATE, work, SPEED)
     product(work, SPEED, SPEED, OFFSET)
     total = work[SPEED + COUNT]
@@ -237,11 +237,11 @@ def fill_force(march, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
-    """Fill the row at ``out`` with W for the forces that were sampled; returns q over the panel, inf if too large."""
+    """Fill the row at ``out`` with W for the sampled forces; return q over the panel, or inf if it is too large."""
     total = fill_force(march, work)
     if not total < inf:
         return inf
-    # The integral over the distance comes from means, and where g is not zero also from means with the weight y.
+    # The integral over the distance comes from means, and if g is not zero also from means weighted with y.
     to_means(work, FORCE, work, MEAN)
     if march.g > 0.0:
         to_graded_means(work, FORCE, work, GRADED)
@@ -254,11 +254,13 @@ def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """`integrate` for forces that are not linear in V**2, by Newton's method; inf if it does not converge."""
+    """Do the work of `integrate` for forces that are not linear in V**2, by Newton's method; return inf if it does not
+    converge.
+    """
     v, nu = float(forces.direction), float(panel.contact_sign)
-    work[W] = max(panel.v2, 1e-300)  # laws may take its root
+    work[W] = max(panel.v2, 1e-300)  # laws may contain its square root
     call_speed_equation(forces.speed_equation, 1, work, (ARC_RATE, W, MEAN), v, nu, forces.params)
-    # The first approximation grows as V**2 does at the panel's start.
+    # The first approximation is linear, with the slope of V**2 at the panel's start.
     slope = max(march.direction * (work[MEAN + 1] - work[MEAN + 2] * work[W]), 0.0)
     linear_row(work, W, D, panel.v2, slope)
     last_change = inf
@@ -273,7 +275,7 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
         copy_row(work, W, SPEED)
         if not change < inf:
             return inf
-        # Each iteration squares the error, until rounding is all that changes.
+        # Each iteration squares the error, until changes are rounding only.
         if change <= 4e-16 * size or (change <= 1e-13 * size and change >= 0.5 * last_change):
             return total
         last_change = change
@@ -282,9 +284,9 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """W on a panel that was begun (`begin_panel`), and all rows that do not need W > 0.
+    """Compute W on a panel prepared by `begin_panel`, and all rows that do not need W > 0.
 
-    Returns q over the panel, or inf if the panel is too wide for an answer.
+    Return q over the panel, or inf if the panel is too wide to be solved.
     """
     total = integrate(march, panel, W, work) if forces.linear else solve_nonlinear(forces, march, panel, work)
     if not total < inf:
@@ -301,13 +303,13 @@ def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def as_factor(w, march, left):  # type: ignore[no-untyped-def]
-    """A value of W in the unit of W_FACTOR, at the start of a panel."""
+    """Return a value of W at the start of a panel in the unit of W_FACTOR."""
     return w / (0.25 * march.c * march.c) if march.g > 0.0 and left == 0.0 and march.c > 0.0 else w
 
 
 @Inner
 def fill_rates(march, panel, work):  # type: ignore[no-untyped-def]
-    """Fill Y and the rates of time and of arc length; they are not numbers where W is not positive."""
+    """Fill Y and the rates of time and of arc length, which are NaN where W is not positive."""
     if panel.v2 == 0.0 or march.g == 0.0:
         root_row(work, SPEED, W_FACTOR)
     else:

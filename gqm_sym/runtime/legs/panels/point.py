@@ -1,4 +1,4 @@
-"""The forces on a body at one place: by how much they change V**2, and the sign of N."""
+"""The forces on a body at one place: the change of V**2 that they cause, and the sign of N."""
 
 from math import fabs
 
@@ -10,7 +10,7 @@ from gqm_sym.runtime.compiled.registers import on_stack
 # digit less than doubles.
 ZERO_TOLERANCE = 5e-14
 
-# V**2 of a body at rest, for laws that take its root.
+# The value used for V**2 of a body at rest, for laws that contain its square root.
 LEAST_V2 = 1e-300
 
 # A buffer for one place, V**2 there, and the five numbers of the speed equation.
@@ -19,7 +19,9 @@ point_buffer = on_stack(7)
 
 @Inner
 def slope_of_v2(forces, place, v2, contact_sign, point):  # type: ignore[no-untyped-def]
-    """By how much V**2 grows per distance run; also fills ``point`` from index 2 on with DS to KAPPA."""
+    """Return the increase of V**2 per unit of the curve parameter run, and fill ``point`` from index 2 on with DS to
+    KAPPA.
+    """
     v, nu = float(forces.direction), float(contact_sign)
     point[0], point[1] = place, v2
     call_speed_equation(forces.speed_equation, 1, point, (0, 1, 2), v, nu, forces.params)
@@ -28,7 +30,7 @@ def slope_of_v2(forces, place, v2, contact_sign, point):  # type: ignore[no-unty
 
 @Inner
 def sign_of_load(forces, place, v2, point):  # type: ignore[no-untyped-def]
-    """The sign of N at a place; 0 where it is zero within rounding."""
+    """Return the sign of N at a place; 0 where it is zero within rounding."""
     slope_of_v2(forces, place, v2, 0, point)
     load, centripetal = point[5], point[6] * v2
     if fabs(load + centripetal) > ZERO_TOLERANCE * (fabs(load) + fabs(centripetal)):

@@ -1,7 +1,8 @@
-"""Polynomials on a panel: from values at Chebyshev nodes to coefficients, running means, and proved changes of sign.
+"""Polynomials on a panel, given by values at Chebyshev nodes: their coefficients, running means, and proved changes of
+sign.
 
 The nodes are those of the first kind, so that no function is ever needed at a panel's ends, one of which may be a cusp
-or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
+or the end of the domain. ``x`` runs from -1 at the beginning of the panel to 1 at its end.
 """
 
 from math import cos, fabs, fsum, pi, sin
@@ -16,14 +17,16 @@ from gqm_sym.runtime.compiled.registers import on_stack, over_rows
 # The number of nodes; together with the panel's end they fill three registers.
 COUNT = 23
 
-# The fixed point of tables, and pi in it.
+# The number of binary places of the tables in fixed-point arithmetic, and pi in it.
 BITS = 240
 PI = 31415926535897932384626433832795028841971693993751058209749445923078164062862 * (1 << BITS) // 10**76
 
 
 def _share(m: int) -> float:
-    """``sin(pi m/(4 COUNT))**2``, correctly rounded: an error of the nodes would be one of every turning point."""
-    square = (PI * m // (2 * COUNT)) ** 2 >> BITS  # of twice the angle
+    """Return ``sin(pi m/(4 COUNT))**2`` correctly rounded, because an error of the nodes would be one of every turning
+    point.
+    """
+    square = (PI * m // (2 * COUNT)) ** 2 >> BITS  # the cosine of twice the angle
     total, term, n = 0, square // 2, 2
     while term:
         total, term, n = total + term, -(term * square >> BITS) // ((n + 1) * (n + 2)), n + 2
@@ -31,7 +34,7 @@ def _share(m: int) -> float:
 
 
 def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The nodes as shares of the panel, the matrices of running means, and that of Chebyshev coefficients.
+    """Return the nodes as shares of the panel, the matrices of running means, and the matrix of Chebyshev coefficients.
 
     They are computed in integers and rounded at the end, because an error here would be one of every integral.
     """
@@ -50,7 +53,9 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     one = 1 << BITS
 
     def both_means(share: float) -> tuple[list[float], list[float]]:
-        """Means of all T_k over [0, y], y a share of the panel, by the measures dy and d(y**2)."""
+        """Return the means of all T_k over [0, y], where y is a share of the panel, with the measures dy and
+        d(y**2).
+        """
         top, bottom = share.as_integer_ratio()
         y = one // bottom * top
         values = [one, 2 * y - one]  # T_(k+1) = (4 y - 2) T_k - T_(k-1)
@@ -73,7 +78,7 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
 SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 
-# A row has the values at the nodes and one at the panel's end, which fills it up to whole registers.
+# A row has the values at the nodes and one at the panel's end, which makes its length a multiple of a register.
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
 to_means, to_graded_means, to_coefficients = (multiply(table.T) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS))
@@ -84,32 +89,32 @@ LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 to_tails = multiply(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T)
 extent, size_of = span(COUNT), largest(COUNT)
 
-# A bound of the Lebesgue constant: the polynomial differs from a number nowhere by more than this times the largest
+# A bound on the Lebesgue constant: the polynomial nowhere differs from a number by more than this times the largest
 # difference at the nodes.
 LEBESGUE = 3.0
 
-# The smallest part of a panel that is searched for a change of sign that bounds do not decide.
+# The smallest part of a panel that is searched for a change of sign if bounds do not decide it.
 MIN_PART = 2.0**-30
 
-# Rows of the buffer of a search: the series on the part that is searched, three rows of Clenshaw's scheme by which it
-# is found, and the ends of the parts that are still to search.
+# Rows of the buffer of a search: the series on the part being searched, three rows of the Clenshaw recurrence by which
+# it is found, and the ends of the parts still to be searched.
 PART, TWICE_X, NEXT_SUM, SUM_AFTER, STACK = range(0, 5 * WIDE, WIDE)
 search_buffer = on_stack(STACK + 64)
 
 next_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + twice_x * next_sum - after, WIDE)
 last_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + 0.5 * twice_x * next_sum - after, WIDE)
 
-# The step of Newton's method for a zero in [-1, 1] after which it ends: the next one would be about its square.
+# Newton's method for a zero in [-1, 1] ends after a step this short, because the next one would be about its square.
 LAST_STEP = 1e-9
 
 
-# What bounds say of a series on a part of the panel (`_on_part`).
+# The conclusions from bounds of a series on a part of the panel (`_on_part`).
 ONE_SIGN, TO_ZERO, OTHER_SIGN, CROSSES, ZERO, UNDECIDED = range(6)
 
 
 @Inner
 def _at_ends(c):  # type: ignore[no-untyped-def]
-    """The series at -1 and at 1."""
+    """Return the series at -1 and at 1."""
     even, odd = c[0], 0.0
     for k in range(1, COUNT - 1, 2):
         odd += c[k]
@@ -123,7 +128,7 @@ def _restrict(c, lo, hi, buffer):  # type: ignore[no-untyped-def]
     for j in range(WIDE):
         buffer[TWICE_X + j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
         buffer[NEXT_SUM + j], buffer[SUM_AFTER + j] = 0.0, 0.0
-    for k in range(COUNT - 1, 0, -2):  # each sum takes the place of the one before the last
+    for k in range(COUNT - 1, 0, -2):  # each sum replaces the last but one
         next_sum_row(buffer, SUM_AFTER, TWICE_X, NEXT_SUM, SUM_AFTER, c[k])
         next_sum_row(buffer, NEXT_SUM, TWICE_X, SUM_AFTER, NEXT_SUM, c[k - 1])
     last_sum_row(buffer, TWICE_X, TWICE_X, NEXT_SUM, SUM_AFTER, c[0])
@@ -132,8 +137,8 @@ def _restrict(c, lo, hi, buffer):  # type: ignore[no-untyped-def]
 
 @Inner
 def _is_monotone(c):  # type: ignore[no-untyped-def]
-    """Whether bounds of its derivative prove that the series is monotone."""
-    # The derivative's coefficients from the last one down; each follows from the one two degrees higher.
+    """Return whether bounds of its derivative prove that the series is monotone."""
+    # The derivative's coefficients are found from the last one down; each follows from the one two degrees higher.
     second, first, others = 0.0, 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
         second, first = first, second + 2.0 * k * c[k]
@@ -144,7 +149,7 @@ def _is_monotone(c):  # type: ignore[no-untyped-def]
 
 @Inner
 def sum_and_slope(c, x):  # type: ignore[no-untyped-def]
-    """The series and its derivative at x."""
+    """Return the series and its derivative at x."""
     value, value_after, slope, slope_after = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
     for k in range(COUNT - 1, 0, -1):
@@ -155,7 +160,9 @@ def sum_and_slope(c, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def _crossing(c, low, high):  # type: ignore[no-untyped-def]
-    """The zero of a monotone series that goes from ``low`` to ``high``, by Newton's method inside a bracket."""
+    """Return the zero of a monotone series that changes from ``low`` to ``high``, by Newton's method inside a
+    bracket.
+    """
     lo, hi, rising = -1.0, 1.0, high > 0.0
     x = lo + (hi - lo) * (low / (low - high))
     for _ in range(60):
@@ -183,7 +190,7 @@ def _sign(value, noise):  # type: ignore[no-untyped-def]
 
 @Inner
 def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
-    """Return the result of bounds by the coefficients for a series on a part of the panel.
+    """Return what bounds from the coefficients prove about the sign of a series on a part of the panel.
 
     Parameters
     ----------
@@ -195,13 +202,13 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     Returns
     -------
     verdict : int
-        ONE_SIGN, the one so far, to its end; TO_ZERO, the one so far, but its end is no more than noise; OTHER_SIGN
-        throughout; CROSSES from the one so far to the other, or has the other one; ZERO, no more than noise, or
-        undecided on a smallest part; else UNDECIDED.
+        ONE_SIGN if the series has the sign so far up to its end; TO_ZERO if it does, but is within the noise at its
+        end; OTHER_SIGN if it has the other sign throughout; CROSSES if it changes from the sign so far to the other, or
+        has the other; ZERO if it is within the noise, or undecided on a smallest part; else UNDECIDED.
     before : int
         The sign with which it starts, if it was not known before.
     x : float
-        The place in [-1, 1] where it crosses zero.
+        The place in [-1, 1] of the zero crossing; 2 if there is none.
     """
     spread = 0.0
     for k in range(1, COUNT):
@@ -225,10 +232,11 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
 
 @Inner
 def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
-    """The first place in [-1, 1] where a series takes the other sign; none is missed.
+    """Find the first place in [-1, 1] where a series takes the other sign; none is missed.
 
     The panel is halved until bounds by the coefficients prove that the series has one sign or is monotone. On a part
-    where it is no more than ``noise`` it has no sign, so that touching zero without a change of sign does not count.
+    where the series is within the ``noise`` it has no sign, so that touching zero without a change of sign does not
+    count.
 
     Parameters
     ----------
@@ -242,11 +250,11 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
     Returns
     -------
     x : float
-        Where it changes its sign; 2 if it does not.
+        The place at which it changes its sign; 2 if it does not.
     before : int
         The sign with which it starts.
     touch : float
-        The first place before ``x`` where it is no more than noise but is not proved to cross zero; 2 if there is none.
+        The first place before ``x`` where it is within the noise but is not proved to cross zero; 2 if there is none.
     """
     part, buffer, lo, hi, waiting, halved = c, c, -1.0, 1.0, 0, False
     before, zero_from, touch = sign, 2.0, 2.0

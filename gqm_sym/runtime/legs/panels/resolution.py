@@ -1,4 +1,6 @@
-"""Whether what depends on the place on a panel is resolved by a polynomial, and by how much panels may be wider."""
+"""Tests whether functions of the place on a panel are resolved by polynomials, and the factors by which panels may be
+wider.
+"""
 
 from math import fabs, inf
 
@@ -34,45 +36,47 @@ from gqm_sym.runtime.legs.panels.polynomials import (
     to_tails,
 )
 
-# The last coefficients of a resolved function against the largest one; noise in them is about 1e-16.
+# The largest ratio of the last coefficients of a resolved function to its largest one; the noise in them is about
+# 1e-16.
 TAIL_RATIO = 4e-16
 
 # Below this ratio coefficients that no longer decrease are rounding noise, not structure.
 NOISE_LEVEL = 1e-9
 
-# The last coefficients of N against the largest one that suffice where N has one sign at all nodes, because its changes
-# of sign are decided to no more than that (`point.ZERO_TOLERANCE`); and those where it is far from zero throughout.
+# The same ratio for N if it has one sign at all nodes, because its changes of sign are not decided more accurately
+# (`point.ZERO_TOLERANCE`); and the ratio if N is far from zero throughout.
 ONE_SIGN_RATIO, FAR_FROM_ZERO_RATIO = 1e-14, 1e-7
 
-# What rounding may leave of a function that vanishes by cancellation, as a share of its parts.
+# The rounding error of a function that vanishes by cancellation, as a share of its terms.
 CANCELLATION_NOISE = 1e-15
 
 # Coefficients that decrease by this factor with each degree reach TAIL_RATIO at the end; those in the middle are this
 # many degrees from the first.
 DECREASE, DEGREES = 5.4, 15
 
-# The bits of 1.0, and those that x**(-1/DEGREES) has for x = 1 if logarithms are linear between powers of two.
+# The bits of 1.0, and the constant that gives the bits of x**(-1/DEGREES) if logarithms are taken as linear between
+# powers of two.
 ONE = 0x3FF0000000000000
 LINEAR_LOGARITHM = ONE + ONE // DEGREES
 
-# How far a singularity is from the panel's middle, in half widths, if coefficients decrease by that factor.
+# The distance of a singularity from the panel's middle, in half widths, if coefficients decrease by that factor.
 SINGULARITY_DISTANCE = 0.5 * (DECREASE + 1.0 / DECREASE)
 
-# A factor by which panels are narrower than they seem to be allowed to be, and the most by which they grow.
+# A safety factor on the width of panels, and the largest factor by which they grow.
 SAFETY_FACTOR, MAX_GROWTH = 0.9, 4.0
 
 
 @Inlined
 def size_at(row):  # type: ignore[no-untyped-def]
-    """The index of the size that a row's coefficients are compared with."""
+    """Return the index of the size that a row's coefficients are compared with."""
     return SIZES + row // WIDE
 
 
 @Inner
 def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
-    """Set the sizes that coefficients are compared with, but that of the time rate; returns the largest V**2.
+    """Set the sizes that coefficients are compared with, except that of the time rate; return the largest V**2.
 
-    At the panel's start V**2 has the value ``v2``, which is ``factor`` in the unit of W_FACTOR.
+    At the panel's start V**2 is ``v2``, which is ``factor`` in the unit of W_FACTOR.
     """
     load_size_row(work, MEAN, DS, N0, KAPPA, W)
     largest_v2, q_rate = max(v2, extent(work, W)[1]), size_of(work, Q_RATE)
@@ -87,7 +91,9 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def examine(work, row, size):  # type: ignore[no-untyped-def]
-    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved."""
+    """Return the size of a function's last coefficients, that of some coefficients in the middle, and whether the
+    function is resolved.
+    """
     to_tails(work, row, work, TAILS)
     tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
     return tail, middle, tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
@@ -95,9 +101,11 @@ def examine(work, row, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
-    """Whether rows ``first`` to ``last`` (excluded) are resolved; and their largest ratio of middle coefficients.
+    """Return whether rows ``first`` to ``last`` (excluded) are resolved, and the largest ratio of their middle
+    coefficients to their sizes.
 
-    Noise counts as no more than it usually is: where terms of the force cancel, panels would stay narrow for nothing.
+    The noise is taken to be that without cancellation: panels would not become more accurate by being narrower where
+    terms of the force cancel.
     """
     resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
@@ -114,22 +122,26 @@ def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
 
 @Inner
 def decrease(ratio):  # type: ignore[no-untyped-def]
-    """The factor by which coefficients decrease with each degree, by those in the middle; right to a few per cent."""
+    """Return the factor by which coefficients decrease with each degree, estimated from those in the middle to a few
+    per cent.
+    """
     return from_bits(LINEAR_LOGARITHM - bits(ratio) // DEGREES)
 
 
 @Inner
 def growth(ratio):  # type: ignore[no-untyped-def]
-    """The factor by which a panel may grow, if coefficients are powers of the distance to a singularity."""
+    """Return the factor by which a panel may grow if coefficients decrease as powers of the distance to a
+    singularity.
+    """
     return min(SAFETY_FACTOR / DECREASE * decrease(ratio), MAX_GROWTH) if ratio < inf else 0.5
 
 
 @Inner
 def growth_towards(ratio, side):  # type: ignore[no-untyped-def]
-    """The factor by which a panel may grow if the singularity lies ahead, as a turn does for time.
+    """Return the factor by which a panel may grow if the singularity lies ahead, as a turn does for the time rate.
 
-    It is meant for the panel itself (``side`` 1) or for the one that begins at its end (-1). Coefficients decrease as
-    for an ellipse through the singularity.
+    The factor is for the panel itself (``side`` 1) or for the one that begins at its end (-1). Coefficients decrease as
+    for the Bernstein ellipse through the singularity.
     """
     if not ratio < inf:
         return 0.5
@@ -139,20 +151,20 @@ def growth_towards(ratio, side):  # type: ignore[no-untyped-def]
 
 @Inner
 def narrower(width, factor):  # type: ignore[no-untyped-def]
-    """The width to try next."""
+    """Return the width to try next."""
     return width * max(min(factor, 0.9), 0.2)
 
 
 @Inner
 def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
-    """Whether a function's values are so far from zero that the polynomial through them has no zero."""
+    """Return whether a function's values are so far from zero that the polynomial through them has no zero."""
     low, high = extent(work, row)
     return fabs(0.5 * (low + high)) > 0.5 * LEBESGUE * (high - low) + noise
 
 
 @Inner
 def is_load_resolved(work):  # type: ignore[no-untyped-def]
-    """Whether N is resolved as far as its changes of sign need it, and its ratio of middle coefficients."""
+    """Return whether N is resolved as far as its changes of sign require, and the ratio of its middle coefficients."""
     size = work[size_at(LOAD)]
     tail, middle, fine = examine(work, LOAD, size)
     if not (tail < inf and middle < inf):
@@ -168,7 +180,7 @@ def is_load_resolved(work):  # type: ignore[no-untyped-def]
 
 @Inner
 def first_change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
-    """`first_change` of a row of values; coefficients are computed only if the values leave a doubt."""
+    """Return `first_change` of a row of values; coefficients are computed only if the values leave a doubt."""
     if keeps_sign(work, row, noise):
         found = 1 if work[row] > 0.0 else -1
         if sign == 0 or found == sign:
@@ -179,9 +191,9 @@ def first_change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
 
 @Inner
 def kink(work):  # type: ignore[no-untyped-def]
-    """The place x where the curvature changes sign: 2 if it does not, -1 if that is not resolved.
+    """Return the place x where the curvature changes sign; 2 if it does not, -1 if that is not resolved.
 
-    The sign is taken from ds kappa, which is smooth at cusps too.
+    The sign is that of ds kappa, which is also smooth at cusps.
     """
     product(work, LOAD, DS, KAPPA)
     size = size_of(work, LOAD)
@@ -192,12 +204,14 @@ def kink(work):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_curve_resolved(width, work):  # type: ignore[no-untyped-def]
-    """Whether the rows that do not depend on V**2 are resolved, and their largest ratio of middle coefficients."""
+    """Return whether the rows that do not depend on V**2 are resolved, and their largest ratio of middle
+    coefficients.
+    """
     work[size_at(DS)], work[size_at(Q_RATE)] = size_of(work, DS), max(size_of(work, Q_RATE), 1.0 / width)
     return are_resolved(work, Q_RATE, P)
 
 
 @Inlined
 def tail_of(work):  # type: ignore[no-untyped-def]
-    """The largest of the last coefficients of the row examined last."""
+    """Return the largest of the last coefficients of the row examined last."""
     return max(abs(work[TAILS]), max(abs(work[TAILS + 1]), abs(work[TAILS + 2])))

@@ -1,4 +1,4 @@
-"""The widest panel from a place on, on which V**2, the forces and the time rate can be resolved by a polynomial."""
+"""The widest panel from a given place on which polynomials resolve V**2, the forces and the time rate."""
 
 from math import fabs, inf, sqrt
 from typing import NamedTuple
@@ -41,30 +41,33 @@ from gqm_sym.runtime.legs.panels.resolution import (
 # A width of a few units in the last place of the curve's parameter.
 MIN_RELATIVE_WIDTH = 1e-15
 
-# From this ratio on of its coefficients to all others the time rate is taken to have a turning point ahead.
+# If the ratio of the time rate's coefficients to those of all other functions is above this, a turning point is taken
+# to lie ahead.
 TURNING_RATIO = 10.0
 
 # The ratio of V**2 at a panel's end to the largest V**2 so far above which time is resolved. Below it a turn is
 # expected, and time is counted from there.
 HIGH_V2_RATIO = 0.25
 
-# The share of a panel on which V**2 is resolved within which structure of the time rate can only be noise.
+# On a part of a panel shorter than this share of a panel on which V**2 is resolved, structure of the time rate can only
+# be noise.
 NOISE_WIDTH_RATIO = 2.0**-20
 
-# The most panels of a leg, and the most widths that are tried for one.
+# The largest number of panels of a leg, and of widths that are tried for one.
 MAX_PANELS, MAX_WIDTHS = 20000, 2100
 
-# How far it is from the node next to an end of a panel to that end, against the distance of the next node.
+# The distance from the outermost node of a panel to the panel's end, over the distance to the next node.
 TO_END = float(SHARES[0] / (SHARES[1] - SHARES[0]))
 
-# Where ds/dlam changes by this factor or more on a panel, and would vanish within so many units in the last place of
-# its start, it does: narrower panels would step over that place, which their roundings hide.
+# If ds/dlam changes by this factor or more on a panel, and by extrapolation would vanish within so many units in the
+# last place of its start, it is taken to vanish there: narrower panels would step over that place, which rounding
+# hides.
 CUSP_RATIO, CUSP_UNITS = 1.5, 32.0
 
-# At a cusp that roots of a polynomial give, ds/dlam is no more than this share of what it is about it.
+# At a cusp found as the zero of a polynomial, ds/dlam is at most this share of its values nearby.
 CUSP_SHARE = 1e-7
 
-# Whether time has to be resolved.
+# Codes that say whether time has to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
 
 
@@ -78,12 +81,12 @@ class PanelRequest(NamedTuple):
     step : float
         The width to begin with.
     largest_v2 : float
-        The largest V**2 on the leg so far, less what resistance alone takes of it since.
+        The largest V**2 on the leg so far, reduced by the resistance since then.
     timing : int
         ALWAYS if time must be resolved, NEVER if not; MAYBE if it must unless V**2 is below HIGH_V2_RATIO of the
         largest at both ends.
     resolve_load : bool
-        Whether N must be resolved as far as its changes of sign need it.
+        Whether N must be resolved as far as its changes of sign require.
     """
 
     max_width: float
@@ -95,17 +98,18 @@ class PanelRequest(NamedTuple):
 
 @Inner
 def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # type: ignore[no-untyped-def]
-    """Whether a panel will do as far as time is concerned.
+    """Decide whether a panel resolves time as far as that is required.
 
-    ``worst`` is the ratio of middle coefficients of the other functions. On so small a part of a smooth panel that it
-    ``is_sliver`` only noise is unresolved, which the error of the time includes.
+    ``worst`` is the ratio of middle coefficients of the other functions. If the panel is a very small part of a smooth
+    one (``is_sliver``), only noise is unresolved, which the error of the time includes.
 
     Returns
     -------
     done : bool
-        Whether the panel will do.
+        Whether the panel meets the requirement.
     factor : float
-        By how much the next panel may be wider; or this one, if it will not do.
+        The factor by which the next panel may be wider, or to which this one must be reduced if it does not meet the
+        requirement.
     timed : bool
         Whether time is resolved.
     """
@@ -118,7 +122,7 @@ def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # 
         work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
         timed, ratio = are_resolved(work, TIME_RATE, LOAD)
     timed = timed or (needed and is_sliver and work[TAILS] < inf)
-    # Where only time needs narrow panels while V**2 decreases, there is a turn ahead.
+    # If only time needs narrow panels while V**2 decreases, there is a turn ahead.
     turning = end < panel.v2 and ratio > TURNING_RATIO * worst
     if timed:
         factor = min(factor, growth_towards(ratio, -1.0) if turning else growth(ratio))
@@ -129,9 +133,10 @@ def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # 
 
 @Inner
 def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Whether ds/dlam vanishes between an end of a panel and the node next to it, where no values show it.
+    """Return whether ds/dlam vanishes between an end of a panel and the node next to it, where there are no values to
+    show it.
 
-    The nodes then make it negative at that end, of the size that it has there.
+    Extrapolation from the nodes then gives a negative value at that end, of about the actual size.
     """
     last = DS + COUNT - 1
     at_end = work[last] + TO_END * (work[last] - work[last - 1])
@@ -145,7 +150,7 @@ def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def ds_at(forces, march, panel, far):  # type: ignore[no-untyped-def]
-    """ds/dlam at a distance from the origin of the march."""
+    """Return ds/dlam at a distance from the origin of the march variable."""
     point = point_buffer()
     place = within(march.origin[0] + march.direction * far, panel.span)
     slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
@@ -154,30 +159,33 @@ def ds_at(forces, march, panel, far):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_cusp(forces, march, panel, far, work):  # type: ignore[no-untyped-def]
-    """Whether ds/dlam vanishes at a place on a panel, at which the curvature changes sign.
+    """Return whether ds/dlam vanishes at a place on a panel at which the curvature changes sign.
 
-    There the curve turns back on itself, and no panel may end: the next one would begin behind the end of the motion.
+    The curve turns back on itself there, and no panel may end there, because the next one would begin beyond the end of
+    the motion.
     """
     return ds_at(forces, march, panel, far) <= CUSP_SHARE * max(work[DS], work[DS + COUNT - 1])
 
 
 @Inner
 def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
-    """Whether ds/dlam vanishes next to the start of a panel of a length, given a unit in the last place."""
+    """Return whether ds/dlam vanishes next to the start of a panel of the given length; ``unit`` is a unit in the last
+    place.
+    """
     first, last = work[DS], work[DS + COUNT - 1]
-    if last > first:  # it vanishes as far before the start as it takes to grow to its first value
+    if last > first:  # by linear extrapolation it vanishes this far before the start
         return last > CUSP_RATIO * first and length * first <= CUSP_UNITS * unit * last
     return first > CUSP_RATIO * last and length <= CUSP_UNITS * unit
 
 
 @Inner
 def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
-    """The widest panel from a start on that can be resolved.
+    """Find the widest panel from a given start that can be resolved.
 
     Returns
     -------
     width : float
-        In the march variable; 0 if no width suffices that doubles can represent.
+        The width in the march variable; 0 if no width that doubles can represent suffices.
     step : float
         The width to begin with on the next panel.
     timed : bool
@@ -186,14 +194,15 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
     step, ends_at_kink, widest = request.step, False, 0.0
     start, slope = distance(panel.left, march), slope_at(panel.left, march)
     unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
-    # What is left of a leg may be hardly wider than the last panel may be narrow.
+    # The rest of a leg may be hardly wider than the narrowest possible panel.
     width = min(max(step, 4.0 * unit / (slope + sqrt(slope * slope + 8.0 * march.g * unit))), request.max_width)
-    # Where rows are known before V**2 is, they show most panels that are too wide.
+    # Rows that are known before V**2 show most panels that are too wide.
     curve_first = forces.linear and not forces.kinked
     last = Q_RATE if curve_first else P
     for _ in range(MAX_WIDTHS):
         length = width * (slope + march.g * width)
-        # A panel may be narrower than places in doubles if its end is given: distances on it keep their digits.
+        # A panel may be narrower than the spacing of doubles if its end is given, because distances on it keep their
+        # digits.
         if (length <= unit and width < request.max_width) or length < 1e-300:
             return 0.0, step, False
         begin_panel(forces, march, panel, width, work)
@@ -207,7 +216,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
         if forces.kinked and not ends_at_kink and (q < inf or forces.linear):
             x = kink(work)
             to_kink = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
-            # A leg that begins at a kink may begin a rounding before it.
+            # A leg that begins at a kink may begin before it by a rounding.
             far = to_kink * (slope + march.g * to_kink)
             if x <= 1.0 and far > unit and not (x > -1.0 and is_cusp(forces, march, panel, start + far, work)):
                 width, ends_at_kink = to_kink, x > -1.0

@@ -30,7 +30,7 @@ from gqm_sym.runtime.legs.panels.widest import MIN_RELATIVE_WIDTH
 
 
 class Change(NamedTuple):
-    """The first places on a panel, as x in [-1, 1], where something ends; 2 where it does not.
+    """The first places on a panel at which something changes, as x in [-1, 1]; 2 if there is none.
 
     Attributes
     ----------
@@ -52,7 +52,9 @@ class Change(NamedTuple):
 
 @Inner
 def equilibrium_near(work, direction, touch):  # type: ignore[no-untyped-def]
-    """The place x near ``touch`` where V**2, which almost vanishes there, is smallest, because the force vanishes."""
+    """Return the place x near ``touch`` at which the force vanishes, so that V**2, which almost vanishes there, is
+    smallest.
+    """
     for j in range(COUNT):
         work[MEAN + j] = direction * (work[P + j] - work[Q + j] * work[W + j])
     to_coefficients(work, MEAN, work, SERIES)
@@ -69,7 +71,7 @@ def equilibrium_near(work, direction, touch):  # type: ignore[no-untyped-def]
 
 @Inner
 def first_changes(march, panel, largest_v2, load_change, work):  # type: ignore[no-untyped-def]
-    """The first changes on a panel, on which N changes its sign at x = ``load_change``."""
+    """Return the first changes on a panel, on which N changes its sign at x = ``load_change``."""
     if panel.v2 == 0.0:
         scale = size_of(work, FORCE)
     else:
@@ -82,7 +84,7 @@ def first_changes(march, panel, largest_v2, load_change, work):  # type: ignore[
 
 @Inner
 def changes_at_once(march, panel, width, change, run_length):  # type: ignore[no-untyped-def]
-    """Whether N is zero at the panel's start, so that what follows decides its sign."""
+    """Return whether N is zero at the panel's start, so that its sign on the panel is decided by what follows."""
     if change.first == change.load and change.first <= 1.0:
         where = distance(panel.left + width * (0.5 * (1.0 + change.first)), march)
         here = march.origin[0] + march.direction * run_length
@@ -92,9 +94,9 @@ def changes_at_once(march, panel, width, change, run_length):  # type: ignore[no
 
 @Inner
 def cut_panel(forces, march, panel, width, change, run_length, work, point):  # type: ignore[no-untyped-def]
-    """Lay a panel once more, so that it ends at the first change; returns the march variable there.
+    """Lay a panel once more, so that it ends at the first change; return the march variable there.
 
-    Its own sum has more digits than the series of a wider panel.
+    The sum over the shorter panel has more digits than the series of the wider one.
     """
     x = change.first
     if x == change.touch and x != change.turn:
@@ -110,7 +112,7 @@ def cut_panel(forces, march, panel, width, change, run_length, work, point):  # 
         if fabs(v2) < fabs(slope) * 1e-6 * (there - run_length):
             right = marched(there - v2 / slope, march)
     elif change.first == change.load and change.first != change.touch:
-        # N at the panel's end has no error of a series, nor has the distance left to where it vanishes.
+        # N at the panel's end is free of the error of a series, and so is the remaining distance to the zero of N.
         load, load_before = work[LOAD + COUNT], work[LOAD + COUNT - 1]
         rate = (load - load_before) / (work[OFFSET + COUNT] - work[OFFSET + COUNT - 1])
         if fabs(load) < fabs(rate) * 1e-6 * (right - panel.left):

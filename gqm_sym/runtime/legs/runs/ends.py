@@ -27,12 +27,13 @@ from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
 TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, SLOWED, FULL = range(9)
 GOES_ON = -1
 
-# A body this close to a turn, as a share of the distance it has run, counts as being there; some laws have no value
+# A body this close to a turn, as a share of the distance run, counts as being there, because some laws have no value
 # beyond a turn.
 NEAR_TURN = 1e-11
 
-# A body whose place is smaller than where the run began by this factor, and which goes on by hardly more than that, is
-# on its way to an equilibrium at 0: places that are counted from farther away would lose their digits.
+# If the place of a body is smaller by this factor than the start of its run, and the next step is hardly longer than
+# the place, the body is on its way to an equilibrium at 0. Its run pauses, because places that are counted from a
+# farther origin would lose their digits.
 CLOSE_SHARE = 2.0**-10
 
 
@@ -54,12 +55,12 @@ class Timed(NamedTuple):
 
 
 class End(NamedTuple):
-    """The code of the end of a run.
+    """The end of a run, with the state of the body there.
 
     Attributes
     ----------
     what : int
-        TURN to FULL.
+        One of the codes from TURN to FULL.
     place : (float, float)
         The place as two doubles.
     v2 : float
@@ -67,11 +68,11 @@ class End(NamedTuple):
     contact_sign : int
         The sign of N there.
     step, no_turn_until : float
-        As in `Start`, from here on.
+        As in `Start`, for the next run.
     middle : (float, float)
         The place up to which time is counted, as two doubles.
     half_c : float
-        c/2 of the march variable (`panels.equation.March`); infinite where it is the distance itself.
+        c/2 of the march variable (`panels.equation.March`); infinite if that is the distance itself.
     change_count, panel_count : int
         The number of sign changes of N, and of recorded panels.
     upcoming : int
@@ -93,10 +94,11 @@ class End(NamedTuple):
 
 @Inner
 def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
-    """Return the end of a run where no panel is possible, with its distance and V**2: a turn, if one is near.
+    """Return the end of a run at a place where no panel is possible, with its distance and V**2; it is a turn if one is
+    near.
 
-    Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
-    there, and the body never comes to it.
+    If a body at rest would move on, the end is not a turn but an equilibrium: V**2 grows with the square of the
+    distance from there, and the body never reaches it.
     """
     if not forces.linear and panel.v2 > 0.0:
         here = march.origin[0] + march.direction * run_length
@@ -110,7 +112,7 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
 
 @Inner
 def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
-    """`end_at_once` where V**2 is below its noise because the panel begins next to a turn; GOES_ON elsewhere."""
+    """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise GOES_ON."""
     if change.first == change.touch and not forces.linear:
         what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
         if what == TURN:
@@ -120,9 +122,10 @@ def turn_below_noise(forces, march, panel, change, run_length, point):  # type: 
 
 @Inner
 def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[no-untyped-def]
-    """Whether a body has run far enough for once, or approaches an equilibrium at 0 that the run's start is far from.
+    """Return whether the run may pause: it is long enough, or approaches an equilibrium at 0 that is far from its
+    start.
 
-    ``speeds`` are V**2 and the largest so far, ``panel`` where the next one begins and how wide it is to be.
+    ``speeds`` are V**2 and its largest value so far; ``panel`` is the start and the width of the next panel.
     """
     here, (left, step) = fabs(march.origin[0] + march.direction * run_length), panel
     onwards = step * (slope_at(left, march) + march.g * step)
@@ -156,7 +159,7 @@ def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # typ
 
 @Inner
 def conclude(forces, route, march, end, timed, searching, run_length):  # type: ignore[no-untyped-def]
-    """The end of a run at the distance ``run_length``; ``end`` has all of it but the places."""
+    """Return the end of a run at the distance ``run_length``; ``end`` has all of its data except the places."""
     breaks, v, what = route.breaks, march.direction, end.what
     middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
     v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - run_length

@@ -1,10 +1,10 @@
-"""V**2 along the legs of a dissipative motion, panel after panel: to where they end, and back from where they turn.
+"""V**2 along the legs of a dissipative motion, panel by panel: forwards to their ends, and back from their turns.
 
-A leg is run once from its start (`run`), and time is counted on the way as long as V**2 is large. If the leg ends
-at a turn, time is counted from there back to where it was left off: next to a turn V**2 is a small difference when it
-is computed from the start, but has all its digits when it is computed from the turn. A leg that tends to an equilibrium
-is followed back from there as a field of polynomials (`leg_record`). Before all this, a leg that begins at a turn is
-tried as one polynomial (`whole_leg`).
+A leg is run once from its start (`run`), and time is counted on the way as long as V**2 is large. If the leg ends at a
+turn, the rest of the time is counted back from there: next to a turn V**2 is a small difference when it is computed
+from the start, but has all its digits when it is computed from the turn. A leg that tends to an equilibrium is followed
+back from there as a field of polynomials (`leg_record`). Before all this, a leg that begins at a turn is tried as one
+polynomial (`whole_leg`).
 """
 
 from math import fabs, sqrt
@@ -54,18 +54,18 @@ from gqm_sym.runtime.legs.runs.route import Start
 from gqm_sym.runtime.legs.runs.run import run
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
-# Why a leg was not followed back.
+# The reasons for which a leg was not followed back.
 NO_SPACE, LOST = -1, -2
 
 
 @Inner
 def next_stop(march, passed, length_back, record, breaks, remaining):  # type: ignore[no-untyped-def]
-    """On the way back, the distance at which the next panel must end.
+    """Return the distance at which the next panel must end on the way back.
 
     Parameters
     ----------
     passed, length_back : float
-        The distance that was followed back so far, and that to follow.
+        The distance that has been followed back so far, and the whole distance to follow back.
     remaining : (int, int, int)
         The index of the next change of N's sign, that of the next break, and the sign of N.
 
@@ -76,7 +76,7 @@ def next_stop(march, passed, length_back, record, breaks, remaining):  # type: i
     """
     change, upcoming, contact_sign = remaining
     origin, u, stop = march.origin, march.direction, length_back
-    # Distances are compared, because the distance to a stop was given as such: its place may be a rounding farther.
+    # Distances are compared and not places, because the place of a stop may be rounded to a farther one.
     while change >= 0 and offset(record[change_at(record, change)], origin, u) <= passed:
         change, contact_sign = change - 1, -contact_sign
     while upcoming >= 0 and offset(breaks[upcoming], origin, u) <= passed:
@@ -90,14 +90,14 @@ def next_stop(march, passed, length_back, record, breaks, remaining):  # type: i
 
 @Inner
 def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
-    """Enter the panels of a leg that turns, followed back from the turn to the middle of its run.
+    """Store the panels of a leg that turns, followed back from the turn to the middle of its run.
 
     Parameters and Returns are those of `approach`, with panels for rows.
     """
     work = panel_buffer()
     set_nodes(work)
     v, march = forces.direction, March(end.place, -forces.direction, 1.0, 0.0)
-    # By the same differences as in `next_stop`, for the middle may be a break.
+    # The differences are those of `next_stop`, because the middle may be a break.
     length = v * ((end.place[0] - end.middle[0]) + end.place[1]) - v * end.middle[1]
     count, v2, left, passed, step = 0, 0.0, 0.0, 0.0, sqrt(end.step)
     remaining = (end.change_count - 1, breaks.size - 1, end.contact_sign)
@@ -124,7 +124,7 @@ def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
 
 @Inner
 def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
-    """Enter the field of a leg that tends to an equilibrium, followed back from there to the middle of its run.
+    """Store the field of a leg that tends to an equilibrium, followed back from there to the middle of its run.
 
     Parameters
     ----------
@@ -134,12 +134,12 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
     breaks, off
         As in `runs.run.run`.
     record, used
-        The field is entered in the record after the numbers that are used already.
+        The record, and the number of its elements in use, after which the field is stored.
 
     Returns
     -------
     int
-        The number of rows; NO_SPACE if the record has none for them, LOST if the leg could not be followed.
+        The number of rows; NO_SPACE if they do not fit into the record, LOST if the leg could not be followed.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -161,7 +161,7 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
             return NO_SPACE
         record[row], record[row + 1] = left, right
         if count == 0:
-            # V**2/d vanishes at the equilibrium, as the force does; what rounding leaves of it there is subtracted.
+            # V**2/d vanishes at the equilibrium, as the force does; its rounding error there is subtracted.
             to_coefficients(work, W_FACTOR, work, SERIES)
             linear_part = chebyshev_sum(work[SERIES : SERIES + COUNT], -1.0)
         for j in range(COUNT):
@@ -177,10 +177,11 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
 
 @Inner
 def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
-    """The direction in which a body at rest leaves a place, 0 if it stays; and whether it could stay at some slope.
+    """Return the direction in which a body at rest leaves a place, or 0 if it stays; and whether it could stay on some
+    slope.
 
-    The place is given by one on either side of it; these differ where it is a break. From a ridge the body may leave in
-    either direction, and takes the ``preferred`` one.
+    The place is given by one place on either side of it; the two differ if it is a break. From a ridge the body may
+    leave in either direction, and takes the ``preferred`` one.
     """
     point, rates = point_buffer(), point_buffer()
     point[0] = ahead
@@ -201,7 +202,7 @@ def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-un
 
 @Inner
 def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """`run`, begun again with the turn expected later where it slows down before its first panel."""
+    """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel."""
     while True:
         end = run(forces, start, route, off, record)
         if end.what != SLOWED or end.panel_count > 0:
@@ -214,7 +215,9 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
 
 @Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """`run_to_end`, as one polynomial if that will do; and how many panels from the end have been entered with it."""
+    """Run to the end as one polynomial if that suffices, else by `run_to_end`; return the end, and the number of panels
+    stored from the end.
+    """
     if start.v2 == 0.0 and forces.linear and start.may_be_whole:
         end = run_whole(forces, start, route, off, record)
         if end.what == TURN:
@@ -223,16 +226,16 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
 
 
 class Followed(NamedTuple):
-    """The outcome of a leg that was followed; its other data are in the record.
+    """The outcome of following a leg; other data are in the record.
 
     Attributes
     ----------
     what, contact_sign : int
         As in `runs.ends.End`.
     direction : int
-        At a turn, the one that `released` finds; otherwise that of the motion.
+        At a turn, the direction that `released` returns; otherwise that of the motion.
     could_stay : bool
-        At a turn, whether the body could stay there at some slope; otherwise True.
+        At a turn, whether the body could stay there on some slope; otherwise True.
     is_whole : bool
         Whether the leg was one polynomial.
     step, no_turn_until, v2 : float
@@ -251,12 +254,12 @@ class Followed(NamedTuple):
 
 @Inner
 def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def]
-    """Run a leg, and follow it back from where it ends with V**2 = 0.
+    """Run a leg, and follow it back from its end if V**2 vanishes there.
 
     Parameters
     ----------
     dissipation : Dissipation
-        The module's compiled functions, and of what kind its forces are.
+        The module's compiled functions, and the kind of its forces.
     p : array
         Run-time parameters.
     start : Start

@@ -1,11 +1,11 @@
 """The effect of the forces between two breaks of the curve on a body, kept for all bodies that pass.
 
-Bodies pass such a gap by it where forces are linear in V**2. Then ``V**2 = (w + G)/(1 + E)`` with w = V**2 at the first
-break, E = exp(q) - 1, and the integral G of exp(q) P (`panels.equation`): E and G depend on the place alone. With the
-middle M of G's range in ``u = w + M``, and the rest of it in ``H = G - M``, the time over the gap is the integral of
-``ds sqrt(1 + E)/sqrt(u + H)``. As a series it is a sum of powers of 1/u, each with the integral of
-``ds sqrt(1 + E) H**k``, which is kept. It is used where H is small against u; nearer to a turn V**2 and the rate of
-time follow at nodes from the rows that are kept.
+If the forces are linear in V**2, bodies pass such a gap by these data. Then ``V**2 = (w + G)/(1 + E)`` with w = V**2 at
+the first break, E = exp(q) - 1, and the integral G of exp(q) P (`panels.equation`): E and G depend on the place alone.
+With the middle M of G's range in ``u = w + M``, and the rest of it in ``H = G - M``, the time over the gap is the
+integral of ``ds sqrt(1 + E)/sqrt(u + H)``. As a series it is a sum of powers of 1/u, each with the integral of ``ds
+sqrt(1 + E) H**k``, which is kept. The series is used if H is small compared with u; nearer to a turn V**2 and the rate
+of time are found at nodes from the rows that are kept.
 """
 
 from math import fabs, inf, nan, sqrt
@@ -74,14 +74,14 @@ from gqm_sym.runtime.legs.panels.resolution import (
 )
 from gqm_sym.runtime.legs.runs.route import Ahead
 
-# The ratio of V**2 to the largest V**2 so far above which gaps are passed. The time that a rounding of the largest V**2
-# costs grows with the root of this ratio, and panels laid one by one take far longer.
+# The ratio of V**2 to the largest V**2 so far above which gaps are passed by kept data. Near a turn a rounding of the
+# largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
 GAP_V2_RATIO = 2.0**-6
 
-# The most that H may be as a share of u, and how many powers are summed then.
+# The largest share of u that H may be, and the number of powers that are summed then.
 MAX_SHARE, POWERS = 0.1, 16
 
-# What is kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
+# The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
 # largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature; the factors of the powers; and
 # rows from which V**2, N and time follow.
 STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
@@ -101,7 +101,7 @@ share_row = over_rows(lambda gained, middle, largest: (gained - middle) / larges
 
 @Inner
 def range_of(work, row):  # type: ignore[no-untyped-def]
-    """Bounds of the polynomial through a row of values."""
+    """Return bounds of the polynomial through a row of values."""
     low, high = extent(work, row)
     beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
     return low - beyond, high + beyond
@@ -109,7 +109,7 @@ def range_of(work, row):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Fill what is kept of a panel from break to break, from ``gaps[at]`` on."""
+    """Fill the data kept of a gap, the panel from one break to the next, from ``gaps[at]`` on."""
     gaps[at] = REFUSED
     begin_panel(forces, march, panel, width, work)
     if not fill_force(march, work) < inf:
@@ -145,7 +145,7 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
 
 
 class Bounds(NamedTuple):
-    """Between which numbers V**2 and the contact force per mass are on a gap."""
+    """Bounds of V**2 and of the contact force per mass on a gap."""
 
     least_v2: float
     most_v2: float
@@ -155,9 +155,9 @@ class Bounds(NamedTuple):
 
 @Inner
 def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
-    """The time over a gap at whose start V**2 is ``v2``, V**2 at its end, and bounds on it.
+    """Return the time over a gap at whose start V**2 is ``v2``, V**2 at its end, and bounds on the gap.
 
-    The time is NaN where V**2 changes too much for a few powers, or N may be near zero.
+    The time is NaN if V**2 changes too much for a few powers, or N may be near zero.
     """
     u, h = v2 + gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST]
     low, high = (u - h) * gaps[at + LEAST_DAMPING], (u + h) * gaps[at + MOST_DAMPING]
@@ -177,9 +177,10 @@ def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
 
 @Inner
 def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """The time over a gap, V**2 at its end, and the largest V**2 on it; fills V**2, Y and the rate of time at nodes.
+    """Return the time over a gap, V**2 at its end, and the largest V**2 on it; fill V**2, Y and the rate of time at
+    nodes.
 
-    The time is NaN where the curve or time is not resolved, V**2 vanishes or N may change its sign.
+    The time is NaN if the curve or the time is not resolved, V**2 vanishes, or N may change its sign.
     """
     if gaps[at] != FILLED:
         return nan, nan, nan
@@ -199,7 +200,7 @@ def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-un
     return width * work[TAILS + 6], end, high
 
 
-# How far, as a share, times may be off that are summed in another order.
+# The relative error of times that are summed in another order.
 ROUNDINGS_OF_TIMES = 1e-12
 
 
@@ -227,13 +228,15 @@ class Passed(NamedTuple):
 
 @Inner
 def ends_of_gap(all_breaks, period, gap):  # type: ignore[no-untyped-def]
-    """Between which places a gap lies; the last one of a closed curve goes on to the first break of the next lap."""
+    """Return the places between which a gap lies; the last gap of a closed curve extends to the first break of the next
+    lap.
+    """
     return all_breaks[gap], (all_breaks[gap + 1] if gap + 1 < all_breaks.size else all_breaks[0] + period)
 
 
 @Inner
 def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
-    """Whether what is looked for may be on a gap with these bounds."""
+    """Return whether the extreme to be found may be on a gap with these bounds."""
     if reading.force:
         return (bounds.most_load if reading.sign > 0.0 else -bounds.least_load) > reading.best
     return (sqrt(bounds.most_v2) if reading.sign > 0.0 else -sqrt(bounds.least_v2)) > reading.best
@@ -241,7 +244,7 @@ def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
-    """Whether a gap has the place or the time up to which a leg is read, which takes a panel."""
+    """Return whether a gap contains the place or the time up to which a leg is read, which requires a panel."""
     if route.reading.what == PASSAGE:
         return min(places) <= route.target <= max(places)
     near = ROUNDINGS_OF_TIMES * times[1]
@@ -250,7 +253,7 @@ def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
 
 @Inner
 def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
-    """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
+    """Pass gaps from the break ahead on, as long as V**2 is large and follows from the kept data."""
     (left, run_length, v2, largest_v2, ahead, count), v, spent = before, march.direction, 0.0
     breaks, gaps, upcoming, reads = route.breaks, route.gaps, ahead.upcoming, route.reading.what
     to, total, total_low, may_join = HEAD + count * COLUMNS, 0.0, 0.0, False
@@ -258,7 +261,7 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         spent += record[HEAD + k * COLUMNS + TIME]
     while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
         start, stop = breaks[upcoming], breaks[upcoming + 1]
-        # A break lies behind already where a panel is laid once more.
+        # If a panel is laid once more, the break may lie behind already.
         is_ahead = offset(start, march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
@@ -278,7 +281,7 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         largest_v2 = max(largest_v2 / (1.0 + gaps[at + END_EXPM1]), max(v2, top))
         v2, upcoming, spent = end, upcoming + 1, spent + time
         run_length = offset(stop, march.origin, v)
-        # Gaps of which nothing is read but the time are one entry.
+        # Successive gaps from which only the time is read become one entry of the record.
         to += COLUMNS if may_join and has_values else 0
         total, rounding = two_sum(total if may_join and not has_values else 0.0, time)
         total_low = rounding + (total_low if may_join and not has_values else 0.0)

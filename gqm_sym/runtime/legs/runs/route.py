@@ -1,4 +1,4 @@
-"""Where a run begins, and the curve ahead of it and of each of its panels."""
+"""The start of a run, and the curve ahead of it and of each of its panels."""
 
 from math import inf, sqrt
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from gqm_sym.runtime.legs.panels.breaks import offset, span_before, within
 from gqm_sym.runtime.legs.panels.equation import March, marched
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, sign_of_load, slope_of_v2
 
-# The width of the first panel of a leg, and of the first one after a break, against the distance on which the
-# acceleration there would stop the body.
+# The largest width of the first panel of a leg, and of the first one after a break, as a share of the distance over
+# which the acceleration there would stop the body.
 STOPPING_SHARE = 2.0
 
-# The steps by which it is found where a body that moves slowly would have been at rest.
+# The number of integration steps to the place at which a slowly moving body would have been at rest.
 REST_STEPS = 4
 
 
@@ -29,13 +29,13 @@ class Start(NamedTuple):
     direction : int
         The sign of dlam/dt.
     contact_sign : int
-        The sign of N; 0 if it has to be found out.
+        The sign of N; 0 if it has to be determined.
     step : float
-        The distance to begin with.
+        The first width to try, as a distance.
     no_turn_until : float
         The distance up to which no turn is expected, however slow the body becomes.
     width : float
-        About how long the leg is, if it begins at a turn; 0 if that is unknown.
+        The approximate length of the leg, if it begins at a turn; 0 if that is unknown.
     may_be_whole : bool
         Whether the leg is tried as one polynomial, if it begins at a turn.
     """
@@ -63,7 +63,7 @@ class Reading(NamedTuple):
     sign : float
         1 for the largest, -1 for the smallest.
     best : float
-        ``sign`` times the largest or smallest so far; what does not exceed it need not be in the record.
+        ``sign`` times the largest or smallest value so far; parts that do not exceed it need not be in the record.
     """
 
     what: int
@@ -78,7 +78,7 @@ class Route(NamedTuple):
     Attributes
     ----------
     breaks : array
-        Places where panels have to begin, in the order in which they are passed; some may lie behind.
+        Places at which panels have to begin, in the order in which they are passed; some may lie behind.
     limit : float
         The end of the domain.
     pause : float
@@ -87,9 +87,9 @@ class Route(NamedTuple):
         The only sign that N can have; 0 if it can have both.
     reading : Reading
     until, target : float
-        The time from the leg's start up to which it is read, and the place whose passage is looked for.
+        The time from the leg's start up to which it is read, and the place whose passage is to be found.
     gaps : array
-        What is kept of the curve between its breaks (`gaps`); empty if that is not used.
+        The data kept of the gaps between breaks (`gaps`); empty if they are not used.
     first_break : int
         The index of the first break of the route among all of the curve.
     all_breaks : array
@@ -112,7 +112,7 @@ class Route(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What is ahead of a panel.
+    """The data of the curve ahead of a panel.
 
     Attributes
     ----------
@@ -121,9 +121,9 @@ class Ahead(NamedTuple):
     span : (float, float)
         The places between which the curve may be evaluated (`panels.breaks`).
     widest : float
-        The width that the panel may have at most; infinite but for the first panel and those after a break.
+        The largest width that the panel may have; infinite except for the first panel and those after a break.
     is_limited : bool
-        Whether ``widest`` has been found. After a break this waits until the panel turns out to have a turn.
+        Whether ``widest`` has been found. After a break it is found only if the panel turns out to contain a turn.
     """
 
     upcoming: int
@@ -134,7 +134,7 @@ class Ahead(NamedTuple):
 
 @Inner
 def distance_from_rest(forces, start, span, contact_sign, slope, point):  # type: ignore[no-untyped-def]
-    """How far behind a start V**2 would vanish, by the steps of Runge and Kutta from speed to speed."""
+    """Return the distance behind a start at which V**2 would vanish, by Runge-Kutta steps in the speed."""
     d, u, v = 0.0, sqrt(start.v2), start.direction
     step, moved, sums = u / REST_STEPS, 2.0 * u / slope, 0.0
     for k in range(REST_STEPS):
@@ -152,10 +152,10 @@ def distance_from_rest(forces, start, span, contact_sign, slope, point):  # type
 
 @Inner
 def begin_march(forces, start, place, span, contact_sign, point):  # type: ignore[no-untyped-def]
-    """The march variable from a start on, and the width that the first panel may have at most.
+    """Return the march variable from a start on, and the largest width of the first panel.
 
-    After a slow launch the root of V**2 has its zero where the march variable is ``-c/2``: the speed over it would not
-    be smooth if c were only about right, and panels are too wide to tell.
+    After a slow launch the speed vanishes at the march variable ``-c/2``. If c were only approximate, the speed divided
+    by the distance from there would not be smooth, and panels are too wide to detect that.
     """
     origin, g, c, widest = (start.place, start.place_low), 1.0, 0.0, inf
     if start.v2 > 0.0:
@@ -166,14 +166,15 @@ def begin_march(forces, start, place, span, contact_sign, point):  # type: ignor
             g, c = 1.0, 2.0 * sqrt(behind if 0.0 < behind <= start.step else start.v2 / slope)
         else:
             g, c = 0.0, 1.0
-        # V**2 at launch is exact; a turn near the launch has all digits on a panel that is no wider than this.
+        # V**2 at launch is exact; a turn near the launch is accurate to all digits on a panel that is no wider than
+        # this.
         widest = STOPPING_SHARE * start.v2 / -slope if slope < 0.0 else inf
     return March(origin, start.direction, g, c), widest
 
 
 @Inner
 def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
-    """The march variable of a run, the sign of N with which it begins, and what is ahead of it."""
+    """Return the march variable of a run, the sign of N with which it begins, and the data ahead of its first panel."""
     breaks, origin, upcoming = route.breaks, (start.place, start.place_low), 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, start.direction) <= 0.0:
         upcoming += 1
@@ -198,7 +199,7 @@ def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-unt
 def limited(forces, march, panel, ahead, change, run_length, point):  # type: ignore[no-untyped-def]
     """Return the data ahead of a panel that begins at the distance ``run_length`` and has these changes.
 
-    V**2 at a break is as exact as at launch, so that a panel after it that has a turn is as narrow as the first one.
+    V**2 at a break is as exact as at launch, so a panel after it that contains a turn is limited like the first one.
     """
     if ahead.is_limited or min(change.turn, change.touch) > 1.0:
         return ahead

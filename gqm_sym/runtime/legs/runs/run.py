@@ -1,7 +1,7 @@
 """A run of the body along the curve where forces dissipate: panel after panel, until it turns, ends or may pause.
 
-Time is counted on the way as long as V**2 is large. From where V**2 decreases for good the run is only followed to its
-end, from which time is then counted back (`follow`).
+Time is counted on the way as long as V**2 is large. After V**2 has begun to decrease for good, the run is only followed
+to its end, from which time is then counted back (`follow`).
 """
 
 from math import inf
@@ -47,21 +47,23 @@ PANELS_PER_RUN = 512
 
 @Inner
 def enter_change(record, count, place):  # type: ignore[no-untyped-def]
-    """Enter a place where N changes its sign in the record; returns the number of changes."""
+    """Store a place at which N changes its sign in the record; return the number of changes."""
     record[change_at(record, count)] = place
     return count + 1
 
 
 @Inner
 def enter_panel(record, count, right, width, work):  # type: ignore[no-untyped-def]
-    """Enter a panel that ends at w = ``right`` in the record; returns the number of panels."""
+    """Store a panel that ends at w = ``right`` in the record; return the number of panels."""
     add_panel(record, HEAD + count * COLUMNS, right, width, work)
     return count + 1
 
 
 @Inner
 def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-def]
-    """The largest V**2 so far, of which resistance alone leaves the share exp(-q) on a panel beginning with ``v2``."""
+    """Return the largest V**2 so far after a panel that begins with ``v2``; resistance alone reduces the value before
+    by the factor exp(-q).
+    """
     damped = largest_v2 if ends_here else largest_v2 / (1.0 + work[EXPM1_Q + COUNT])
     return max(damped, max(v2, extent(work, W)[1]))
 
@@ -88,10 +90,10 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     set_nodes(work)
     march, nu, ahead = begin(forces, start, route, off, point)
     v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(start.step, march)
-    # Once time is not counted any more, a turn is searched for.
+    # When time is not counted any more, a turn is searched for.
     what, panel_count, recorded, change_count, searching, at_stop = GOES_ON, 0, 0, 0, False, False
-    # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; laws that are not
-    # linear keep to what is next to it.
+    # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; with laws that
+    # are not linear only the part next to the end is.
     middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
     timed = Timed(run_length, v2, nu, change_count)
     for _ in range(MAX_PANELS):
@@ -120,7 +122,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         if nu == 0 and sign != 0:
             nu = sign
             if forces.friction or nu == -route.only_sign:
-                continue  # with forces of this sign
+                continue  # with the forces for this sign
         change = first_changes(march, panel, largest_v2, load_change, work)
         what, run_length, v2 = turn_below_noise(forces, march, panel, change, run_length, point)
         if what == TURN:

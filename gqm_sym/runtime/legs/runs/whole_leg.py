@@ -1,10 +1,10 @@
-"""A leg from turn to turn as one polynomial, where that has enough terms.
+"""A leg from turn to turn as one polynomial, if that has enough terms.
 
-V**2 is smooth along a leg; only its root is not. Let the leg have the width h, and let y be the share of it behind the
-body: ``W = h y (1 - y) C`` with a smooth C > 0, and with ``y = sin(phi/2)**2`` the time is the integral of
-``f = ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. C is computed from running means
-of exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The leg ends where the mean over
-all of it vanishes, which Newton's method finds.
+V**2 is smooth along a leg; only its square root is not. With the width h of the leg and the share y of it that lies
+behind the body, ``W = h y (1 - y) C`` with a smooth C > 0. With ``y = sin(phi/2)**2`` the time is the integral of ``f =
+ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. C is computed from running means of
+exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The width is that for which the mean
+over the whole leg vanishes; Newton's method finds it.
 """
 
 from math import fabs, fsum, pi, sin, sqrt
@@ -75,33 +75,35 @@ from gqm_sym.runtime.legs.panels.resolution import (
 )
 from gqm_sym.runtime.legs.runs.ends import GOES_ON, TURN, End
 
-# The first width to try where none is known, in units of the first panel's.
+# The first width to try if none is known, in units of the first panel's width.
 FIRST_WIDTH = 2.0
 
-# The most widths that are tried for a leg.
+# The largest number of widths that are tried for a leg.
 MAX_TRIES = 12
 
-# The largest step of Newton's method as a share of the width; a turn farther away is looked for among the nodes.
+# The largest step of Newton's method as a share of the width; a turn farther away is searched for among the nodes.
 MAX_STEP = 0.125
 
-# After a step this short only rounding is left of the next one.
+# After a step this short the next one would be rounding only.
 LAST_STEP = 1e-3
 
-# A change this small of the step itself: the next one would be about its square.
+# If the step itself changes by this little, the next one would be about its square.
 LAST_CHANGE = 1e-9
 
-# The factors by which the width grows, at least and at most, where no turn is found on it.
+# The smallest and the largest factor by which the width grows if no turn is found on it.
 MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
 
-# The rounding of a mean in units in the last place of its largest term.
+# The rounding error of a mean in units in the last place of its largest term.
 MEAN_ROUNDINGS = 4.0
 
-# How many terms the Taylor series at a leg's end has.
+# The number of terms of the Taylor series at a leg's end.
 TERMS = 6
 
 
 def _end_terms() -> Array:
-    """The matrix to the Taylor series, at the end, of the integral from a leg's start in units of its width."""
+    """Return the matrix that gives the Taylor series, at the leg's end, of the integral from its start, in units of its
+    width.
+    """
     k = np.arange(COUNT, dtype=np.float64)
     slope, columns = np.ones(COUNT), [MEANS[COUNT]]
     for m in range(1, TERMS):
@@ -112,14 +114,16 @@ def _end_terms() -> Array:
 
 
 def _factors() -> Array:
-    """The matrix to C exp(q): from the mean between a node and the turn that is nearer."""
+    """Return the matrix that gives C exp(q) from the means between each node and the nearer turn."""
     half = COUNT // 2 + 1
     near = MEANS[:half] / (1.0 - SHARES[:half, None])
     return np.vstack([near, -near[COUNT - half - 1 :: -1, ::-1]]).T
 
 
 def _half_times() -> Array:
-    """The matrix from f to the time from the start to the middle, and from there to the end."""
+    """Return the matrix that gives the times from the start to the middle, and from there to the end, from the values
+    of f.
+    """
     k = np.arange(1, COUNT)
     terms = np.append(0.5 * pi, [(-1.0) ** j * round(sin(0.5 * pi * j)) / j for j in k])
     first = terms @ TO_COEFFICIENTS
@@ -127,7 +131,8 @@ def _half_times() -> Array:
 
 
 def _to_part(begin: float, end: float) -> Array:
-    """The matrix to a function's values at the nodes of a panel on the half from the start to the middle.
+    """Return the matrix that gives a function's values at the nodes of a panel on the half from the start to the
+    middle.
 
     There the march variable is the root of the distance; the panel lies between two shares of its value in the middle.
     """
@@ -149,19 +154,19 @@ JOINT = 0.625
 TURN_PART, MIDDLE_PART = _to_part(0.0, JOINT), _to_part(JOINT, 1.0)
 to_end_terms, to_factors, to_half_times = multiply(_end_terms()), multiply(_factors()), multiply(_half_times())
 to_turn_part, to_middle_part = multiply(TURN_PART), multiply(MIDDLE_PART)
-# Behind the middle, distances are counted from the end.
+# Beyond the middle, distances are counted from the end.
 from_turn_part, from_middle_part = multiply(TURN_PART[::-1]), multiply(MIDDLE_PART[::-1])
 
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
-# Y where the march variable is the share s of its value in the middle.
+# Y at the share s of the value that the march variable has in the middle.
 part_speed_row = over_rows(lambda factor, s: np.sqrt(factor - 0.5 * factor * (s * s)), WIDE)
 part_arc_row = over_rows(lambda ds, s, slope: ds * (s * slope), WIDE)
 
 
 @Inner
 def step_to_turn(work):  # type: ignore[no-untyped-def]
-    """The step to where V**2 vanishes by its Taylor series at the end, as a share of the width."""
+    """Return the step to the zero of V**2 by its Taylor series at the end, as a share of the width."""
     a, b, c, d, e, f = (
         work[TAILS],
         work[TAILS + 1],
@@ -183,7 +188,7 @@ def step_to_turn(work):  # type: ignore[no-untyped-def]
 
 @Inner
 def factor_to_turn(work):  # type: ignore[no-untyped-def]
-    """The factor by which the width seems to be wrong, where the turn is not near; NaN if that is unknown."""
+    """Return an estimate of the factor by which the width must change if the turn is not near; NaN if there is none."""
     to_means(work, FORCE, work, MEAN)
     for j in range(COUNT + 1):
         mean = work[MEAN + j]
@@ -193,14 +198,16 @@ def factor_to_turn(work):  # type: ignore[no-untyped-def]
             before, y = work[MEAN + j - 1], work[NODES + j - 1]
             return y + (work[NODES + j] - y) * before / (before - mean)
     first, last = work[FORCE], work[TAILS + 1]
-    # If the force were linear, the body would turn twice as far away as where it vanishes.
+    # If the force were linear, the turn would be twice as far away as the zero of the force.
     factor = 2.0 * first / (first - last) if last < first else MAX_GROWTH
     return min(max(factor, MIN_GROWTH), MAX_GROWTH)
 
 
 @Inner
 def width_of_leg(forces, march, panel, room, width, work):  # type: ignore[no-untyped-def]
-    """The width of a leg, about ``width`` and at most ``room``; 0 if it is not found. Fills FORCE and EXPM1_Q."""
+    """Return the width of a leg, which is about ``width`` and at most ``room``, and fill FORCE and EXPM1_Q; return 0 if
+    it is not found.
+    """
     h, last = min(width, room), np.inf
     for _ in range(MAX_TRIES):
         begin_panel(forces, march, panel, h, work)
@@ -225,7 +232,7 @@ def width_of_leg(forces, march, panel, room, width, work):  # type: ignore[no-un
 
 @Inner
 def is_whole(forces, panel, h, work):  # type: ignore[no-untyped-def]
-    """Fill the other rows, and say whether all are resolved and V**2 and N have one sign on the leg."""
+    """Fill the other rows; return whether all are resolved and whether V**2 and N each have one sign on the leg."""
     to_factors(work, FORCE, work, W_FACTOR)
     damped_row(work, W_FACTOR, W_FACTOR, EXPM1_Q)
     v2_row(work, W, W_FACTOR, NODES, h)
@@ -248,7 +255,8 @@ def is_whole(forces, panel, h, work):  # type: ignore[no-untyped-def]
 def enter_part(record, at, begin, end, w, work):  # type: ignore[no-untyped-def]
     """Write a part of a leg into the record as one panel, whose factor and ds are in SPEED and ARC_RATE.
 
-    The panel is between two shares of the march variable in the middle, ``w``. Returns whether time on it is resolved.
+    The panel lies between two shares of ``w``, the march variable in the middle. The function returns whether time on
+    it is resolved.
     """
     width = (end - begin) * w
     linear_row(work, OFFSET, NODES, begin, end - begin)
@@ -266,7 +274,7 @@ def enter_part(record, at, begin, end, w, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def enter_parts(record, h, work):  # type: ignore[no-untyped-def]
-    """Write a leg into the record as two panels from each of its ends; returns whether time is resolved on them."""
+    """Write a leg into the record as two panels from each of its ends; return whether time is resolved on them."""
     w, at = sqrt(0.5 * h), HEAD
     load_per_mass_row(work, MEAN, N0, KAPPA, W)
     to_turn_part(work, W_FACTOR, work, SPEED)
@@ -292,14 +300,14 @@ def enter_parts(record, h, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def enter_time(record, begin, time, is_read):  # type: ignore[no-untyped-def]
-    """Set the time on the panels of half a leg, the first of which stands at ``begin``."""
+    """Set the time on the panels of half a leg, the first of which is at ``begin`` in the record."""
     first = record[begin + TIME] if is_read else 0.0
     record[begin + TIME], record[begin + COLUMNS + TIME] = first, time - first
 
 
 @Inner
 def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
-    """Whether anything of a leg of the width ``h`` is read for which it takes panels."""
+    """Return whether data that require panels are read from a leg of the width ``h``."""
     reads = route.reading.what
     if reads == PASSAGE:
         return 0.0 <= offset(route.target, origin, v) <= h * (1.0 + CLEARANCE_SHARE)
@@ -324,7 +332,7 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
     Returns
     -------
     End
-        With GOES_ON for what ended the run where the leg must be followed panel by panel.
+        Its code is GOES_ON if the leg must be followed panel by panel.
     """
     breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:

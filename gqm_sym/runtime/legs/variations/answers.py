@@ -10,22 +10,27 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
+from gqm_sym.runtime.legs.tabulation import TabulatedPiece
+from gqm_sym.runtime.legs.variations.chain import DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes
-from gqm_sym.runtime.legs.variations.law import LawRows, States
+from gqm_sym.runtime.legs.variations.law import LawRows
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
-# An extreme inside a leg is improved by Newton's method, whose steps may be this share of the time of the motion.
+# An extreme inside a leg is improved by Newton's method, whose steps may be at most this share of the time of the
+# motion.
 MAX_STEP, NEWTON_STEPS = 1e-5, 3
 
-# Points that are taken together.
-BLOCK = 4096
+# The number of points that are evaluated together; for more of them the system would provide memory anew each time.
+BLOCK = 2048
 
-# An extreme this near to the end of a motion, as a share of its time, is there; and one this near to a place where the
-# force jumps, as a share of the place. This share of the time later or earlier, it is on one side of it.
+# An extreme this near to the end of a motion, as a share of its time, counts as the end. An extreme this near to a jump
+# of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
+# is on one side of the jump.
 AT_END, AT_BREAK, BESIDE = 1e-12, 1e-9, 1e-13
 
 
@@ -39,8 +44,8 @@ class Switch(NamedTuple):
     lam : float
         The place, in the unit of the curve's parameter.
     margin : float
-        By how much the pull along the track is larger there than what can hold the body, as a share of the latter. It
-        is negative where the body stays. At 0 one more leg begins or ends, and derivatives are one-sided.
+        The excess of the driving force along the track over the largest force that can hold the body there, as a share
+        of the latter. It is negative if the body stays. At 0 the number of legs changes, and derivatives are one-sided.
     """
 
     t: float
@@ -48,89 +53,110 @@ class Switch(NamedTuple):
     margin: float
 
 
+class MarchPoints(NamedTuple):
+    """Some points of a motion with losses: a number for each.
+
+    Attributes
+    ----------
+    half : array of int
+        The halves of runs (`equation`) on which the points lie.
+    w : array
+        The march variables.
+    v : array
+        The velocities.
+    laps : array
+        The laps of a closed curve before them.
+    """
+
+    half: NDArray[np.int64]
+    w: Array
+    v: Array
+    laps: Array
+
+    def part(self, block: slice) -> "MarchPoints":
+        """Return some of the points."""
+        return MarchPoints(self.half[block], self.w[block], self.v[block], self.laps[block])
+
+
+def points_by_record(record: Array, pieces: Sequence[TabulatedPiece], t: Array) -> MarchPoints:
+    """Return the points of a motion at times, from the record of some of its pieces."""
+    number, phi, v = rows = np.empty((3, t.size))
+    phases_along_legs(record, t, rows)
+    of_pieces = np.array([(2 * piece.leg + (piece.sense < 0), piece.last, piece.laps) for piece in pieces])
+    counts = [len(piece.intervals) for piece in pieces]
+    half, last, laps = np.repeat(of_pieces, counts, axis=0)[number.astype(np.intp)].T
+    return MarchPoints(half.astype(np.int64), phi * last, v, laps)
+
+
+def points_of(found: PhasePoints, v: Array) -> MarchPoints:
+    """Return the points of a motion, given the velocities.
+
+    Raises
+    ------
+    SolutionError
+        If one of them lies where the motion tends to an equilibrium.
+    """
+    half, w = np.empty(v.size, dtype=np.int64), np.empty(v.size)
+    for timed, here, phi in found.segments:
+        if timed.segment.speed_series is None:
+            raise SolutionError(
+                "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
+            )
+        half[here], w[here] = 2 * timed.leg + (timed.sense < 0), phi * timed.segment.speed_series[0]
+    return MarchPoints(half, w, v, found.laps)
+
+
 class StateChanges:
-    """How states at points of a motion with losses change: a row for each variable, at fixed times.
+    """The changes of the states at points of a motion with losses, at fixed times: a row for each variable.
 
     Parameters
     ----------
     changes : Changes
         The changes of its legs.
-    points : PhasePoints
-        Where it is at the times.
-    v : array
-        The velocities there.
+    points : MarchPoints
+        The points of the motion at the times.
 
     Attributes
     ----------
     lam, s, x, z, v, normal_force, y : arrays
-        As in `gradients.sensitivity.Sensitivity`, but for places by the labels of points, within the lap.
+        As in `gradients.sensitivity.Sensitivity`, except that places are the labels of points, within the lap.
     labels, arc : array
-        How the labels of the places change, and as of `changes.Origin`.
-    acceleration : array
-        How the velocity changes with time.
-    states : States
-        The last of the points.
+        The changes of the labels of the places, and ``arc`` as in `changes.Origin`.
+    states : array
+        The points (`law.states_of`).
     law : LawRows
         The law there.
     """
 
-    law: LawRows
-    states: States
+    def __init__(self, changes: Changes, points: MarchPoints) -> None:
+        starts = range(0, max(points.v.size, 1), BLOCK)
+        parts = [self._part(changes, points.part(slice(start, start + BLOCK))) for start in starts]
+        found, self.states, law = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found
+        self.labels, self.law = self.lam, LawRows(law)
 
-    def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
-        half, w = _marched(changes, points)
-        parts = [
-            self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
-            for start in range(0, max(v.size, 1), BLOCK)
-        ]
-        found = np.concatenate(parts, axis=-1)
-        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y, self.arc = found[:8]
-        self.acceleration, self.labels = found[8, 0], found[0]
-
-    def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
-        """The attributes for some of the points: a row for each, and for the acceleration a row of equal rows."""
-        along = changes.along(half, w)
-        self.states = States(*along.places, v**2, along.heading, along.contact_sign)
-        self.law = law = changes.law.rows(self.states)
-        path = changes.law.path(*along.places)
-        lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
-        faster = 0.5 * v * along.y - acceleration * along.delay
-
-        def changed(rows: Array) -> Array:
-            found: Array = changes.by_all(rows[1:-1]) + rows[-1] * lam
-            return found
-
-        x, z, force = changed(path.x), changed(path.z), path.force_changes(v, faster, changed)
-        y = np.zeros_like(lam) if path.y is None else changed(path.y)
-        accelerations = np.broadcast_to(acceleration, lam.shape)
-        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, y, along.arc, accelerations])
+    def _part(self, changes: Changes, points: MarchPoints) -> tuple[Array, Array, Array]:
+        """Return for some of the points the rows of all attributes, the states, and the law."""
+        along = changes.along(points.half, points.w, points.v)
+        law = changes.law.matrix(along.states)
+        return changes.states(along, law, points.v), along.states, law
 
 
-def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
-    """The halves of legs on which points lie, and their march variables."""
-    half, w = np.empty(points.laps.size, dtype=np.intp), np.empty(points.laps.size)
-    for timed, here, phi in points.segments:
-        last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
-        half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
-    return half, w
-
-
-def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
-    """How the places of a motion at times, of two doubles each, change."""
-    if changes.law.by_arc_length:  # the stretch of the way is needed, too
-        found: Array = states_at(motion, changes, t, low).lam
+def places_at(motion: Any, changes: Changes, points: MarchPoints) -> Array:
+    """Return the changes of the places of a motion at points."""
+    if changes.law.by_arc_length:  # the change of the arc length is needed too
+        found: Array = states_at(changes, points).lam
         return found
-    points, f = motion._phase_points(t, low), motion.problem.functions
-    (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
-    ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
-    places: Array = moved - v / ds * delay + points.laps * changes.lap[:, None]
+    v, f = points.v, motion.problem.functions
+    along = changes.along(points.half, points.w, v, whole=False)
+    ds = path_and_force_at(f.addresses, f.p, along.states[0], v**2)[2]
+    places: Array = along.changes[SIGMA] - v / ds * along.changes[DELAY] + points.laps * changes.lap[:, None]
     return places
 
 
-def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
-    """How the states of a motion at times, of two doubles each, change."""
-    points = motion._phase_points(t, low)
-    found = StateChanges(changes, points, motion._velocities(points))
+def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
+    """Return the changes of the states of a motion at points."""
+    found = StateChanges(changes, points)
     found.lam = changes.told(found.lam, found.arc, points.laps)
     if changes.law.by_arc_length:
         found.s = found.lam
@@ -138,7 +164,7 @@ def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChang
 
 
 def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
-    """The derivatives of a quantity of a motion by all variables; of turning points a column for each.
+    """Return the derivatives of a quantity of a motion by all variables; for turning points, a column for each.
 
     Parameters
     ----------
@@ -167,7 +193,7 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
 
 
 def turning_points(motion: Any, changes: Changes) -> Array:
-    """The derivatives of the turning points of a motion."""
+    """Return the derivatives of the turning points of a motion."""
     turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
     columns = [changes.told(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns]
     if motion.problem.w0 == 0.0:
@@ -176,7 +202,9 @@ def turning_points(motion: Any, changes: Changes) -> Array:
 
 
 def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
-    """The derivatives of the place and time where a motion ends; zero if ``t_max`` ends it, or if it ends at once."""
+    """Return the derivatives of the place and the time at which a motion ends; zero if ``t_max`` ends it, or if it ends
+    at once.
+    """
     what, k, zero = motion.legs[-1].end, len(changes.runs) - 1, np.zeros(changes.variables)
     if what == "horizon" or motion.t_end == 0.0:
         return zero, zero
@@ -186,12 +214,12 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
-    law, v = changes.law.rows(at_end), run.record[HEADING]
+    law, v = LawRows(changes.law.matrix(at_end)), run.record[HEADING]
     if what == "liftoff":
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
         path = changes.law.path(*place)
         curvature, load = path.curvature[:, 0], path.load[:, 0]
-        faster = origin.y - law.slope[0] * origin.sigma
+        faster = origin.y - law.force[0, 0] * origin.sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
         moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
     else:
@@ -201,14 +229,15 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
 def balance_at(static_balance, p, places):  # type: ignore[no-untyped-def]
-    """The accelerations of a body at rest that is about to move forwards, and backwards, at places."""
+    """Return the accelerations, at places, of a body at rest that is about to move forwards or backwards."""
     out = np.empty((2, places.size))
     call_static_balance(static_balance, places.size, places, p, out)
     return out
 
 
 def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: float) -> Switch | None:
-    """The turn at which the number of legs is nearest to changing; None if nothing can hold the body at any.
+    """Return the turn at which the number of legs is nearest to changing; None if no force can hold the body at any
+    turn.
 
     Parameters
     ----------
@@ -232,11 +261,11 @@ def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: 
 
 
 def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
-    """The derivatives of an extreme of a motion.
+    """Return the derivatives of an extreme of a motion.
 
-    Inside a leg it changes as the quantity does at a fixed time, since it is stationary there (envelope theorem), and
-    so it does where the horizon cuts the motion. Where the motion ends by itself, its time changes too. An extreme at a
-    place where the force jumps stays there.
+    Inside a leg the extreme changes as the quantity does at a fixed time, because the quantity is stationary there
+    (envelope theorem); the same holds if the horizon cuts the motion there. If the motion ends by itself there, the
+    time of the extreme changes too. An extreme at a jump of the force stays there.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
@@ -247,7 +276,8 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     else:
         t, is_stationary = _improved(motion, changes, of_speed, found)
         if not is_stationary and np.abs(found.lam - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(found.lam):
-            # On the side of the extreme, and from two times back to its own.
+            # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
+            # itself.
             sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * BESIDE * t_end
             states = [motion.state(side[0]) for side in sides]
             values = [abs(state.v) if of_speed else state.normal_force for state in states]
@@ -261,12 +291,14 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
 
 
 def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
-    """How the speed or the contact force changes at times that themselves change; if not told how, the places stay."""
-    at, v = states_at(motion, changes, t, np.zeros_like(t)), motion.state(t).v
+    """Return the changes of the speed or the contact force at times that change by ``moved``; without it, the places
+    stay fixed.
+    """
+    at, v = states_at(changes, motion._march_points(t)[0]), motion.state(t).v
     if moved is None:
         moved = -at.labels * at.law.ds / v
     if of_speed:
-        faster: Array = np.sign(v) * (at.v + at.acceleration * moved)
+        faster: Array = np.sign(v) * (at.v + 0.5 * at.law.force[0] / at.law.ds * moved)
         return faster
     law = changes.law
     rate = law.parameters[0, law.mass] * law.loads(at.states)[0] * v / at.law.ds
@@ -275,16 +307,16 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
 
 
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
-    """The time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
+    """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 
     The time is left where it is not.
     """
     t = found.t
     for _ in range(NEWTON_STEPS):
-        at = states_at(motion, changes, np.array([t]), np.zeros(1))
+        at = states_at(changes, motion._march_points(np.array([t]))[0])
         law = at.law
-        slope, by_place, by_w = (law.slope, law.by_place, law.by_w) if of_speed else changes.law.loads(at.states)
-        bend, v = by_place[0] + by_w[0] * law.slope[0], motion.state(t).v
+        slope, by_place, by_w = law.force if of_speed else changes.law.loads(at.states)
+        bend, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
         step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
             return float(found.t), False

@@ -1,8 +1,8 @@
 """The law of a motion with losses along a chart, with its derivatives.
 
-The label of a point is its arc length along the curve as it is. With a parameter that shapes the curve, the point moves
-as that of equal u on its piece does (`charts.double_double.pieces`), so that pieces keep their edges, where forces may
-jump.
+The label of a point is its arc length along the curve for the given parameters. If a parameter that shapes the curve
+changes, a point keeps its value of u on its piece (`charts.double_double.pieces`), so that pieces keep their edges,
+where forces may jump.
 """
 
 import numpy as np
@@ -10,11 +10,12 @@ import numpy as np
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
-from gqm_sym.runtime.gradients.orbit import PathRows, without_formulas
+from gqm_sym.runtime.gradients.orbit import without_formulas
+from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.interface import ExactChartLaw
 from gqm_sym.runtime.launch.formulas import true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.variations.law import FormulaLaw, Law, LawRows, States
+from gqm_sym.runtime.legs.variations.law import FormulaLaw, Law
 from gqm_sym.runtime.legs.variations.programs import (
     ORDERS,
     ChartForces,
@@ -23,7 +24,7 @@ from gqm_sym.runtime.legs.variations.programs import (
     chart_path_program,
 )
 
-# Places whose coordinates are found together.
+# The number of places whose coordinates are found together.
 BLOCK = 4096
 
 
@@ -46,7 +47,7 @@ class ChartLaw(Law):
 
     @property
     def launch_moves(self) -> Array:
-        """As in `Law`: points that shift along the curve leave the place of the launch to others."""
+        """See `Law`. The launch place is a fixed arc length, so its label changes if points shift along the curve."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
         place = self._shape.places(np.array([self._launch.value]), self._launch.low)
@@ -55,15 +56,15 @@ class ChartLaw(Law):
 
     @property
     def ranges(self) -> Array:
-        """As in `Law`: the ends of the curve keep their labels."""
+        """See `Law`. The ends of the curve keep their labels."""
         return np.zeros((3, self.count))
 
-    def coordinates(self, states: States) -> Array:
-        """As in `Law`."""
-        return self._coordinates(states.high, states.low)
+    def coordinates(self, states: Array) -> Array:
+        """See `Law`."""
+        return self._coordinates(*states[:2])
 
     def _coordinates(self, high: Array, low: Array) -> Array:
-        """The coordinates of places, as two doubles each."""
+        """Return the coordinates of places, as two doubles each."""
         parts = []
         for start in range(0, max(high.size, 1), BLOCK):
             some = slice(start, start + BLOCK)
@@ -71,27 +72,26 @@ class ChartLaw(Law):
         found = np.concatenate(parts, axis=1)
         return np.stack([found, np.zeros_like(found)], axis=1).reshape(-1, high.size)
 
-    def rows(self, states: States) -> LawRows:
-        """As in `Law`."""
-        found = self.values(chart_law_program(self._forces), states)[:, 0]
-        stretches, slope = found[: self.count], found[self.count :]
-        return LawRows(
-            np.ones_like(states.w), np.zeros_like(states.w), stretches, slope[0], slope[1], slope[2], slope[3:]
-        )
+    def matrix(self, states: Array) -> Array:
+        """See `Law`."""
+        n, found = self.count, self.values(chart_law_program(self._forces), states, parts=1)[:, 0]
+        # Places are arc lengths along the curve for the given parameters.
+        ds: Array = np.vstack([np.ones_like(found[0]), np.zeros_like(found[0])])
+        return np.vstack([ds, found[:n], found[n:]])
 
-    def loads(self, states: States) -> Array:
-        """As in `Law`."""
-        found: Array = self.values(chart_load_program(self._forces), states)[:, 0]
+    def loads(self, states: Array) -> Array:
+        """See `Law`."""
+        found: Array = self.values(chart_load_program(self._forces), states, parts=1)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
-        """As in `Law`."""
+        """See `Law`."""
         program, places = chart_path_program(self._forces), self._coordinates(high, low)
-        found = np.empty((program.outputs.size, 3, high.size))
+        found = np.empty((program.outputs.size, 1, high.size))
         fill_values(program.operands, program.work, self.parameters, places, found)
-        return PathRows(*found[:, 0].reshape(5, self.count + 2, high.size))
+        return PathRows(found.reshape(6, self.count + 2, high.size))
 
 
 def law_of(problem: Problem) -> Law:
-    """The law of the motion of a launch."""
+    """Return the law of the motion of a launch."""
     return FormulaLaw(problem) if problem.formulas.chart is None else ChartLaw(problem)

@@ -1,7 +1,7 @@
 """The variational equation along the panels of legs, in the march variable in which the legs were found.
 
-Let dW/dlam = F(lam, W; p), where W is V**2, and let the place where a half of a leg begins (its *origin*: the start, or
-the turn at the end) move by sigma. At a given distance d from the origin, W changes by y with
+The law of motion is dW/dlam = F(lam, W; p), where W is V**2. If the beginning of a half of a leg (its *origin*: the
+start, or the turn at the end) moves by sigma, then W at a given distance d from the origin changes by y with
 
     dy/dd = u (F_W y + F_p + F_lam sigma),
 
@@ -9,258 +9,314 @@ where u is the direction in which d grows. This is the equation of the leg itsel
 the same integrating factor solves it. From a turning point y begins with 0 and vanishes as W does, so that y/W and the
 change of the time per w, ``dt/dw (ds_p/ds + ds_lam sigma/ds - y/(2 W))``, are smooth in the march variable w there too.
 The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for y = 1 at the origin are found for all
-panels at once; the change of a leg is a sum of them (`changes`).
+panels; the change of a leg is a linear combination of them (`chain`).
+
+Each run has two *halves*: number 2k is that of run k from its start, 2k + 1 that from its end. Either may have no
+panels. A panel is a row of PANEL_COLUMNS numbers: the march variable at its beginning, its width, the place of the
+origin as two doubles, u, the signs of dlam/dt and of N, and c/2 of the march variable (infinite if that is the
+distance); from SPEEDS on, Y at its nodes.
+
+The solutions on a panel are rows of WIDE numbers, for its nodes and for its end: for each solution the change of the
+time from the origin, then for each solution y/W at the nodes and y at the end, then for each parameter the integral of
+the derivative of ds/dlam from the origin.
 """
 
-from collections.abc import Sequence
-from functools import cached_property
-from itertools import pairwise
-from math import ceil, inf, log2
+from math import exp, fabs, inf
 
 import numpy as np
 from numba import types
-from numpy.polynomial.chebyshev import chebvander
-from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
-from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
-from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
-from gqm_sym.runtime.legs.variations.law import LawRows, States
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    COLUMNS,
+    END,
+    HALF_C,
+    HEAD,
+    HEADING,
+    MIDDLE,
+    NORMAL_LOAD,
+    RIGHT,
+    START,
+    START_V2,
+    Y_ROW,
+)
+from gqm_sym.runtime.legs.panels.polynomials import (
+    COUNT,
+    ENDS_BY_NODE,
+    SHARES,
+    TO_COEFFICIENTS,
+    WIDE,
+    to_coefficients,
+    to_graded_means,
+    to_means,
+)
 
-# The nodes of a panel and its end, as shares of it.
-POINTS = np.append(SHARES, 1.0)
-
-# From values at the nodes to those at both ends of a panel.
+# The matrix that maps values at the nodes to those at both ends of a panel.
 TO_START, TO_END = (-1.0) ** np.arange(COUNT) @ TO_COEFFICIENTS, TO_COEFFICIENTS.sum(axis=0)
 
-# A panel that begins this near to where the curve is not smooth, as a share of the place, begins there.
+# A panel that begins this near to a break of the curve, as a share of the place, counts as beginning there.
 AT_BREAK = 1e-12
 
+PANEL_BEGIN, PANEL_WIDTH, ORIGIN, ORIGIN_LOW, OUTWARD, PANEL_HEADING, CONTACT_SIGN, PANEL_HALF_C = range(8)
+SPEEDS, PANEL_COLUMNS = WIDE, 2 * WIDE
 
-@entry(types.void(types.float64[:, :, ::1], types.int64[::1], VECTOR, MATRIX), checked=False)
-def fill_sums(series, panels, x, out):  # type: ignore[no-untyped-def]
-    """Fill the sums of Chebyshev series of panels at places x in [-1, 1] on them: a row for each series of a panel."""
-    waves = np.ones(COUNT)
-    for i in range(x.size):
-        waves[1] = x[i]
-        for j in range(2, COUNT):
-            waves[j] = 2.0 * x[i] * waves[j - 1] - waves[j - 2]
-        terms = series[panels[i]]
-        for row in range(out.shape[0]):
-            total = 0.0
-            for j in range(COUNT - 1, -1, -1):
-                total += terms[row, j] * waves[j]
-            out[row, i] = total
+# The rows of states (`law.states_of`).
+PLACE, PLACE_LOW, W, STATE_HEADING, STATE_SIGN = range(5)
+
+# The number of states of each run before those of the nodes: its start, its end and its middle.
+MARKS = 3
+
+CUBE, WHOLE = types.float64[:, :, ::1], types.int64[::1]
 
 
-class Panels:
-    """The panels of all halves of some runs, one after the other, with the solutions of the variational equation.
+@Inner
+def distance_at(panel, w):  # type: ignore[no-untyped-def]
+    """Return the distance from the origin at a march variable, and V over Y there."""
+    half_c = panel[PANEL_HALF_C]
+    return (w, 1.0) if half_c == inf else (w * (w + 2.0 * half_c), w + half_c)
+
+
+@Inner
+def place_on(panel, w):  # type: ignore[no-untyped-def]
+    """Return the place at a march variable, as two doubles."""
+    high, low = two_sum(panel[ORIGIN], panel[OUTWARD] * distance_at(panel, w)[0])
+    return high, low + panel[ORIGIN_LOW]
+
+
+@Inner
+def value_at_end(weights, line, at):  # type: ignore[no-untyped-def]
+    """Return a function at an end of a panel, from its values at the nodes, which begin at an index of a line."""
+    total = 0.0
+    for j in range(COUNT):
+        total += weights[j] * line[at + j]
+    return total
+
+
+@Inner
+def end_speed(panel):  # type: ignore[no-untyped-def]
+    """Return V at the end of a panel."""
+    return distance_at(panel, panel[PANEL_BEGIN] + panel[PANEL_WIDTH])[1] * value_at_end(TO_END, panel, SPEEDS)
+
+
+@Inner
+def sum_series(terms, at, x):  # type: ignore[no-untyped-def]
+    """Return the sum of the Chebyshev series whose coefficients begin at an index of a line."""
+    following, after = 0.0, 0.0
+    for j in range(COUNT - 1, 0, -1):
+        following, after = terms[at + j] + 2.0 * x * following - after, following
+    return terms[at] + x * following - after
+
+
+@Inner
+def lay_half(records, at, count, head, panels, k):  # type: ignore[no-untyped-def]
+    """Fill the panels of a half from row k on, and return the next free row; ``head`` has what they have in common.
+
+    The march variable of a slow launch begins near a zero of V**2 behind it, at -c/2. Y is smooth there, but its
+    changes are not, so panels must be no wider than their distance from this zero.
+    """
+    terms, half_c, left = np.empty(WIDE), head[PANEL_HALF_C], 0.0
+    mark = half_c if half_c > 0.0 else inf
+    for i in range(count):
+        row = at + i * COLUMNS
+        right, begin = records[row + RIGHT], left
+        while begin < right:
+            while mark <= begin:
+                mark = 2.0 * mark + half_c
+            stop, panel = min(mark, right), panels[k]
+            panel[:SPEEDS] = head
+            panel[PANEL_BEGIN], panel[PANEL_WIDTH] = begin, stop - begin
+            panel[CONTACT_SIGN] = 1.0 if records[row + NORMAL_LOAD + COUNT // 2] > 0.0 else -1.0
+            if stop - begin == right - left:
+                panel[SPEEDS:] = records[row + Y_ROW : row + Y_ROW + WIDE]
+            else:
+                to_coefficients(records, row + Y_ROW, terms, 0)
+                for j in range(COUNT):
+                    x = 2.0 * ((begin - left) + (stop - begin) * SHARES[j]) / (right - left) - 1.0
+                    panel[SPEEDS + j] = sum_series(terms, 0, x)
+            begin, k = stop, k + 1
+        left = right
+    return k
+
+
+@Inner
+def mark_state(states, at, record, mark, v2, panel):  # type: ignore[no-untyped-def]
+    """Fill the state at a place of a record, on the side of a panel."""
+    states[PLACE, at], states[PLACE_LOW, at], states[W, at] = record[mark], record[mark + 1], v2
+    states[STATE_HEADING, at], states[STATE_SIGN, at] = record[HEADING], panel[CONTACT_SIGN]
+
+
+@entry(MATRIX(VECTOR, WHOLE, WHOLE, MATRIX), checked=False)
+def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
+    """Fill the panels of all halves, and return the states (`law.states_of`) in which the law is needed.
 
     Parameters
     ----------
-    halves : sequence of (Run, bool)
-        Runs, each with whether the half from its end is meant.
+    records : array
+        The records of all runs, one after the other.
+    begins : array of int
+        The indices at which these begin.
+    first : array of int
+        The indices at which the panels of each half begin; the last item is the number of panels. They are filled.
+    panels : array
+        The panels, which are filled.
 
-    Attributes
+    Returns
+    -------
+    array
+        The states at the start of each run, at the end of each, in the middle of each, and at the nodes of all panels.
+    """
+    runs, head = begins.size, np.zeros(WIDE)
+    first[0] = 0
+    for k in range(runs):
+        record = records[begins[k] :]
+        ahead, back, v = int(record[AHEAD]), int(record[BACK]), record[HEADING]
+        head[ORIGIN], head[ORIGIN_LOW], head[OUTWARD], head[PANEL_HEADING] = record[START], record[START + 1], v, v
+        head[PANEL_HALF_C] = record[HALF_C]
+        first[2 * k + 1] = lay_half(records, begins[k] + HEAD, ahead, head, panels, first[2 * k])
+        head[ORIGIN], head[ORIGIN_LOW], head[OUTWARD], head[PANEL_HALF_C] = record[END], record[END + 1], -v, 0.0
+        back_from = begins[k] + HEAD + ahead * COLUMNS
+        first[2 * k + 2] = lay_half(records, back_from, back, head, panels, first[2 * k + 1])
+    count = first[2 * runs]
+    states = np.empty((5, MARKS * runs + COUNT * count))
+    for k in range(runs):
+        record, one, other = records[begins[k] :], first[2 * k], first[2 * k + 1]
+        v2, on_way, at_end = record[START_V2], panels[one], panels[other if record[BACK] > 0.0 else one]
+        # If there are no panels from the start, the start is the middle.
+        mark_state(states, k, record, START, v2, on_way)
+        mark_state(states, runs + k, record, END, 0.0, at_end)
+        middle_v2 = end_speed(panels[other - 1]) ** 2 if record[AHEAD] > 0.0 else v2
+        mark_state(states, 2 * runs + k, record, MIDDLE, middle_v2, on_way)
+    for k in range(count):
+        panel = panels[k]
+        for j in range(COUNT):
+            at, w = MARKS * runs + k * COUNT + j, panel[PANEL_BEGIN] + panel[PANEL_WIDTH] * SHARES[j]
+            states[PLACE, at], states[PLACE_LOW, at] = place_on(panel, w)
+            states[W, at] = (panel[SPEEDS + j] * distance_at(panel, w)[1]) ** 2
+            states[STATE_HEADING, at], states[STATE_SIGN, at] = panel[PANEL_HEADING], panel[CONTACT_SIGN]
+    return states
+
+
+@Inner
+def jump(panels, forces, breaks, one, other, weights):  # type: ignore[no-untyped-def]
+    """Return the jump of the force from the end of a panel to an end of another one.
+
+    At a given distance from a moving origin, V**2 changes there by the jump times the shift of the origin. The force at
+    the nodes is ``forces``; the ``weights`` are those of one end of the other panel.
+    """
+    if breaks.size == 0:
+        return 0.0
+    panel = panels[one]
+    place = place_on(panel, panel[PANEL_BEGIN] + panel[PANEL_WIDTH])[0]
+    nearest, largest = inf, 0.0
+    for at in breaks:
+        nearest, largest = min(nearest, fabs(place - at)), max(largest, fabs(at))
+    if nearest > AT_BREAK * (fabs(place) + largest):
+        return 0.0
+    return value_at_end(weights, forces, other * COUNT) - value_at_end(TO_END, forces, one * COUNT)
+
+
+@Inner
+def integrate(panel, rows, at, out, to):  # type: ignore[no-untyped-def]
+    """Fill the integrals of u times a function over the distance, from the start of a panel to its nodes and end.
+
+    The values at the nodes begin at an index of a line, the integrals too.
+    """
+    graded, half_c = np.empty(WIDE), panel[PANEL_HALF_C]
+    to_means(rows, at, out, to)
+    u, width = panel[OUTWARD], panel[PANEL_WIDTH]
+    if half_c == inf:
+        for j in range(WIDE):
+            out[to + j] *= u * (width * ENDS_BY_NODE[j])
+        return
+    to_graded_means(rows, at, graded, 0)
+    slope = 2.0 * (panel[PANEL_BEGIN] + half_c)
+    for j in range(WIDE):
+        offset = width * ENDS_BY_NODE[j]
+        out[to + j] = u * offset * (slope * out[to + j] + offset * graded[j])
+
+
+@Inner
+def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: ignore[no-untyped-def]
+    """Fill the solutions on a panel (a row of WIDE numbers for each, as the module says).
+
+    Parameters
     ----------
-    first : list of int
-        Where the panels of each half begin; the last item is their number.
-    begin, width, contact_sign : (n,) arrays
-        The march variable where each panel begins, how far it goes, and the sign of N on it.
-    nodes : States
-        The nodes of all panels.
-    shares : (k+2, n, COUNT) array
-        For each solution and panel y/W at the nodes.
-    times : (k+2, n, COUNT+1) array
-        For each solution and panel the change of the time from the origin to the nodes, and to the panel's end.
-    arcs : (k, n, COUNT+1) array
-        For each parameter and panel the integral of the derivative of ds/dlam from the origin to there.
-    ends : (k+2, n) array
-        For each solution and panel y at the panel's end.
+    panel : array
+        The panel.
+    law : array
+        The law in states (`law.Law.matrix`).
+    at : int
+        The state at the first node of the panel.
+    parameters : int
+        The number of run-time parameters.
+    start, before : (n + 2,) arrays
+        y of the solutions, and the change of the time, at the beginning of the panel; they are set to those at its end.
+    arcs : (n,) array
+        The same of the integrals of ds/dlam.
+    out : array
+        What is filled, as one line.
     """
-
-    shares: Array
-    times: Array
-    arcs: Array
-    ends: Array
-
-    def __init__(self, halves: Sequence[tuple[Run, bool]]) -> None:
-        rows, tables = [], []
-        for run, is_back in halves:
-            place, low = run.pair(END if is_back else START)
-            heading = float(run.record[HEADING])
-            u, half_c = (-heading, 0.0) if is_back else (heading, run.half_c)
-            tables.append(run.panels_back if is_back else run.panels_ahead)
-            rows.append((place, low, u, heading, half_c))
-        panels, counts = _as_followed(tables), [len(table) for table in tables]
-        if any(0.0 < row[-1] < inf for row in rows):
-            parts = np.split(panels, np.cumsum(counts)[:-1])
-            parts = [_divided(part, row[-1]) for part, row in zip(parts, rows, strict=True)]
-            panels, counts = np.concatenate(parts), [len(part) for part in parts]
-        self.first = np.cumsum([0, *counts]).tolist()
-        self.place, self._low, self.u, self.heading, half_c = np.repeat(np.array(rows), counts, axis=0).T.copy()
-        self._is_distance = half_c == inf
-        self._half_c = np.where(self._is_distance, 0.0, half_c)
-        (self.begin, self.width, self.contact_sign), self._y = panels[:, :3].T, panels[:, 3:]
-        w = self.begin[:, None] + self.width[:, None] * SHARES
-        self._growth = np.where(self._is_distance[:, None], 1.0, w + self._half_c[:, None])
-        signs = np.repeat(self.heading, COUNT), np.repeat(self.contact_sign, COUNT)
-        places = self.places(np.repeat(np.arange(len(self.width)), COUNT), w.ravel())
-        self.nodes = States(*places, ((self._y * self._growth) ** 2).ravel(), *signs)
-
-    @property
-    def end_speeds(self) -> Array:
-        """V at the end of each panel."""
-        growth = np.where(self._is_distance, 1.0, self.begin + self.width + self._half_c)
-        speeds: Array = growth * (self._y @ TO_END)
-        return speeds
-
-    def panel_at(self, half: NDArray[np.intp], w: Array) -> NDArray[np.intp]:
-        """The panels at march variables w on halves with numbers."""
-        low, high = np.array(self.first)[half], np.array(self.first)[half + 1] - 1
-        while (low < high).any():  # by halving
-            middle = (low + high + 1) // 2
-            is_behind = self.begin[middle] <= w
-            low, high = np.where(is_behind, middle, low), np.where(is_behind, high, middle - 1)
-        return low
-
-    def distances(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
-        """At march variables w on panels k the distance from the origin, and V over Y there."""
-        distance = np.where(self._is_distance[k], w, w * (w + 2.0 * self._half_c[k]))
-        return distance, np.where(self._is_distance[k], 1.0, w + self._half_c[k])
-
-    def places(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
-        """The places at march variables w on panels k, as two doubles each."""
-        high, low = two_sum.py_func(self.place[k], self.u[k] * self.distances(k, w)[0])
-        return high, low + self._low[k]
-
-    def solve(self, rows: LawRows, breaks: Array) -> None:
-        """Solve the variational equation.
-
-        Parameters
-        ----------
-        rows : LawRows
-            The law at all nodes.
-        breaks : array
-            The places at which it may jump.
-        """
-        n, count = len(rows.by_parameters), len(self.width)
-        offset, zero = self.width[:, None] * POINTS, np.zeros_like(rows.ds)
-        twice = np.where(self._is_distance, 1.0, 2.0)[:, None]
-        ds = rows.ds.reshape(count, COUNT)
-        # By w and not by the distance: laws with the root of W have a pole here at a turn, but not times the growth.
-        rate = twice * self._growth * rows.by_w.reshape(count, COUNT)
-        factor = np.exp(self.u[:, None] * offset * (rate @ MEANS.T))
-        # Sources for each parameter, for sigma, and none for what begins with y = 1.
-        sources = np.vstack([rows.by_parameters, rows.by_place, zero]).reshape(n + 2, count, COUNT)
-        gained = self._over_distance(sources / factor[:, :COUNT])
-        slopes = rows.slope.reshape(count, COUNT)
-        self._breaks, self._slopes = breaks, np.stack([slopes @ TO_START, slopes @ TO_END])
-        panels = np.arange(1, count)
-        jumps = np.append(0.0, self.jumps(panels - 1, panels, 0))
-        y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1], jumps)[:, :, None])
-        self.shares, self.ends = y[:, :, :COUNT] / self.nodes.w.reshape(count, COUNT), y[:, :, -1]
-        self.shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
-        stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, zero]).reshape(n + 2, count, COUNT)
-        changes = twice * ds / self._y * (stretch / ds - 0.5 * self.shares)
-        times = offset * (changes @ MEANS.T)
-        arcs = self._over_distance(rows.ds_by_parameters.reshape(n, count, COUNT))
-        self.times, self.arcs = times + self._before(times), arcs + self._before(arcs)
-
-    @cached_property
-    def _series(self) -> tuple[Array, Array]:
-        """Chebyshev coefficients on each panel: rows for ``times``, and for ``shares`` and ``arcs``."""
-        others = np.concatenate([self.shares, self.arcs[:, :, :COUNT]])
-        parts = (self.times[:, :, :COUNT], others)
-        times, others = (np.ascontiguousarray(np.moveaxis(part @ TO_COEFFICIENTS.T, 0, 1)) for part in parts)
-        return times, others
-
-    def _sums(self, series: Array, k: NDArray[np.intp], w: Array) -> Array:
-        out = np.empty((series.shape[1], k.size))
-        fill_sums(series, k, np.clip(2.0 * (w - self.begin[k]) / self.width[k] - 1.0, -1.0, 1.0), out)
-        return out
-
-    def times_at(self, k: NDArray[np.intp], w: Array) -> Array:
-        """``times`` at march variables w on panels k."""
-        return self._sums(self._series[0], k, w)
-
-    def at(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
-        """``shares``, ``times`` and ``arcs`` at march variables w on panels k."""
-        others = self._sums(self._series[1], k, w)
-        count = len(self.shares)
-        return others[:count], self.times_at(k, w), others[count:]
-
-    def _over_distance(self, rows: Array) -> Array:
-        """Integrals of u times rows over the distance, from the start of each panel to its points."""
-        offset = self.width[:, None] * POINTS
-        slope = np.where(self._is_distance, 1.0, 2.0 * (self.begin + self._half_c))[:, None]
-        graded = np.where(self._is_distance, 0.0, 1.0)[:, None] * offset * (rows @ GRADED_MEANS.T)
-        integrals: Array = self.u[:, None] * offset * (slope * (rows @ MEANS.T) + graded)
-        return integrals
-
-    def _before(self, integrals: Array) -> Array:
-        """Return the values of integrals before each panel of their half."""
-        before = np.zeros((*integrals.shape[:2], 1))
-        for first, stop in pairwise(self.first):
-            before[:, first + 1 : stop, 0] = np.cumsum(integrals[:, first : stop - 1, -1], axis=1)
-        return before
-
-    def jumps(self, one: NDArray[np.intp], other: NDArray[np.intp], end: int) -> Array:
-        """By how much the force jumps between the ends of some panels and the beginnings (or ends) of others.
-
-        At a given distance from an origin that moves, V**2 changes by as much there, times how far that moves.
-        """
-        if not self._breaks.size:
-            return np.zeros(one.size)
-        places = self.places(one, self.begin[one] + self.width[one])[0]
-        nearest = np.abs(places[:, None] - self._breaks).min(axis=1)
-        at_break = nearest <= AT_BREAK * (np.abs(places) + np.abs(self._breaks).max())
-        return np.where(at_break, self._slopes[end, other] - self._slopes[1, one], 0.0)
-
-    def jump(self, one: int, other: int, end: int) -> float:
-        """As `jumps`, between two panels."""
-        return float(self.jumps(np.array([one]), np.array([other]), end)[0])
-
-    def _chained(self, gained: Array, factors: Array, jumps: Array) -> Array:
-        """The values of y with which panels begin: at the origin 0, and 1 for the last of the solutions."""
-        start = np.zeros_like(gained)
-        for first, stop in pairwise(self.first):
-            start[-1, first] = 1.0
-            for k in range(first + 1, stop):
-                start[:, k] = factors[k - 1] * (start[:, k - 1] + gained[:, k - 1])
-                start[-2, k] += jumps[k]
-        return start
+    n, work = parameters, np.empty(5 * WIDE)
+    factor, rate, source, gained, growth = 0, WIDE, 2 * WIDE, 3 * WIDE, 4 * WIDE
+    by_distance, width, u = panel[PANEL_HALF_C] == inf, panel[PANEL_WIDTH], panel[OUTWARD]
+    twice = 1.0 if by_distance else 2.0
+    for j in range(COUNT):
+        work[growth + j] = distance_at(panel, panel[PANEL_BEGIN] + width * SHARES[j])[1]
+        # Integrals are over w and not over the distance: laws with the square root of W have a pole at a turn, which
+        # the growth of the distance with w cancels.
+        work[rate + j] = twice * work[growth + j] * law[n + 4, at + j]
+    to_means(work, rate, work, factor)
+    for j in range(WIDE):
+        work[factor + j] = exp(u * (width * ENDS_BY_NODE[j]) * work[factor + j])
+    for row in range(n + 2):
+        # A row for each parameter, for sigma, and for the solution that begins with y = 1, which has no source.
+        force, stretch = (n + 5 + row, 2 + row) if row < n else (n + 3, 1)
+        if row <= n:
+            for j in range(COUNT):
+                work[source + j] = law[force, at + j] / work[factor + j]
+            integrate(panel, work, source, work, gained)
+        else:
+            work[gained : gained + WIDE] = 0.0
+        times, shares = row * WIDE, (n + 2 + row) * WIDE
+        for j in range(COUNT):
+            y = work[factor + j] * (work[gained + j] + start[row])
+            share = y / (panel[SPEEDS + j] * work[growth + j]) ** 2
+            # No solution begins with y = 1 where V**2 is 0.
+            out[shares + j] = share if by_distance or row <= n else 0.0
+            stretched = law[stretch, at + j] / law[0, at + j] if row <= n else 0.0
+            work[rate + j] = twice * law[0, at + j] / panel[SPEEDS + j] * (stretched - 0.5 * out[shares + j])
+        start[row] = work[factor + COUNT] * (work[gained + COUNT] + start[row])
+        out[shares + COUNT] = start[row]
+        to_means(work, rate, out, times)
+        for j in range(WIDE):
+            out[times + j] = width * ENDS_BY_NODE[j] * out[times + j] + before[row]
+        before[row] = out[times + COUNT]
+    for row in range(n):
+        to = (2 * n + 4 + row) * WIDE
+        for j in range(COUNT):
+            work[source + j] = law[2 + row, at + j]
+        integrate(panel, work, source, out, to)
+        for j in range(WIDE):
+            out[to + j] += arcs[row]
+        arcs[row] = out[to + COUNT]
 
 
-def _as_followed(tables: Sequence[Array]) -> Array:
-    """The panels of all halves: where each begins, how far it goes, the sign of N on it, and Y at its nodes."""
-    table = np.concatenate(tables)
-    right = table[:, RIGHT]
-    begin = np.append(0.0, right[:-1])
-    begin[np.cumsum([0, *(len(part) for part in tables)])[:-1]] = 0.0
-    sign = np.where(table[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
-    return np.column_stack([begin, right - begin, sign, table[:, Y_ROW : Y_ROW + COUNT]])
-
-
-def _divided(panels: Array, half_c: float) -> Array:
-    """The panels of a half, divided where its launch is slow.
-
-    The march variable of a slow launch begins near a zero of V**2 behind it, at -half_c. There Y is smooth, but changes
-    of it are not: panels are no longer than their distance from it.
-    """
-    if not 0.0 < half_c < inf:
-        return panels
-    left, sign, y = panels[:, 0], panels[:, 2], panels[:, 3:]
-    right = np.append(left[1:], left[-1] + panels[-1, 1])
-    marks = half_c * (2.0 ** np.arange(1, ceil(log2(right[-1] / half_c + 2.0))) - 1.0)
-    edges = np.unique([*left, right[-1], *marks[marks < right[-1]]])
-    if edges.size == left.size + 1:
-        return panels
-    begin, width = edges[:-1], np.diff(edges)
-    owner = np.searchsorted(right, begin, side="right")
-    x = 2.0 * ((begin - left[owner])[:, None] + width[:, None] * SHARES) / (right - left)[owner, None] - 1.0
-    y = np.einsum("pj,jk,pik->pi", y[owner], TO_COEFFICIENTS.T, chebvander(x, COUNT - 1))
-    return np.column_stack([begin, width, sign[owner], y])
+@Inner
+def solve_panels(panels, first, law, parameters, breaks, solutions):  # type: ignore[no-untyped-def]
+    """Fill the solutions on all panels."""
+    n, half = parameters, 0
+    states = law.shape[1] - COUNT * panels.shape[0]
+    forces = law[n + 2, states:]
+    start, before, arcs = np.zeros(n + 2), np.zeros(n + 2), np.zeros(n)
+    for half in range(first.size - 1):
+        start[:], before[:], arcs[:] = 0.0, 0.0, 0.0
+        start[n + 1] = 1.0
+        for k in range(first[half], first[half + 1]):
+            if k > first[half]:
+                start[n] += jump(panels, forces, breaks, k - 1, k, TO_START)
+            out = solutions[k].reshape(solutions.shape[1] * WIDE)
+            solve_panel(panels[k], law, states + k * COUNT, n, start, before, arcs, out)

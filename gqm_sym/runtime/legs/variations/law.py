@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
-from gqm_sym.runtime.gradients.evaluation import fill_values
-from gqm_sym.runtime.gradients.orbit import PathRows, pairs, path_rows, values, without_formulas
+from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
+from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
+from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
@@ -23,7 +24,7 @@ from gqm_sym.runtime.legs.panels.polynomials import COUNT
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
 from gqm_sym.runtime.legs.variations.programs import force_program, law_program, load_program, range_program
 
-# Roundings of doubles over those of double-double arithmetic.
+# The ratio of the rounding errors of doubles to those of double-double arithmetic.
 COARSER = 0.5 * ULP / UNIT
 
 # The largest relative error of the force at which panels still distinguish rounding from structure.
@@ -31,63 +32,44 @@ MAX_FORCE_ERROR = 1e-11
 
 
 class LawRows(NamedTuple):
-    """The law of motion at places: a column for each.
+    """The law of motion in states, with its derivatives: a column for each.
 
     Attributes
     ----------
-    ds, ds_by_place : (n,) arrays
-        ds/dlam and its derivative by the place.
-    ds_by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
-    slope, by_place, by_w : (n,) arrays
-        F = dW/dlam and its derivatives by the place and by W.
-    by_parameters : (k, n) array
-        Its derivatives by the run-time parameters.
+    matrix : (2 * k + 5, n) array
+        ds/dlam, its derivative by the place and those by the k run-time parameters, then F = dW/dlam and its
+        derivatives by the place, by W and by the parameters.
     """
 
-    ds: Array
-    ds_by_place: Array
-    ds_by_parameters: Array
-    slope: Array
-    by_place: Array
-    by_w: Array
-    by_parameters: Array
+    matrix: Array
 
-    def part(self, first: int, last: int | None) -> "LawRows":
-        """The law at some of the places."""
-        return LawRows(*(row[..., first:last] for row in self))
+    @property
+    def ds(self) -> Array:
+        """ds/dlam."""
+        ds: Array = self.matrix[0]
+        return ds
+
+    @property
+    def force(self) -> Array:
+        """F and its derivatives by the place and by W: a row for each."""
+        first = (len(self.matrix) - 1) // 2
+        force: Array = self.matrix[first : first + 3]
+        return force
 
 
-class States(NamedTuple):
-    """The states for which the law is evaluated: a number for each.
-
-    Attributes
-    ----------
-    high, low : (n,) arrays
-        The places as two doubles each.
-    w : (n,) array
-        V**2 there.
-    heading, contact_sign : (n,) arrays
-        The signs of dlam/dt and of N.
+def states_of(high: Array, low: Array, w: Array, heading: Array, contact_sign: Array) -> Array:
+    """Return the states for which the law is evaluated, from places of two doubles each, V**2, and the signs of dlam/dt
+    and of N.
     """
-
-    high: Array
-    low: Array
-    w: Array
-    heading: Array
-    contact_sign: Array
-
-
-def one_state(place: Pair, w: float, heading: float, contact_sign: float) -> States:
-    """One state, at a place of two doubles."""
-    return States(*(np.array([number]) for number in (*place, w, heading, contact_sign)))
+    return np.array([high, low, w, heading, contact_sign])
 
 
 class Law(ABC):
     """The law of a motion with losses, with its derivatives.
 
-    Places are labels of points of the curve. Where the curve has formulas they are its parameter, else arc lengths
-    along the curve as it is; there, parameters that shape the curve move its points and stretch the way between them.
+    Places are labels of points of the curve. For a curve with formulas they are values of its parameter; otherwise they
+    are arc lengths along the curve for the given parameters. In that case parameters that shape the curve move its
+    points and change the arc lengths between them.
 
     Parameters
     ----------
@@ -99,11 +81,11 @@ class Law(ABC):
     count : int
         The number of run-time parameters.
     mass : int
-        Which of them is the mass.
+        The index of the mass among them.
     parameters : (3, count) array
         Their values as inputs of programs.
     by_arc_length : bool
-        Whether places are told as arc lengths, which then are not the labels of points.
+        Whether places are arc lengths, which then are not fixed to the points of the curve.
     """
 
     by_arc_length: bool
@@ -115,7 +97,7 @@ class Law(ABC):
     @property
     @abstractmethod
     def launch_moves(self) -> Array:
-        """How the label of the launch changes with each variable."""
+        """The derivatives of the label of the launch by each variable."""
 
     @property
     @abstractmethod
@@ -123,36 +105,32 @@ class Law(ABC):
         """The derivatives of both ends of the range of labels and of their period: a row for each, by parameters."""
 
     @abstractmethod
-    def rows(self, states: States) -> LawRows:
-        """The law in states."""
+    def matrix(self, states: Array) -> Array:
+        """Return the law in states, as `LawRows.matrix`."""
 
     @abstractmethod
-    def loads(self, states: States) -> Array:
-        """The slope of the contact force per mass along the motion, and its derivatives by the place and by W."""
+    def loads(self, states: Array) -> Array:
+        """Return the slope of the contact force per mass along the motion, and its derivatives by the place and by
+        W.
+        """
 
     @abstractmethod
     def path(self, high: Array, low: Array) -> PathRows:
-        """The path at places of two doubles each, with derivatives at the points that labels tell."""
+        """Return the path at places of two doubles each, with derivatives at points with fixed labels."""
 
     @abstractmethod
-    def coordinates(self, states: States) -> Array:
-        """The places that programs take, as two doubles for each coordinate but the last, which is V**2."""
+    def coordinates(self, states: Array) -> Array:
+        """Return the coordinates that programs take, as two doubles each except for the last one, which is V**2."""
 
-    def values(self, program: Program, states: States, errors: Array | None = None) -> Array:
-        """The results of a program in states (`orbit.values`), for parameters with bounds on their errors."""
-        signs, found = 2.0 * states.heading + states.contact_sign, np.empty((program.outputs.size, 3, states.w.size))
-        w = np.maximum(states.w, LEAST_V2)  # laws may take its root
-        places = np.vstack([self.coordinates(states), [w, np.zeros_like(w)]])
-        for heading in (-1.0, 1.0):
-            for contact_sign in (-1.0, 1.0):
-                here = np.flatnonzero(signs == 2.0 * heading + contact_sign)
-                if here.size:
-                    inputs = np.hstack([self.parameters, [[heading, contact_sign], [0.0, 0.0], [0.0, 0.0]]])
-                    if errors is not None:
-                        inputs[2, : self.count] = errors
-                    some = np.empty((program.outputs.size, 3, here.size))
-                    fill_values(program.operands, program.work, inputs, np.ascontiguousarray(places[:, here]), some)
-                    found[:, :, here] = some
+    def values(self, program: Program, states: Array, errors: Array | None = None, *, parts: int = 3) -> Array:
+        """Return the results of a program in states (`evaluation.values`), given bounds on the errors of parameters."""
+        found = np.empty((program.outputs.size, parts, states.shape[1]))
+        w = np.maximum(states[2], LEAST_V2)  # laws may contain its square root
+        places = np.vstack([self.coordinates(states), w, np.zeros_like(w)])
+        inputs = np.hstack([self.parameters, np.zeros((3, 2))])
+        if errors is not None:
+            inputs[2, : self.count] = errors
+        fill_signed_values(program.operands, program.work, inputs, places, states, found)
         return found
 
 
@@ -170,40 +148,40 @@ class FormulaLaw(Law):
 
     @property
     def launch_moves(self) -> Array:
-        """As in `Law`."""
+        """See `Law`."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
         return moves
 
     @cached_property
     def ranges(self) -> Array:
-        """As in `Law`."""
+        """See `Law`."""
         assert self._domain is not None
         found = values(range_program(self._domain, self.count), self.parameters, np.zeros(1))[:, 0, 0]
         return found.reshape(3, -1)[:, 1:]
 
-    def coordinates(self, states: States) -> Array:
-        """As in `Law`."""
-        return np.array([states.high, states.low])
+    def coordinates(self, states: Array) -> Array:
+        """See `Law`."""
+        return states[:2]
 
-    def rows(self, states: States) -> LawRows:
-        """As in `Law`."""
-        n = self.count
-        found = self.values(law_program(self._exact, n), states)[:, 0]
-        ds, slope = found[: n + 2], found[n + 2 :]
-        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:])
+    def matrix(self, states: Array) -> Array:
+        """See `Law`."""
+        found: Array = self.values(law_program(self._exact, self.count), states, parts=1)[:, 0]
+        return found
 
-    def loads(self, states: States) -> Array:
-        """As in `Law`."""
-        found: Array = self.values(load_program(self._exact, self.count), states)[:, 0]
+    def loads(self, states: Array) -> Array:
+        """See `Law`."""
+        found: Array = self.values(load_program(self._exact, self.count), states, parts=1)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
-        """As in `Law`."""
+        """See `Law`."""
         return path_rows(self._exact, self.parameters, self.mass, high, low)
 
     def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:
-        """`force_errors` on the panels of each run, first those from its start: the largest of three places of each."""
+        """Return `force_errors` on the panels of each run, beginning with those from its start: the largest at three
+        places of each.
+        """
         places, signs, counts = [], [], []
         for run in runs:
             v, halves = run.record[HEADING], [(run.record[START], run.half_c, run.panels_ahead)]
@@ -222,30 +200,33 @@ class FormulaLaw(Law):
         return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
 
     def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
-        """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place."""
+        """Return the errors of dW/dlam of a body at rest in doubles: by rounding, and by the rounding of the place."""
         return np.nan_to_num(self._forces(places, v, nu)[1], posinf=0.0)
 
     def _forces(self, places: Array, v: Array, nu: Array) -> tuple[Array, Array]:
-        """The force dW/dlam on a body at rest, and its errors.
+        """Return the force dW/dlam on a body at rest, and its errors.
 
         Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
         """
-        states = States(places, np.zeros_like(places), np.zeros_like(places), v, nu)
+        states = states_of(places, np.zeros_like(places), np.zeros_like(places), v, nu)
         lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
         force, slope = self.values(force_program(self._exact, self.count), states, lows)
         return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
     def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """The force dW/dlam on a body at rest, without friction, and its derivative by the place.
+        """Return the force dW/dlam on a body at rest, without friction, and its derivative by the place.
 
         Places are given as two doubles each.
         """
         ones = np.ones_like(high)
-        force, slope = self.values(force_program(self._exact, self.count), States(high, low, 0.0 * ones, ones, ones))
+        states = states_of(high, low, 0.0 * ones, ones, ones)
+        force, slope = self.values(force_program(self._exact, self.count), states)
         return force[0], slope[0]
 
     def cancels(self, place: float, heading: int) -> bool:
-        """Whether terms of the force on a body at rest cancel so far there that their rounding passes for structure."""
+        """Return whether terms of the force on a body at rest cancel so far at a place that their rounding looks like
+        structure.
+        """
         both = np.array([-1.0, 1.0])
         forces, errors = self._forces(np.full(2, place), np.full(2, float(heading)), both)
         return bool(np.all(errors > MAX_FORCE_ERROR * np.abs(forces)))

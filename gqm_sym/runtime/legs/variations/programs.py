@@ -12,7 +12,7 @@ from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
 
 @lru_cache(maxsize=64)
 def law_program(law: ExactLaw, parameters: int) -> Program:
-    """The law of a motion with losses at a place and a V**2, the two coordinates.
+    """Return the program of the law of a motion with losses, whose two coordinates are a place and V**2.
 
     The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
     place and the parameters, and dW/dlam, where W is V**2, and its derivatives by the place, W and the parameters.
@@ -24,7 +24,8 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
 
 @lru_cache(maxsize=64)
 def load_program(law: ExactLaw, parameters: int) -> Program:
-    """The slope of the contact force per mass along a motion with losses, and its derivatives by the place and by W.
+    """Return the program of the slope of the contact force per mass along a motion with losses, and of its derivatives
+    by the place and by W.
 
     The inputs are those of `law_program`.
     """
@@ -37,7 +38,7 @@ def load_program(law: ExactLaw, parameters: int) -> Program:
 
 
 def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
-    """A tape with ds/dlam and dW/dlam."""
+    """Return a tape with ds/dlam and dW/dlam."""
     op = Recorder(parameters + 2, coordinates=2)
     (lam, w), p, signs = op.places, op.values[:parameters], op.values[parameters:]
     return op, op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
@@ -45,14 +46,17 @@ def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumb
 
 @lru_cache(maxsize=64)
 def force_program(law: ExactLaw, parameters: int) -> Program:
-    """dW/dlam at a place and a V**2, and its derivative by the place; the inputs are those of `law_program`."""
+    """Return the program of dW/dlam at a place and V**2, and its derivative by the place; the inputs are those of
+    `law_program`.
+    """
     op, _, slope = _law(law, parameters)
     return assemble(op, [slope, *gradient(op, slope, [op.place])])
 
 
 @lru_cache(maxsize=64)
 def range_program(domain: Callable[..., Any], parameters: int) -> Program:
-    """Both ends of the parameter's range and its period, each with its derivatives by the run-time parameters.
+    """Return the program of both ends of the parameter's range and its period, each with its derivatives by the
+    run-time parameters.
 
     Those that do not exist are zero.
     """
@@ -69,7 +73,7 @@ class ChartForces(NamedTuple):
     law : ExactChartLaw
         The formulas of a module.
     parameters, mass : int
-        The number of run-time parameters, and which of them is the mass.
+        The number of run-time parameters, and the index of the mass among them.
     shaping : tuple of int
         The parameters that shape the curve.
     """
@@ -80,13 +84,13 @@ class ChartForces(NamedTuple):
     shaping: tuple[int, ...]
 
 
-# Derivatives of the coordinates x and z by u, from order 0 on, that tell a point of a chart, and how many of these tell
-# its curvature; there are as many of each displacement.
+# The number of derivatives of x and z by u, from order 0 on, that describe a point of a chart, and the number of those
+# that its curvature needs; each displacement has as many of the latter.
 ORDERS, CURVED = 5, 3
 
 
 class _ChartPoint:
-    """A tape with a point of a chart and V**2 there, as `ShapedPieces.path` tells it with `ORDERS`.
+    """A tape with a point of a chart, as `ShapedPieces.path` gives it with `ORDERS`, and V**2 there.
 
     The inputs are the run-time parameters, sgn(ds/dt) and sgn(N).
     """
@@ -109,13 +113,13 @@ class _ChartPoint:
             self.stretches[k] = (dx * moved[2] + dz * moved[3]) / square
 
     def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
-        """For each parameter that shapes the curve, the displacement with its derivatives by u."""
+        """Return, for each parameter that shapes the curve, the displacement with its derivatives by u."""
         first, count = 2 * ORDERS, 2 * CURVED
         starts = range(first, first + count * len(self._forces.shaping), count)
         return [(k, self.op.places[i : i + count]) for k, i in zip(self._forces.shaping, starts, strict=True)]
 
     def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        """The derivatives of a quantity of a point by arc length, by V**2, and by the run-time parameters."""
+        """Return the derivatives of a quantity of a point by arc length, by V**2, and by the run-time parameters."""
         op, count = self.op, 2 * (ORDERS - 1)
         *by_places, by_w = gradient(op, quantity, [*op.places[:count], self.w])
         by_parameters = gradient(op, quantity, self.p)
@@ -128,9 +132,11 @@ class _ChartPoint:
 
 @lru_cache(maxsize=64)
 def chart_law_program(forces: ChartForces) -> Program:
-    """The law at a point of a chart: how ways there are stretched by each parameter, and dW/dlabel with derivatives.
+    """Return the program of the law at a point of a chart: the relative change of arc lengths there by each parameter,
+    and dW/dlabel with derivatives.
 
-    These are by the place, by W and by the parameters. Ways are longer by their stretch, and the change of W on them.
+    The derivatives are by the place, by W and by the parameters. If arc lengths grow, so does the change of W over
+    them.
     """
     at = _ChartPoint(forces)
     along, by_w, by_parameters = at.partials(at.slope)
@@ -140,7 +146,9 @@ def chart_law_program(forces: ChartForces) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_load_program(forces: ChartForces) -> Program:
-    """The slope of the contact force per mass along a motion, and its derivatives by the place and by W."""
+    """Return the program of the slope of the contact force per mass along a motion, and of its derivatives by the place
+    and by W.
+    """
     at = _ChartPoint(forces)
     along, by_w, _ = at.partials(at.curvature * at.w + at.load)
     load_slope = along + by_w * at.slope
@@ -149,10 +157,10 @@ def chart_load_program(forces: ChartForces) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
-    """Return the program of states at a point, as `gradients.programs.path_program` without a potential."""
+    """Return the program of states at a point, as `gradients.programs.path_program`."""
     at = _ChartPoint(forces)
     op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
-    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load):
+    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load, op.number(0)):
         if quantity is None:
             outputs += [op.number(1), *at.stretches, op.number(0)]
         else:

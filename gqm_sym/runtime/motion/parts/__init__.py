@@ -1,1 +1,1 @@
-"""The parts that `Motion` is put together from, each for one kind of question."""
+"""The base classes of `Motion`, each for one kind of question."""

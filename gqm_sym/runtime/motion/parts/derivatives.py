@@ -67,7 +67,7 @@ class Derivatives(Positions):
         raise SolutionError(f"gradient: only periodic motions have second derivatives; this one is {self.kind!r}")
 
     def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
-        """The derivatives of the time at which the body is at a place: what carries it on makes that earlier."""
+        """Return the derivatives of the time at which the body is at a place; it is earlier if the body moves on."""
         t = self.time_at(lam)
         state, changes, f = self.state(t), self._sensitivity(t, wrt), self.problem.functions
         if state.v == 0.0:
@@ -83,8 +83,8 @@ class Derivatives(Positions):
         -------
         Switch or None
             Its time ``t``, its place ``lam``, and ``margin``: the force along the track minus the largest static
-            friction, divided by the latter; negative where the body stays. Derivatives are those for the present number
-            of legs, and one-sided at a margin of 0.
+            friction, divided by the latter; negative if the body stays. Derivatives are those for the present number of
+            legs, and one-sided at a margin of 0.
         """
         return None
 
@@ -117,7 +117,7 @@ class Derivatives(Positions):
         return self._sensitivity(t, wrt)
 
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
-        """`sensitivity`, of which the contact force is right only where that has a sign."""
+        """Return `sensitivity`, whose contact force is right only if that has a sign."""
         raise self._without_gradients()
 
     def place_changes(self, t: Any, wrt: Any) -> Array:

@@ -25,7 +25,7 @@ class History(Positions):
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:
-        """Ends of timed segments that end no leg."""
+        """Kinds of ends of timed segments at which no leg ends."""
         return ("",)
 
     @property
@@ -55,7 +55,9 @@ class History(Positions):
         return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
-        """The places at phase angles of a segment, each with its time; at launch it is exactly the launch place."""
+        """Return the places at phase angles of a segment, given with their times; at launch it is exactly the launch
+        place.
+        """
         lam = timed.segment.places(np.array([phi for _, phi in marks]))
         lam[[time[0] == 0.0 for time, _ in marks]] = self.problem.lam0
         return lam
@@ -74,7 +76,7 @@ class History(Positions):
         return Rows(self._events_along(self._history()))
 
     def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
-        """The events on timed segments from launch, and the horizon if it is not later than a time in s."""
+        """Return the events on timed segments from launch, and the horizon if it is not later than a time in s."""
         found: list[Event] = []
         time_scale_error = self._listed_trajectory.time_scale_error
         for timed in segments:
@@ -119,7 +121,7 @@ class History(Positions):
         return Rows(event for event in found if start <= event.t <= stop)
 
     def _up_to_horizon(self, legs: list[Leg]) -> list[Leg]:
-        """The legs up to the horizon, at which the last one is cut."""
+        """Return the legs up to the horizon, at which the last one is cut."""
         end = self._horizon
         out = [leg for leg in legs if leg.t_start < end or leg.t_end == end]
         if out and (out[-1].t_end > end or out[-1].end == ""):
@@ -130,15 +132,15 @@ class History(Positions):
         return out
 
     def _place_on_last_leg(self, t: float) -> float:
-        """The curve parameter at a time on the last of the legs."""
+        """Return the curve parameter at a time on the last of the legs."""
         return float(self.lam(t))
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
-        """The times at which N changes sign on a timed segment, each with its phase angle."""
+        """Return the times at which N changes sign on a timed segment, each with its phase angle."""
         return crossings(timed, contact_changes(self.problem.formulas, timed), self._listed_trajectory.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
-        """The approach to an equilibrium, which the body reaches after infinite time."""
+        """Return the event of an approach to an equilibrium, which the body reaches after infinite time."""
         f, lam = self.problem.functions, timed.segment.b
         x, z = path_and_force_at(f.addresses, f.p, np.array([lam]), np.zeros(1))[:2, 0]
         return Event("asymptote", inf, lam + timed.laps * self._listed_trajectory.lap, float(x), float(z))
@@ -151,7 +153,7 @@ class History(Positions):
 
 
 def merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
-    """The legs, joined where the end of one matters to the computation only."""
+    """Return the legs, joined at ends that matter only to the computation."""
     out: list[Leg] = []
     for leg in legs:
         if out and out[-1].end in internal_ends:

@@ -50,23 +50,27 @@ class Positions(ABC):
 
     @abstractmethod
     def _trajectory(self, end_time: float) -> Trajectory:
-        """The trajectory, computed for times up to ``end_time`` from launch at least."""
+        """Return the trajectory, computed for times up to ``end_time`` from launch at least."""
 
     @property
     def _listed_trajectory(self) -> Trajectory:
-        """The trajectory that legs, events and passages are read off: of a motion that repeats, one period."""
+        """The trajectory from which legs, events and passages are read; for a motion that repeats, one period."""
         return self._trajectory(0.0)
 
     @abstractmethod
     def _time_error(self, t: Array) -> Array:
-        """Estimated error in s of the time at which the body comes to its segment of the trajectory."""
+        """Return the estimated error in s of the time at which the body reaches its segment of the trajectory."""
 
     def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
-        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        """Return bounds of the errors inherited by a timed segment: those of its place, and of the times at phase
+        angles.
+        """
         return 0.0, np.zeros_like(phi)
 
     def _known_end(self) -> float:
-        """The time in s at which the motion ends by what has been computed of it; infinite if that is not known."""
+        """Return the time in s at which the motion ends, as far as it has been computed; infinite if that is not
+        known.
+        """
         return self._horizon
 
     def _end_text(self) -> str:
@@ -96,7 +100,7 @@ class Positions(ABC):
         return max((timed.segment.condition_number for timed in self._history()), default=1.0)
 
     def _history(self) -> tuple[TimedSegment, ...]:
-        """The timed segments that `legs` and `events` list."""
+        """Return the timed segments that `legs` and `events` list."""
         return self._listed_trajectory.segments
 
     # -- positions ----------------------------------------------------------------------------
@@ -162,9 +166,9 @@ class Positions(ABC):
         return kind(*found, *(_shaped(array, shape) for array in more))
 
     def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
-        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows.
+        """Return the class of states on the curve, and their fields in addition to those of `State`, as rows.
 
-        In a frame that turns the contact ``force`` is filled, too.
+        In a rotating frame the contact ``force`` is filled, too.
         """
         formulas, p = self.problem.formulas, self.problem.functions.p
         if formulas.path_in_space is None:
@@ -179,7 +183,7 @@ class Positions(ABC):
         )
 
     def _resting(self, times: Array) -> NDArray[np.bool_]:
-        """Whether the body is at rest for good at times from launch."""
+        """Return whether the body is at rest for good at times from launch."""
         if self.kind == "rest":
             return np.ones(times.size, dtype=np.bool_)
         if self.kind != "dissipative" or not times.size or (last := float(times.max())) < self._known_end():
@@ -187,7 +191,9 @@ class Positions(ABC):
         return times >= (last if self.legs[-1].end == "rest" else inf)
 
     def _state_of(self, t: Any, rows: Array) -> State:
-        """The state at one time, or at an array of times, from the rows of `Sampler.states` at places within a lap."""
+        """Return the state at one time, or at an array of times, from the rows of `Sampler.states` at places within a
+        lap.
+        """
         times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
         kind, more = self._in_space(times, rows[0], rows[4], rows[5], rows[7])
         rows = np.concatenate([rows, more]) if more.size else rows
@@ -211,7 +217,7 @@ class Positions(ABC):
         Raises
         ------
         SolutionError
-            If the motion is never there before ``t_end``.
+            If the motion does not reach the place before ``t_end``.
         """
         formulas = self.problem.formulas
         place = read_number(lam, where=formulas.parameter, unit=formulas.units.get(formulas.parameter))
@@ -252,7 +258,7 @@ class Positions(ABC):
         return _shaped(self._bound(times, points, reduced, v, ds), shape)
 
     def _bound(self, times: Array, points: PhasePoints, reduced: Array, v: Array, ds: Array) -> Array:
-        """`error_bound`, from the places within the lap, the velocities and ds/dlam."""
+        """Return `error_bound`, given the places within the lap, the velocities and ds/dlam."""
         with np.errstate(divide="ignore", invalid="ignore"):
             rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
         time_error, inversion_error = self._time_error(times), np.zeros_like(times)
@@ -262,7 +268,7 @@ class Positions(ABC):
             inversion_error[mask] = place_before + errors.inversion_error(timed.segment, phi)
         # The length of a lap, its multiple and the sum are rounded.
         rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
-        # Where nothing is known of the time, nothing is known of the place, at rest too.
+        # If nothing is known of the time, nothing is known of the place, even at rest.
         of_time = np.multiply(rate, time_error, out=np.full_like(rate, np.inf), where=time_error < np.inf)
         bound: Array = of_time + inversion_error + rounding
         return bound
@@ -330,14 +336,14 @@ class Positions(ABC):
         return locate(self._trajectory(float(np.abs(t).max()) if t.size else 0.0), t, t_low)
 
     def _places(self, points: PhasePoints) -> Array:
-        """The curve parameter within the lap; at launch it is exactly the launch place."""
+        """Return the curve parameter within the lap; at launch it is exactly the launch place."""
         return points.places(self.problem.lam0)
 
     def _velocities(self, points: PhasePoints) -> Array:
         return points.velocities(self.direction * self.problem.launch.v0.value)
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
-        """Times at which the body passes a place, the first time on each segment."""
+        """Return the times at which the body passes a place, the first time on each segment."""
         trajectory = self._listed_trajectory
         return passages(trajectory.segments, trajectory, lam, low)
 

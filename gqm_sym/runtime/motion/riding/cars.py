@@ -1,4 +1,4 @@
-"""The cars of a train: where they are, what the track does to each, and what each coupling carries."""
+"""The cars of a train: their places, the contact force on each, and the force in each coupling."""
 
 from typing import Any, NamedTuple
 
@@ -47,12 +47,12 @@ class Cars(NamedTuple):
 
 
 class CarsOfRiders(NamedTuple):
-    """The cars of a train on a banked track at given times: what `Cars` has, and what riders feel in each.
+    """The cars of a train on a banked track at given times: the fields of `Cars`, and the loads on riders in each car.
 
     Attributes
     ----------
     t, lam, x, y, z, normal_force, normal_x, normal_y, normal_z, coupling_force
-        As of `Cars`.
+        As in `Cars`.
     n_vertical, n_lateral, n_longitudinal : array
         Loads on riders at the middle of each car upwards, to the left and ahead, in units of 9.80665 m/s**2.
     """
@@ -73,7 +73,7 @@ class CarsOfRiders(NamedTuple):
 
 
 def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
-    """Return the cars of a train at times, on a banked track with what riders feel in each.
+    """Return the cars of a train at times, on a banked track with the loads on riders in each car.
 
     Raises
     ------
@@ -97,16 +97,16 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
         y, along_x, along_y, along_z = 0.0 * at, -force * np.sin(angle), 0.0 * at, force * np.cos(angle)
     else:
         y, along_x, along_y, along_z = path_in_space(formulas, f.p, at, speeds, np.ones(at.size))
-    # Ends and couplings are the even places, middles of cars the odd ones.
+    # Ends and couplings are at the even places, middles of cars at the odd ones.
     found = [row.reshape(places.shape)[1::2] for row in (at, x, y, z)]
     found += [row.reshape(places.shape)[1::2] / count for row in (force, along_x, along_y, along_z)]
     heights = z.reshape(places.shape)[::2]
-    # Gravity on the cars behind a coupling, less what is left for them of the acceleration of all.
+    # The force of a coupling is gravity on the cars behind it, less their mass times the acceleration of the train.
     share = shares[2:-2:2].reshape(-1, *np.ones(middle.ndim, dtype=int)) + 0.5
     behind = (heights[1:-1] - heights[0]) - share * (heights[-1] - heights[0])
     coupling = mass * gravity / length * behind
     if friction:
-        # Likewise for what rubs on the cars behind, which a train at rest does not tell.
+        # The same holds for the friction on the cars behind, which is unknown for a train at rest.
         rubbing = np.cumsum(friction * np.sign(np.atleast_1d(state.v)) * np.abs(found[4]), axis=0)
         coupling += rubbing[:-1] - share * rubbing[-1]
     rows: list[Array] = [*found, coupling]
@@ -117,12 +117,12 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
 
 
 def _loads(problem: Problem, state: Any, places: Array, gravity: float) -> tuple[Array, Array, Array]:
-    """What riders feel upwards, to the left and ahead at places of a train."""
+    """Return the loads on riders upwards, to the left and ahead at places of a train."""
     lam, v, ahead = (np.atleast_1d(row) for row in (state.lam, state.v, state.n_longitudinal))
     speeds, direction = (np.broadcast_to(row, places.shape).ravel() for row in (v * v, np.sign(v)))
     formulas, p, at = problem.formulas, problem.functions.p, places.ravel()
     upwards, sideways = rider_loads(formulas, p, at, speeds, direction, np.zeros(at.size))[:2]
-    # The acceleration is that of the train; gravity acts along the track where the car is.
+    # The acceleration is that of the train; the component of gravity along the track is that at the car.
     chart = formulas.charted(problem.p)
     slopes, slope = chart.points(at)[2].reshape(places.shape), chart.points(lam.ravel())[2].reshape(lam.shape)
     felt = ahead + (slopes - slope) * gravity / STANDARD_GRAVITY

@@ -1,8 +1,8 @@
 """The times for which a load on the rider is beyond a level: between the places where it equals that level.
 
 Along each stretch of a motion the load is a smooth function of the phase angle. It is written as Chebyshev polynomials
-on parts that are halved until they resolve it; all roots of these are known, and one step on the load itself makes each
-of them exact to rounding.
+on parts that are halved until they resolve it; all roots of these are found, and a few secant steps on the load itself
+make each of them exact to rounding.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,14 +20,16 @@ from gqm_sym.runtime.motion.extremes import Quantity, phases, time_of, whole_tra
 from gqm_sym.runtime.motion.riding.loads import load_of
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
-# Nodes of each polynomial, the share of its last coefficients below which it resolves the load well enough to tell its
-# roots apart, and how often a part is halved at most.
+# The number of nodes of each polynomial, the share of its last coefficients below which it resolves the load well
+# enough to separate its roots, and the largest number of times that a part is halved.
 NODES, MAX_TAIL, MAX_HALVINGS = 16, 1e-9, 10
 
-# Steps that make a root exact, and how far outside of its part a root of the polynomial may lie for rounding.
+# The number of steps that make a root exact, and the distance by which rounding may put a root of the polynomial
+# outside of its part.
 STEPS, OUTSIDE = 3, 1e-9
 
-# Spans of time with less than this share of the time between them are one: stretches follow each other to rounding.
+# Spans of time that are separated by less than this share of the time are joined, because stretches of a motion follow
+# each other to rounding.
 SAME_TIME = 1e-13
 
 Span: TypeAlias = tuple[float, float]
@@ -43,8 +45,8 @@ class Exceedance(NamedTuple):
     total : float or array
         The times in s for which the load is beyond them, over one period or over the whole motion.
     longest : float or array
-        The longest of these times without interruption, in s. It is infinite where a motion that repeats is always
-        beyond the level.
+        The longest of these times without interruption, in s. It is infinite if a motion that repeats is always beyond
+        the level.
     allowed : float or array or None
         The longest time in s that the limits allow at each level: infinite below all of them, 0 above. None if no
         limits were given.
@@ -70,7 +72,7 @@ class Exceedance(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A polynomial in place of the load between two phase angles."""
+    """A polynomial that represents the load between two phase angles."""
 
     low: float
     high: float
@@ -105,7 +107,7 @@ def _numbers(given: Any, what: str) -> Array:
 
 
 def _limits(given: Any, sign: int) -> Array:
-    """Durations and levels in the order of durations, checked."""
+    """Check durations and levels, and return them in the order of durations."""
     pairs = _numbers(given, "limits")
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not len(pairs):
         raise InputError(f"exceedance: limits: must be pairs of a duration in s and a level, got {short(given)}")
@@ -119,9 +121,10 @@ def _limits(given: Any, sign: int) -> Array:
 
 
 def _allowed(levels: Array, limits: Array, sign: int) -> Array:
-    """The longest time that limits allow at levels."""
+    """Return the longest time that limits allow at levels."""
     durations, bounds = limits[:, 0], sign * limits[:, 1]
-    # At a level the longest duration at which it is not beyond the limit, which falls as durations grow.
+    # For each level this is the longest duration at which the level is not beyond the limit, which decreases as
+    # durations grow.
     found = np.interp(sign * levels, bounds[::-1], durations[::-1])
     found[sign * levels <= bounds[-1]] = inf
     found[sign * levels > bounds[0]] = 0.0
@@ -129,7 +132,7 @@ def _allowed(levels: Array, limits: Array, sign: int) -> Array:
 
 
 def _times_beyond(spans: Sequence[Span], period: float | None) -> tuple[float, float]:
-    """The sum and the longest of spans of time, which repeat after a period if there is one."""
+    """Return the sum and the longest of spans of time, which repeat after a period if there is one."""
     lengths = [stop - start for start, stop in spans]
     total, longest = sum(lengths), max(lengths, default=0.0)
     if period is not None and spans and spans[0][0] == 0.0 and spans[-1][1] >= period:
@@ -138,7 +141,7 @@ def _times_beyond(spans: Sequence[Span], period: float | None) -> tuple[float, f
 
 
 def _spans(motion: Any, quantity: Quantity, levels: Array, sign: int) -> list[tuple[list[Span], float | None]]:
-    """For each level, the times between which the load is beyond it, and the period if they repeat."""
+    """Return, for each level, the spans of time in which the load is beyond it, and the period if they repeat."""
     if motion.kind == "rest" or motion.t_end == 0.0:
         here = quantity.of_state(motion.state(0.0))
         return [([(0.0, motion.t_end)] if sign * (here - level) > 0.0 else [], None) for level in levels.tolist()]
@@ -167,7 +170,7 @@ def _time(timed: TimedSegment, trajectory: Trajectory, phi: float, end: float) -
 
 
 def _parts(load: Callable[[Array], Array], edges: Array, low: float, high: float) -> Iterator[_Part]:
-    """Polynomials that resolve a load between two phase angles."""
+    """Return polynomials that resolve a load between two phase angles."""
     inside = edges[(edges > low) & (edges < high)]
     ends = [low, *inside.tolist(), high]
     waiting = [(a, b, 0) for a, b in pairwise(ends)]
@@ -187,7 +190,7 @@ def _parts(load: Callable[[Array], Array], edges: Array, low: float, high: float
 def _beyond(
     parts: Sequence[_Part], load: Callable[[Array], Array], level: float, sign: int, ends: tuple[float, float]
 ) -> list[Span]:
-    """The phase angles between which a load is beyond a level."""
+    """Return the phase angles between which a load is beyond a level."""
     low, high = ends
     roots = np.array([root for part in parts for root in _roots(part, load, level)])
     marks = np.unique(np.concatenate([[low], roots[(roots > low) & (roots < high)], [high]]))
@@ -197,7 +200,7 @@ def _beyond(
 
 
 def _roots(part: _Part, load: Callable[[Array], Array], level: float) -> list[float]:
-    """Where a load equals a level in one part."""
+    """Return the phase angles of one part at which a load equals a level."""
     low, high, terms = part
     terms = terms.copy()
     terms[0] -= level
@@ -219,7 +222,7 @@ def _roots(part: _Part, load: Callable[[Array], Array], level: float) -> list[fl
 
 
 def _joined(spans: Sequence[Span]) -> list[Span]:
-    """Spans of time of which each begins after the one before has ended."""
+    """Join spans of time, so that each of them begins after the one before has ended."""
     joined: list[Span] = []
     for start, stop in spans:
         if joined and start <= joined[-1][1] + SAME_TIME * stop:

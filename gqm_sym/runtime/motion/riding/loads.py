@@ -19,7 +19,7 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
 def load_of(name: str, problem: Problem) -> Quantity:
-    """A load by its name, "vertical", "lateral" or "longitudinal", as a quantity along motions."""
+    """Return a load, given by its name "vertical", "lateral" or "longitudinal", as a quantity along motions."""
     one_of(name, LOADS, where="load")
     check_banked(problem.formulas, f"n_{name}")
     return Quantity(partial(_at, LOADS.index(name), problem), lambda state: float(getattr(state, f"n_{name}")))
@@ -35,7 +35,7 @@ def _at(row: int, problem: Problem, timed: TimedSegment, phi: Array) -> Array:
 
 
 def load_extreme(name: str, sign: int) -> Any:
-    """A property of motions: the largest (sign 1) or least (-1) of a load."""
+    """Return a property of motions: the largest (sign 1) or least (-1) value of a load."""
 
     def found(motion: Any) -> Extreme:
         with motion._lock:
@@ -47,10 +47,10 @@ def load_extreme(name: str, sign: int) -> Any:
 def loads_on_rider(
     problem: Problem, lam: Array, v: Array, v2: Array, force: Array, resting: NDArray[np.bool_]
 ) -> Array:
-    """Rows of `FIELDS` at places and velocities.
+    """Return the rows of `FIELDS` at places and velocities.
 
-    Where the body is ``resting`` for good, its track carries all of its weight: nothing changes, and what holds it is
-    felt along the track.
+    Where the body is ``resting`` for good, its track carries all of its weight: the loads do not change, and the force
+    that holds the body is a load along the track.
     """
     formulas, p = problem.formulas, problem.functions.p
     rows = rider_loads(formulas, p, lam, v2, np.sign(v), force)

@@ -1,4 +1,6 @@
-"""Errors of a segment: of its times, and of its places by the table and by the rounding of its turning points."""
+"""Errors of a segment: those of its times, and those of its places due to the table and to the rounding of its turning
+points.
+"""
 
 from math import inf
 
@@ -11,16 +13,16 @@ from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to that there
-# (`_end_errors`); 0.6 was the most that was measured.
+# The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to Q there
+# (`_end_errors`); the largest measured error was 0.6.
 MAX_END_ROUNDINGS = 2.0
 
-# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope, and
-# in those times ds, which is small along the path of a centre (2.5 was measured); and the number of places of a closed
-# one at which that is looked for.
+# The error of the potential's slope along a chart that has no formulas, in roundings of the largest slope; the same in
+# roundings of the largest slope times ds, which is small along the path of a centre (2.5 was measured); and the number
+# of places of a closed chart at which the largest slope is searched for.
 CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 4.0, 16
 
-# The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
+# The error of a place due to the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
 
 # The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
@@ -28,13 +30,13 @@ MAX_SLOPES = (0.5, 2.0, 1.0)
 
 
 def time_error(segment: Segment, phi: Array) -> Array:
-    """Estimated error in s of a segment's times at phase angles.
+    """Return the estimated error in s of a segment's times at phase angles.
 
-    It is a share of the whole duration, or of the panel's where the times of its edges are exact.
+    It is a share of the whole duration, or of the panel's duration if the times at its edges are exact.
     """
     error = segment.relative_error + ULP + MAX_TIME_ERROR
     if segment.kind == TURN_TURN and segment.balance > 0.0 and not segment.from_multiprecision:
-        # Rounded ends change V**2 by more where cancellation leaves little of it.
+        # The rounding of the ends changes V**2 by a larger share if little of it is left after cancellation.
         error += 0.5 * ULP * max(abs(segment.a), abs(segment.b)) / (abs(segment.width) * segment.balance)
     which, times = np.searchsorted(segment.edges[1:-1], phi, side="right"), segment.edge_times[0]
     if segment.has_given_times:
@@ -47,7 +49,9 @@ def time_error(segment: Segment, phi: Array) -> Array:
 
 
 def inversion_error(segment: Segment, phi: Array) -> Array:
-    """Estimated error of places by the table of a segment, at phase angles and in units of the curve parameter."""
+    """Return the estimated error of places due to the table of a segment, at phase angles and in units of the curve
+    parameter.
+    """
     powers, of_intervals = segment.table[3], segment.table[6]
     errors = of_intervals[np.searchsorted(powers[:-1].sum(axis=1), phi)]
     width = abs(segment.width)
@@ -80,8 +84,8 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
     least, steepness = float(steepness.min()), steepness.tolist()
     errors = [error * (least / steep if steep > 0.0 else 1.0) for steep in steepness]
     if f.exact is None:
-        # Slopes of a chart that no formulas improve are known to a rounding of the largest. The path of a centre
-        # has roundings of the curve, which are larger by 1/ds.
+        # Slopes of a chart without formulas are known to a rounding of the largest. The path of a centre has the
+        # rounding errors of the curve, which are larger by the factor 1/ds.
         around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
         largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
         shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
@@ -91,7 +95,8 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
             own + (rounding / steep if steep > 0.0 else 0.0) for own, steep in zip(errors, steepness, strict=True)
         ]
     elif f.exact.edges.size:
-        # A body's path beside the curve has the roundings of the curve, which are larger by 1/ds there.
+        # A body's path beside the curve has the rounding errors of the curve, which are larger there by the factor
+        # 1/ds.
         x, z, ds = path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:3]
         size, shortest = float(np.hypot(x, z).max()), min(1.0, float(np.abs(ds).min()))
         of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size) / shortest

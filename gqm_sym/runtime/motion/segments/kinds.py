@@ -1,4 +1,4 @@
-"""Segments by what lies at their ends: turning points, an equilibrium, or places where the body moves."""
+"""Segments for each combination of ends: turning points, an equilibrium, or places where the body moves."""
 
 from math import exp, log, pi
 from typing import Any
@@ -7,16 +7,16 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# The distance from an equilibrium up to which an approach to it is computed, near the least distance that doubles
-# resolve.
+# The distance from an equilibrium up to which an approach to it is computed. It is near the smallest distance that
+# doubles resolve.
 NEAREST = 1e-300
 
-# Phase angles of such an approach at which panels begin: near its start, panels must be short.
+# Phase angles of such an approach at which panels begin, because panels must be short near its start.
 APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
 
 def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
-    """A segment from ``start`` towards an equilibrium, up to the resolution of doubles."""
+    """Return a segment from ``start`` towards an equilibrium, up to the resolution of doubles."""
     stop = log(abs(start - equilibrium) / NEAREST)
     marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
     return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)
@@ -31,7 +31,7 @@ def between_turns(
     *,
     is_lazy: bool = False,
 ) -> Segment:
-    """A segment between two turning points."""
+    """Return a segment between two turning points."""
     return Segment(
         functions=functions,
         kind=TURN_TURN,
@@ -45,7 +45,7 @@ def between_turns(
 
 
 def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:
-    """A segment from a turning point to a place where the speed is not zero."""
+    """Return a segment from a turning point to a place where the speed is not zero."""
     return Segment(functions=functions, kind=FROM_TURN, a=turn, b=end)
 
 
@@ -59,7 +59,7 @@ def through(
     known_duration: float | None = None,
     panel_breaks: tuple[float, ...] = (),
 ) -> Segment:
-    """A segment at both ends of which the speed is not zero; ``ref_v2`` is V**2 at ``ref``."""
+    """Return a segment whose speed is not zero at either end; ``ref_v2`` is V**2 at ``ref``."""
     return Segment(
         functions=functions,
         kind=REGULAR,
@@ -73,8 +73,10 @@ def through(
 
 
 def with_turning_points(segment: Segment, a: float, b: float, duration: float | None) -> Segment:
-    """The same segment from one turning point to the other with other doubles for them, and its duration if known.
+    """Return the same segment between two turning points that are given by other doubles, with its duration if that is
+    known.
 
-    It is not that of the old doubles: near a separatrix a rounding of the ends is many of the duration.
+    The duration for the old doubles is not kept, because near a separatrix a rounding of the ends causes many roundings
+    of the duration.
     """
     return between_turns(segment.functions, a, b, duration, is_lazy=segment.stored_panels is None)

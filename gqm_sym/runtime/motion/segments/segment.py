@@ -32,27 +32,30 @@ from gqm_sym.runtime.quadrature.time_panels import (
     slopes,
 )
 
-# Widths of a segment, as shares of its ends, below which the rounding of the ends spoils its speeds, and its times from
-# one turning point.
+# Widths of a segment, as shares of its ends, below which the rounding of the ends spoils its speeds, and below which it
+# spoils the times from a single turning point.
 MIN_WIDTH_SHARE = 1.0 / 32.0
 MIN_TIMED_WIDTH_SHARE = 2.0**-10
 
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
 
-# How much V**2 at the double next to a launch place may differ from that at the launch place, as a share of the latter.
+# The largest difference between V**2 at the double next to a launch place and V**2 at the launch place, as a share of
+# the latter.
 MAX_CORRECTION_SHARE = 2.0**-10
 
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
 
-# The slope of the time by the phase angle, as a share of its largest, from which on it has enough digits for a speed.
+# The slope of the time by the phase angle above which it has enough digits for a speed, as a share of its largest
+# value.
 MIN_TIME_SLOPE = 1e-6
 
 
 @dataclass(slots=True, kw_only=True)
 class Segment:
-    """One segment: time and arc length grow from its end ``a`` with the phase angle of the substitution lam(phi).
+    """One segment, along which time and arc length grow from its end ``a`` with the phase angle of the substitution
+    lam(phi).
 
     Its panels hold time and arc length as polynomials of the phase angle (MATHS, section 4).
 
@@ -61,7 +64,7 @@ class Segment:
     functions : BoundFunctions
         The model's functions.
     kind : int
-        TURN_TURN, FROM_TURN, TO_EQUILIBRIUM or REGULAR (`quadrature.integrands`): at which of its ends V**2 vanishes.
+        TURN_TURN, FROM_TURN, TO_EQUILIBRIUM or REGULAR (`quadrature.integrands`), by the ends at which V**2 vanishes.
     a, b : float
         Its ends. A single turning point is ``a``, and an equilibrium is ``b``.
     low_parts : (float, float)
@@ -76,17 +79,17 @@ class Segment:
     v2 : array or None
         V**2 on the approach to an equilibrium with dissipative forces (`quadrature.equilibrium`).
     turn_offset : float
-        If ``a`` is no turning point but the body is slow there, the phase angle from ``a`` back to where the turning
-        point would be, as a share of the last phase angle.
+        If ``a`` is no turning point but the body is slow there, the phase angle from the place behind ``a`` at which
+        the turning point would be to ``a``, as a share of the last phase angle.
     stored_panels : tuple, optional
-        Its panels, if they were computed in extended precision or with a leg.
+        Its panels, if they were computed in extended precision or together with a leg.
     speed_series : (float, array), optional
-        For panels computed with a leg, the last value of the time-like variable and the Legendre coefficients of Y
+        For panels computed together with a leg, the last value of the march variable and the Legendre coefficients of Y
         (`legs.panels.equation`).
     known_duration : float, optional
-        Its duration in s, if doubles have given that accurately; panels are then computed when they are first needed.
+        Its duration in s, if it was found accurately in doubles; panels are then computed when they are first needed.
     is_lazy : bool
-        Whether panels are computed when they are first needed though the duration is not known.
+        Whether panels are computed when they are first needed although the duration is not known.
     ends : pair
         Its ends in extended precision, where they are known.
     """
@@ -156,7 +159,7 @@ class Segment:
             )
 
     def _with_panels(self) -> "Segment":
-        """The segment itself, with its panels computed."""
+        """Return the segment itself, with its panels computed."""
         if self.stored_panels is None:
             self._lay_panels()
         return self
@@ -179,7 +182,7 @@ class Segment:
         return self._with_panels()._condition_number
 
     def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
-        """The same segment with more accurate times at the edges of its panels."""
+        """Return the same segment with more accurate times at the edges of its panels."""
         other = copy(self._with_panels())
         other._edge_times, other._table, other.has_given_times, other.known_duration = edge_times, None, True, None
         return other
@@ -193,7 +196,9 @@ class Segment:
         return times, low
 
     def _initial_edges(self) -> Array:
-        """The first and the last phase angle, and those at which panels must begin, to the rounding of their places."""
+        """Return the first and the last phase angle, and those at which panels must begin, to the rounding of their
+        places.
+        """
         places = [*self.functions.between(self.functions.breaks, self.a, self.b).tolist(), *self.panel_breaks]
         if not places:
             return np.array([0.0, self.stop])
@@ -213,7 +218,7 @@ class Segment:
 
     @property
     def total_time(self) -> tuple[float, float]:
-        """The time in s from one end to the other as two doubles, as its panels have it."""
+        """The time in s from one end to the other as two doubles, according to its panels."""
         if self._edge_times is None:
             return float(self.panels[1][-1]), 0.0
         return float(self._edge_times[0][-1]), float(self._edge_times[1][-1])
@@ -230,11 +235,15 @@ class Segment:
 
     @property
     def balance(self) -> float:
-        """The least value of the regular factor of V**2 as a share of its terms: how much cancellation leaves of it."""
+        """The smallest value of the regular factor of V**2 as a share of its terms, which is the part that cancellation
+        leaves.
+        """
         return float(self.panels[6])
 
     def _v2_correction(self) -> float:
-        """How much larger V**2 is at the double nearest to the launch place than at the launch place itself."""
+        """Return the difference between V**2 at the double nearest to the launch place and V**2 at the launch place
+        itself.
+        """
         f = self.functions
         if f.exact is None or self.kind != REGULAR or self.ref != f.exact.lam0.value:
             return 0.0
@@ -254,14 +263,14 @@ class Segment:
     def width(self) -> float:
         """The change of the curve parameter from ``a`` to ``b``.
 
-        It is that of the ends in extended precision if both are the same double.
+        If both ends are the same double, it is computed from the ends in extended precision.
         """
         if self.a == self.b and self.ends[0] is not None:
             return float(self.ends[1] - self.ends[0])
         return (self.b - self.a) + (self.low_parts[1] - self.low_parts[0])
 
     def offsets(self, place: float, low: float = 0.0) -> tuple[float, float]:
-        """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
+        """Return the signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
         ahead, behind = self._offsets_in_doubles(place, low)
@@ -271,7 +280,7 @@ class Segment:
         return self._exact_offsets(place, low)
 
     def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
-        """`offsets` from the ends in doubles."""
+        """Return `offsets` from the ends in doubles."""
         return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     @property
@@ -279,7 +288,9 @@ class Segment:
         return self.functions.exact is not None and self.v2 is None and self.speed_series is None
 
     def _exact_offsets(self, place: float, low: float) -> tuple[float, float]:
-        """`offsets` from the exact ends, next to which the rounding of an end is much of the time to it."""
+        """Return `offsets` from the exact ends; close to an end its rounding would be a large share of the time to
+        it.
+        """
         exact = self.functions.exact
         assert exact is not None
         start, stop = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
@@ -299,7 +310,7 @@ class Segment:
         return self._table
 
     def phase_angle(self, t: Array, t_low: Array) -> Array:
-        """The phase angle at times t + t_low in s from the end ``a``; at both ends it is exact."""
+        """Return the phase angle at times t + t_low in s from the end ``a``; at both ends it is exact."""
         phi: Array = phase_angles(*self.table[:6], t, t_low)
         total_time = self.total_time
         phi[t + t_low <= 0.0] = 0.0
@@ -307,7 +318,7 @@ class Segment:
         return phi
 
     def phase_angle_of(self, offset_a: float, offset_b: float) -> float:
-        """The phase angle of a place, which is given by its signed distances ``lam - a`` and ``b - lam``."""
+        """Return the phase angle of a place, which is given by its signed distances ``lam - a`` and ``b - lam``."""
         return self._phase_angles([(offset_a, offset_b)])[0]
 
     def _phase_angles(self, offsets: list[tuple[float, float]]) -> list[float]:
@@ -318,13 +329,13 @@ class Segment:
         ]
 
     def places(self, phi: Array) -> Array:
-        """The curve parameter at phase angles, computed from the nearer end."""
+        """Return the curve parameter at phase angles, computed from the nearer end."""
         return places_at(
             self.kind, self.turn_offset, (self.a, self.low_parts[0]), (self.b, self.low_parts[1]), self.width, phi
         )
 
     def speeds(self, phi: Array) -> Array:
-        """|ds/dt| in m/s at phase angles."""
+        """Return |ds/dt| in m/s at phase angles."""
         f, exact = self.functions, self.from_multiprecision
         if self.v2 is not None and not exact:
             along: Array = speeds_along(self.a, self.b, self.v2, phi)
@@ -337,10 +348,11 @@ class Segment:
         return self._improved_by_panels(phi, speeds) if exact else speeds * self.width_ratio
 
     def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
-        """|ds/dt| from the slopes of arc length and time, which has digits where V**2 in doubles is rounding only.
+        """Return |ds/dt| from the slopes of arc length and time, which has digits even where V**2 in doubles is
+        rounding only.
 
-        Where the body is so fast that the time hardly grows, its slope has fewer digits than V**2. At a turn rounding
-        leaves of the slope of arc length a little that may be negative, as no speed is.
+        Where the body is so fast that the time hardly grows, the slope of the time has fewer digits than V**2. At a
+        turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
         """
         lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
         limit = MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
@@ -348,12 +360,12 @@ class Segment:
         return np.maximum(speeds, 0.0)
 
     def times(self, phi: Array) -> Array:
-        """Time in s from the end ``a`` to phase angles."""
+        """Return the time in s from the end ``a`` to phase angles."""
         times: Array = read_off_many(self.panels[0], self.edge_times[0], self.panels[3], phi)
         return times
 
     def lengths(self, phi: Array) -> Array:
-        """Arc length in m from the end ``a`` to phase angles."""
+        """Return the arc length in m from the end ``a`` to phase angles."""
         lengths: Array = read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
         return lengths * self.width_ratio
 

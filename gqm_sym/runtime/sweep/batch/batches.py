@@ -52,7 +52,7 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
 )
 from gqm_sym.runtime.sweep.quantities import ANSWERED, ANSWERS, NOT_PERIODIC, PERIOD, SPAN_KNOWN, SPANS, TURNING_POINTS
 
-# Into how many pieces an orbit, or half of an even one, is cut for its proof: first into few, then into more.
+# The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many.
 FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 3, 2, 12
 
 
@@ -64,9 +64,9 @@ class OrbitKind(NamedTuple):
     kind : int
         LIBRATION, CIRCULATION, AXIS_LIBRATION or AGM_LIBRATION.
     mirrored : bool
-        Whether each is even about an axis of symmetry.
+        Whether each orbit is even about an axis of symmetry.
     proved : bool
-        Whether their turning points need no further proof.
+        Whether the turning points need no further proof.
     """
 
     kind: int
@@ -76,7 +76,7 @@ class OrbitKind(NamedTuple):
 
 @Inner
 def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-def]
-    """Answer SPANS, TURNING_POINTS, or that circulations have no half period."""
+    """Fill the answers to SPANS and TURNING_POINTS, or the status that circulations have no half period."""
     rows, out, status = orbits.rows, answers.values, answers.status
     circulates = kind == CIRCULATION
     if quantity == SPANS:
@@ -95,7 +95,9 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
 
 @Inner
 def answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Prove orbits of one kind, and answer for those that are proved; ``spare`` takes the others meanwhile."""
+    """Prove orbits of one kind, and fill the answers for those that are proved; ``spare`` stores the others
+    meanwhile.
+    """
     count = scratch.param_count
     for pieces in (FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         n, rows = orbits.size, orbits.rows
@@ -144,9 +146,9 @@ def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ign
 
 @Inner
 def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[no-untyped-def]
-    """Search both turning points of each launch; returns the librations, and how many launches circulate.
+    """Search both turning points of each launch; return the librations and the number of circulations.
 
-    Circulations are copied to ``laps``. Launches with neither drop out.
+    Circulations are copied to ``laps``. All other launches are dropped.
     """
     count, lap_count = scratch.param_count, 0
     for ahead in (True, False):
@@ -180,7 +182,7 @@ def kind_of_librations(fns, orbits, monotone):  # type: ignore[no-untyped-def]
     kind = LIBRATION
     if mirrored and one_axis and (fns.time_integrand or fns.agm_arguments):
         kind = AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION
-    # Where closed forms gave turning points, V**2 is monotone on either side of the axis.
+    # If closed forms gave the turning points, V**2 is monotone on either side of the axis.
     known = True
     for j in range(n):
         known &= rows[ZERO_BEHIND, j] == rows[ZERO_BEHIND, j]
@@ -201,7 +203,7 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
     fns : BatchAddresses
         The module's compiled functions for batches.
     invariant_counts : (int, int)
-        The number of numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
+        The number of values that `orbit_invariants` and `integrand_invariants` fill for an orbit.
     columns : array
         The launches, as `strided.pointers` gives them.
     monotone : bool

@@ -1,7 +1,7 @@
 """A batch of orbits: an array with a row for each quantity and a column for each orbit.
 
-The run-time parameters lie beside it, a row each. Every step over a batch is a loop over the columns without branches,
-which vectorises. Columns come in whole registers; the last orbit is repeated to fill one.
+The run-time parameters are stored with it, a row each. Every step over a batch is a loop over the columns without
+branches, which vectorises. Columns fill whole registers; the last orbit is repeated to fill the last one.
 
 ==================== ==================================================================== ======================
 row                  meaning                                                              used by
@@ -43,7 +43,8 @@ from numpy.typing import NDArray
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.types import Array
 
-# Orbits of a batch: its arrays stay in the first-level cache. The largest number of orbits in a register.
+# The number of orbits in a batch, so that its arrays stay in the first-level cache; and the largest number of orbits in
+# a register.
 BATCH, LANES = 128, 8
 
 INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(9)
@@ -55,7 +56,7 @@ TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
 CLOSED = -1.0
 
-# What a search has come to.
+# The states of a search.
 SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
 
 
@@ -85,11 +86,11 @@ class Scratch(NamedTuple):
     param_count : int
         The number of run-time parameters.
     invariant_counts : (int, int)
-        The number of numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
+        The number of values that `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
     chosen, others : int arrays
         Lists of columns.
     work : (13, BATCH) array
-        Rows for numbers that are used at once.
+        Rows for intermediate results.
     """
 
     param_count: int
@@ -101,7 +102,9 @@ class Scratch(NamedTuple):
 
 @Inner
 def contains(row, value):  # type: ignore[no-untyped-def]
-    """Whether a value is in a row. It is a loop of its own, because one that also counts stays scalar."""
+    """Return whether a value is in a row. This is a loop of its own, because a loop that also counts is not
+    vectorised.
+    """
     found = False
     for v in row:
         found |= v == value
@@ -110,7 +113,7 @@ def contains(row, value):  # type: ignore[no-untyped-def]
 
 @Inner
 def gather(orbits, param_count, columns, number, target, row_count):  # type: ignore[no-untyped-def]
-    """Copy ``number`` columns and their parameters to ``target``; returns how many columns that fills."""
+    """Copy ``number`` columns and their parameters to ``target``; return the number of columns that this fills."""
     rows, params, n = orbits.rows, orbits.params, orbits.size
     to_rows, to_params, full = target.rows, target.params, -(-number // LANES) * LANES
     for row in range(row_count):
@@ -128,7 +131,7 @@ def gather(orbits, param_count, columns, number, target, row_count):  # type: ig
 
 @Inner
 def shrink(orbits, param_count, columns, number, row_count):  # type: ignore[no-untyped-def]
-    """Keep only ``number`` columns, listed in ascending order; returns the orbits that are left."""
+    """Keep only ``number`` columns, listed in ascending order; return the remaining orbits."""
     n = orbits.size
     if number != n:
         n = gather(orbits, param_count, columns, number, orbits, row_count)
@@ -137,7 +140,7 @@ def shrink(orbits, param_count, columns, number, row_count):  # type: ignore[no-
 
 @Inner
 def partition(state, found, others):  # type: ignore[no-untyped-def]
-    """List the columns whose state is FOUND, and the others; returns how many there are of each."""
+    """List the columns whose state is FOUND, and the others; return the numbers of both."""
     if not contains(state, NOWHERE):
         for j in range(state.size):
             found[j] = j

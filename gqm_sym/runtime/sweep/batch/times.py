@@ -1,6 +1,6 @@
 """Half periods, periods and loop times of many orbits at once.
 
-They are computed by the trapezoidal rule, or by the arithmetic-geometric mean where the model gives its two numbers.
+They are computed by the trapezoidal rule, or by the arithmetic-geometric mean if the model gives its two arguments.
 """
 
 from math import fabs, inf, nan, pi, sqrt
@@ -49,34 +49,34 @@ from gqm_sym.runtime.sweep.batch.rows import (
 )
 from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
 
-# Kinds of orbits beside those of `trapezoid`. Both are librations about an axis of symmetry: one with a time
+# Kinds of orbits in addition to those of `trapezoid`. Both are librations about an axis of symmetry: one with a time
 # integrand that needs no sines, the other with a half period of pi over an arithmetic-geometric mean.
 AXIS_LIBRATION, AGM_LIBRATION = 2, 3
 
-# For each kind but the last, how many rows of a batch the trapezoidal rule needs.
+# For each kind except the last, the number of rows of a batch that the trapezoidal rule needs.
 NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
 
 # The squares of cosine and sine at the nodes. Share 0 is one end of the orbit, share 1/2 its axis of symmetry.
 COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 
-# What becomes of an orbit after a level of the rule.
+# The verdict on an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 
-# The ratio of the smallest to the largest regular factor of V**2 from which on roundings of the turning points, or of
-# the energy of a lap, do not matter: of launches from rest, one turning point of which is exact, of other librations,
-# and of laps. In even wells, both of whose turning points come near a hilltop, the factor counts at these, unless they
-# are exact, as those of a launch from rest are.
+# The ratio of the smallest to the largest regular factor of V**2 above which roundings of the turning points, or of the
+# energy of a lap, do not matter: for librations from rest, one turning point of which is exact, for other librations,
+# and for laps. In even wells both turning points may be near a hilltop, so the factor at these is used, unless they are
+# exact, as those of a launch from rest are.
 MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.15, 0.25, 0.1, 0.5
 
-# Steps of the arithmetic-geometric mean. Of two numbers in a ratio of 1 : 10, the root of MIN_CANCELLATION_RATIO, the
-# relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then exact to half an ulp,
-# because its error is the square of that.
+# The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
+# MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
+# exact to half an ulp, because its error is the square of that.
 AGM_STEPS = 4
 
 
 @Inner
 def contains_nan(row):  # type: ignore[no-untyped-def]
-    """Whether a number in a row is NaN."""
+    """Return whether a number in a row is NaN."""
     found = False
     for v in row:
         found |= v != v
@@ -85,9 +85,9 @@ def contains_nan(row):  # type: ignore[no-untyped-def]
 
 @Inner
 def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no-untyped-def]
-    """Replace NaN in what `potential_divdiff2` gives of orbits that are too wide for its closed forms.
+    """Replace NaN in the results of `potential_divdiff2` for orbits that are too wide for its closed forms.
 
-    From the nearer turning point V**2 falls as U[a, x] or U[b, x] says, which on a wide orbit keeps all its digits.
+    V**2 is computed from U[a, x] or U[b, x] with the nearer turning point, which loses no digits on a wide orbit.
     """
     from_below = NODE_SHARES[node] <= 0.5
     ends = rows[END_LOW if from_below else END_HIGH, :n]
@@ -105,9 +105,9 @@ def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no
 
 @Inner
 def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-untyped-def]
-    """The time integrand of each orbit at one node of the rule.
+    """Fill the time integrand of each orbit at one node of the rule.
 
-    Updates the rows for the smallest and largest regular factor of V**2.
+    The rows for the smallest and the largest regular factor of V**2 are updated.
     """
     da, db, rates, out = work[0, :n], work[1, :n], work[2, :n], work[3:6].reshape(-1)
     start, w0, offset_low, offset_high = (
@@ -153,7 +153,7 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
 
 @Inner
 def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
-    """Append what is constant along an orbit to the rows of parameters; returns how many rows there are then."""
+    """Append the terms that are constant along an orbit to the rows of parameters; return the new number of rows."""
     count, n, rows, params = scratch.param_count, orbits.size, orbits.rows, orbits.params
     more = 0 if kind == CIRCULATION else scratch.invariant_counts[kind // AXIS_LIBRATION]
     if more:
@@ -178,7 +178,7 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
     """Set each orbit's time by a level of the rule, and the verdict on it.
 
-    ``ratios`` are those that doubles need of a launch from rest and of others.
+    ``ratios`` are the smallest ratios of factors that doubles permit, for a launch from rest and for another one.
     """
     from_rest, thrown = ratios
     for j in range(n):
@@ -193,9 +193,9 @@ def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def
 
 @Inner
 def answer_level(rows, n, factor, verdict, chosen, answers):  # type: ignore[no-untyped-def]
-    """Answer the orbits that have converged and list those that continue; returns how many these are."""
+    """Fill the answers of orbits that have converged and list those that continue; return the number of the latter."""
     out, status, number = answers.values, answers.status, 0
-    for j in range(n):  # without branches, which could not be predicted
+    for j in range(n):  # there are no branches, because they would be unpredictable
         k, done = int(rows[INDEX, j]), verdict[j] == CONVERGED
         out[k, 0] = choose(done, factor * rows[VALUE, j], nan)
         status[k] = ANSWERED if done else UNDECIDED
@@ -206,10 +206,10 @@ def answer_level(rows, n, factor, verdict, chosen, answers):  # type: ignore[no-
 
 @Inner
 def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Answer half periods, periods or loop times by the trapezoidal rule.
+    """Fill half periods, periods or loop times by the trapezoidal rule.
 
-    The number of nodes is doubled until the rule has converged. Orbits for which it has drop out, as do those whose
-    V**2 almost vanishes on the way. Of orbits that are ``mirrored`` only nodes up to the middle are evaluated.
+    The number of nodes is doubled until the rule has converged. Orbits for which it has are removed, as are those on
+    which V**2 almost vanishes. On orbits that are ``mirrored`` only nodes up to the middle are evaluated.
     """
     count = add_invariants(fns, kind, orbits, scratch)
     n, rows, work, chosen = orbits.size, orbits.rows, scratch.work, scratch.chosen
@@ -252,7 +252,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
 
 @Inner
 def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Answer half periods or periods by the arithmetic-geometric mean; orbits next to a separatrix stay undecided."""
+    """Fill half periods or periods by the arithmetic-geometric mean; orbits next to a separatrix stay undecided."""
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
     p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
     pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]

@@ -1,8 +1,7 @@
 """The turning points of many orbits at once.
 
-They are computed by a closed form where there is one (`derivation.wells.symmetric_orbits`), which is proved
-symbolically. Otherwise they
-are approximated by Newton's method and then proved by interval bounds.
+They are computed by a closed form if there is one (`derivation.wells.symmetric_orbits`), which is proved symbolically.
+Otherwise they are approximated by Newton's method and then proved by interval bounds.
 """
 
 from math import fabs, inf, nan
@@ -39,13 +38,13 @@ from gqm_sym.runtime.sweep.batch.rows import (
     contains,
 )
 
-# The most trials of a search, and the relative step after which the next one would be below rounding.
+# The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
 
-# By how much, relative to the places, the middle of an orbit may miss the axis about which it is even.
+# The largest distance of the middle of an orbit from the axis about which it is even, relative to the places.
 EVEN_TOLERANCE = 8.0 * 2.0**-52
 
-# The width of an orbit about one axis, in steps between axes, from which on it reaches the neighbouring axes.
+# The largest width of an orbit about one axis, in distances between axes; a wider one may reach the neighbouring axes.
 MAX_WIDTH = 1.999
 
 # The turning point is given by the square of a sine, which is 1 at a potential maximum. Within NEAR_MAXIMUM of 1 the
@@ -55,11 +54,11 @@ NEAR_MAXIMUM, INACCURATE = 1e-9, 0.5
 
 @Inner
 def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
-    """Set both zeros, and the direction of bodies at rest, by the closed form of the width of the orbit in its well.
+    """Set both zeros, and the direction of bodies at rest, from the closed form of the width of the orbit in its well.
 
-    Where that does not hold ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the well,
-    and SEEKING for all others. Where V**2 is ``monotone`` between axes for some parameters only, each root is improved,
-    for it may lose digits, and launches in other periods are left to the search.
+    If that form does not apply, ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the
+    well, and SEEKING for all others. Unless V**2 is ``monotone`` between axes for all parameters, each root is
+    improved, because it may lose digits, and launches in other periods are left to the search.
     """
     limit = INACCURATE if monotone else -1.0
     start, w0, direction, state = (
@@ -101,7 +100,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
         size, alone = fabs(offset), step == 0.0
         well = (out[1, j] > 0.0) & (alone | (size < step)) & (monotone | (offset == axis[j]))
         clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < MAX_AXIS_STEP_SHARE * step))
-        inside = choose(size > half, half, size)  # many periods away the offset is rounded more than the width
+        inside = choose(size > half, half, size)  # many periods away the offset has the larger rounding error
         ascent = choose(sense * offset < 0.0, -inside, inside)
         known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
         ahead[j], behind[j] = choose(known_well, half - ascent, 0.0), choose(known_well, half + ascent, nan)
@@ -136,8 +135,8 @@ def stop_at_hills(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
 def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead of each launch. A body at rest starts in the direction of the force.
 
-    ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of `strided`. Where V**2 is ``monotone`` between axes a body
-    released at rest turns at its mirror image, and no search is needed.
+    ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of `strided`. If V**2 is ``monotone`` between axes, a body released
+    at rest turns at its mirror image, and no search is needed.
     """
     start, w0, direction, state = (
         rows[LAUNCH_PLACE, :n],
@@ -179,8 +178,8 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
     for j in range(n):
         step, low, itself = steps[j], places_low[j], direction[j] * (places[j] - start[j])
         first = distance_to_axis(start[j], direction[j], places[j], step)
-        passed = whole_below((first - itself) / step + 0.5)  # from the known axis to the first ahead
-        known_well = monotone & (low == low) & (first == itself)  # steps are rounded, and so are axes by them
+        passed = whole_below((first - itself) / step + 0.5)  # steps from the known axis to the first ahead
+        known_well = monotone & (low == low) & (first == itself)  # axes have the rounding of steps
         first += choose(known_well, direction[j] * low, 0.0)
         # A body released at rest moves towards the axis and turns on the other side of it.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
@@ -203,8 +202,8 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
 def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-untyped-def]
     """Set up the search behind each launch; a launch from rest needs none.
 
-    The zero ahead is stored as an offset in END_LOW. AXIS_DISTANCE becomes the offset of the last axis before it, about
-    which its mirror image is the first trial.
+    The zero ahead is stored as an offset in END_LOW. AXIS_DISTANCE becomes the offset of the last axis before it; the
+    mirror image of the zero about this axis is the first trial.
     """
     direction, length, length_behind, state = (
         rows[SEARCH_DIRECTION, :n],
@@ -243,8 +242,8 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
 def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
     """Approximate the distance of the first zero of V**2 from each launch, beginning at TRIAL.
 
-    Newton's method is applied to V**2/distance, which has no zero at a launch from rest. Until a trial has V**2 < 0,
-    the next one is at most four times as far.
+    Newton's method is applied to V**2/distance, which does not vanish at a launch from rest. As long as no trial has
+    V**2 < 0, the next one is at most four times as far away.
     """
     offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     start, w0, direction, length = (
@@ -291,7 +290,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def classify(n, rows):  # type: ignore[no-untyped-def]
-    """Set STATE to FOUND where there is a turning point ahead, and TRIAL to FOUND where the body circulates instead."""
+    """Set STATE to FOUND if there is a turning point ahead, and TRIAL to FOUND if the body circulates instead."""
     state, trial, zero, length = rows[STATE, :n], rows[TRIAL, :n], rows[ZERO, :n], rows[SEARCH_LENGTH, :n]
     direction, w0, length_behind = rows[SEARCH_DIRECTION, :n], rows[LAUNCH_V2, :n], rows[LENGTH_BEHIND, :n]
     for j in range(n):
@@ -303,9 +302,10 @@ def classify(n, rows):  # type: ignore[no-untyped-def]
 
 @Inner
 def set_ends(n, rows):  # type: ignore[no-untyped-def]
-    """Set both ends; STATE to FOUND where the orbit is even, and TRIAL to FOUND where only a known axis lies within it.
+    """Set both ends. Set STATE to FOUND if the orbit is even, and TRIAL to FOUND if only a known axis lies within it.
 
-    Wells about axes that are an odd number of spacings from the known one may have another shape than those about it.
+    Wells about axes that are an odd number of spacings away from the known axis may have another shape than the well
+    about it.
     """
     start, offset_low, offset_high, a, b = (
         rows[LAUNCH_PLACE, :n],
@@ -338,11 +338,11 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
 
 @Inner
 def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-untyped-def]
-    """Set STATE to FOUND where V**2 > 0 and ds > 0 is certain between both ends, else to NOWHERE.
+    """Set STATE to FOUND if V**2 > 0 and ds > 0 is certain between both ends, else to NOWHERE.
 
     V**2 is zero at both ends of a libration, and has its launch value at both ends of a lap. On the piece next to a
-    zero the slope must have one sign throughout, so that the zero is simple and the only one there. Of an orbit that is
-    ``mirrored`` the half up to the axis is enough.
+    zero the slope must have one sign throughout, so that the zero is simple and the only one there. For an orbit that
+    is ``mirrored`` the half up to the axis is enough.
     """
     places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
@@ -367,11 +367,11 @@ def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-unt
         for j in range(n):
             lost = 2.0 * offsets[j] * out[0, j]
             w, clear = w0[j] - lost, CONSTANT_SHARE * (w0[j] + fabs(lost))
-            # Bounds of the rates at which V**2 may fall and grow, and the smallest value that they allow.
+            # Bounds on the rates at which V**2 may decrease and increase, and the smallest value that they allow.
             fall, growth, from_w = 2.0 * box[1, j], -2.0 * box[0, j], speeds[j]
             valley = (fall * w + growth * from_w - fall * growth * (hi[j] - lo[j])) / (fall + growth)
             lowest = choose((fall > 0.0) & (growth > 0.0), valley, choose(w < from_w, w, from_w))
-            # Towards the axis it grows, except by rounding.
+            # Towards the axis V**2 increases, except for rounding.
             grown = 0.5 * from_w - choose(fall > 0.0, fall, 0.0) * (hi[j] - lo[j])
             good = choose(first, -fall, choose(last, -growth, choose(half, grown, lowest - clear))) > 0.0
             good = good & (last | half | (w > clear)) & (box[2, j] > 0.0)

@@ -1,1 +1,1 @@
-"""A curve tabulated panel by panel, and the orbits on it: turning points, times, extremes and where contact is lost."""
+"""A curve tabulated panel by panel, and the orbits on it: turning points, times, extremes and loss of contact."""

@@ -19,16 +19,17 @@ from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
 from gqm_sym.runtime.sweep.tables.places import locate
 from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
 
-# Half the widths of the first and of the last parabola on a panel of a tabulated curve, which is 2 wide, and how many
-# there are at most: one whose vertex is far away is followed by one of the same width there.
+# Half the widths of the first and of the last parabola on a panel of a tabulated curve, whose width is 2, and the
+# largest number of parabolas. One whose vertex is far away is followed by one of the same width there.
 FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
 
 @Inlined
 def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
-    """V**2/2 at an edge of panel j of a passage, the column of the powers from there, and where that edge is.
+    """Return V**2/2 at an edge of panel j of a passage, the column of the powers about that edge, and the edge's place
+    on the panel.
 
-    It is the edge that is farther from a turning point, for the lowest place of a small swing is there.
+    It is the edge that is farther from a turning point, because the lowest place of a small swing is near it.
     """
     if j == 0 and passage.panels > 1:
         return slacks[1], RIGHT_TERMS, 1.0
@@ -37,9 +38,9 @@ def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
 
 @Inner
 def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
-    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
+    """Return V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
 
-    ``level`` is what `level_on` gives.
+    ``level`` is the result of `level_on`.
     """
     slack, at, edge = level
     v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
@@ -50,7 +51,7 @@ def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-def]
-    """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
+    """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by parabolas."""
     prepare(curve, k, NEAR)
     low, high = ends
     best, step = load_on(curve, k, level, force, x), FIRST_STEP
@@ -76,7 +77,9 @@ def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-d
 
 @Inner
 def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
-    """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
+    """Return the largest value of ``sign`` times V**2 or the contact force at the samples, its panel, and its place
+    there.
+    """
     rows, paths, count = curve.rows, curve.table.paths, curve.levels.size
     best, best_j, best_x = -inf, 0, 0.0
     (first, low_x), (last, high_x) = path
@@ -90,7 +93,7 @@ def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-u
                 v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
                 value = paths[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
             else:
-                # The end itself, for the next panel shares it.
+                # The end itself is sampled, because the next panel shares it.
                 x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
                 value = load_on(curve, k, level_on(passage, slacks, j), force, x)
             if sign * value > best:
@@ -100,13 +103,14 @@ def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-u
 
 @Inner
 def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
-    """As `extreme`, on a tabulated curve: the best of each panel's samples, refined on the panels that have it.
+    """Return the result of `orbit_extremes.extreme` on a tabulated curve: the best of all samples, refined on the
+    panels to which it belongs.
 
-    At a joint the values on both sides count.
+    At a joint the values on both sides are compared.
     """
     count, last = curve.levels.size, passage.panels - 1
     path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
-    if orbit.leaves == orbit.direction:  # a body that is not in front of its turning point does not come there
+    if orbit.leaves == orbit.direction:  # a body whose turning point is not ahead does not reach it
         index, x, _ = locate(curve.table, curve.period, orbit.lam0)
         begin = index - passage.first, x
         path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
@@ -117,7 +121,7 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
     if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
         return sqrt(orbit.v2)
     for step in range(-1, 2):
-        # On the panel itself, and on that which it shares the place with.
+        # The extreme is refined on the panel itself, and on the panel with which it shares the place.
         j, x, shared = best_j + step, best_x, step == 0
         if step != 0 and best_x == float(step):
             x, shared = -best_x, path[0][0] <= j <= path[1][0]

@@ -11,11 +11,11 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.double_double.arithmetic import multiply as multiply_pairs
 from gqm_sym.runtime.sweep.tables.layout import FIT, NODES, POINTS
 
-# Legendre coefficients behind the last one above this share of the largest value are rounding noise; a panel is halved
+# Legendre coefficients after the last one above this share of the largest value are rounding noise; a panel is halved
 # if its last two are above the second share.
 MAX_NOISE_RATIO, MAX_TAIL_RATIO = 4e-16, 1e-13
 
-# The second share where values come from double-double arithmetic; and how often the fit is corrected then.
+# The second share for values from double-double arithmetic, and the number of corrections of the fit to these.
 MAX_TRUE_TAIL_RATIO, CORRECTIONS = 1e-15, 2
 _POWERS = np.array([np.pad(leg2poly(row[: k + 1]), (0, NODES - 1 - k)) for k, row in enumerate(np.eye(NODES))])
 fit, powers = multiply(FIT), multiply(_POWERS)
@@ -23,16 +23,17 @@ fit, powers = multiply(FIT), multiply(_POWERS)
 
 @Inner
 def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
-    """Fit a polynomial to values at the Gauss points; returns whether it is resolved. ``work`` has its Legendre terms.
+    """Fit a polynomial to values at the Gauss points, with its Legendre terms in ``work``; return whether it is
+    resolved.
 
-    Coefficients behind the last significant one are set to zero. ``size`` is how large the values are elsewhere: where
-    they are much smaller than that, they are rounding noise.
+    Coefficients after the last significant one are set to zero. ``size`` is the size of the values elsewhere; values
+    that are much smaller are rounding noise.
     """
     off = np.empty(NODES)
     for j in range(NODES):
         off[j], size = values[j] - values[0], max(size, fabs(values[j]))
     fit(off, 0, work, 0)
-    work[0] += values[0]  # so that a constant is fitted without rounding
+    work[0] += values[0]  # a constant is then fitted without rounding
     resolved = max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TAIL_RATIO * size
     for j in range(NODES - 1, -1, -1):
         if fabs(work[j]) > MAX_NOISE_RATIO * size:
@@ -44,9 +45,9 @@ def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
-    """As `fill_terms`, from values of two doubles, and with powers of two doubles.
+    """Fit a polynomial as `fill_terms` does, but to values of two doubles, with coefficients of powers as two doubles.
 
-    Returns the last Legendre terms, and what they are compared with.
+    Return the size of the last Legendre terms, and the size with which it is compared.
     """
     rest, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
     for j in range(NODES):
@@ -68,9 +69,10 @@ def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def move_terms(sums, edge, terms, middle):  # type: ignore[no-untyped-def]
-    """Fill the powers about an edge of a polynomial with powers of x of two doubles, which are changed.
+    """Fill the coefficients of powers about an edge, for a polynomial whose coefficients of powers of x, ``sums``, are
+    two doubles each and are overwritten.
 
-    And ``middle`` with those of x, x**2, ... in its product with the distance from the edge.
+    Also fill ``middle`` with the coefficients of x, x**2, ... of its product with the distance from the edge.
     """
     for j in range(NODES - 1):
         middle[j] = add(sums[0, j], sums[1, j], -edge * sums[0, j + 1], -edge * sums[1, j + 1])[0]

@@ -1,9 +1,9 @@
 """The data of each panel in the table of a curve: the parts of the potential and of the contact force.
 
-The curve is cut into panels on which they are polynomials to rounding. The potential on a panel is that above its left
-edge, so that it has all its digits however small the panel is. Potential and load are sums of parts, each times a
-factor that depends on run-time parameters alone (`interface.SeparatedTerms`): the table has the parts, and a launch
-puts together its own potential on the panels that it comes to (`panel_forces`).
+The curve is cut into panels on which they are polynomials to rounding. The potential on a panel is stored relative to
+its value at the left edge, so that it keeps all its digits however small the panel is. Potential and load are sums of
+parts, each times a factor that depends on run-time parameters alone (`interface.SeparatedTerms`). The table has the
+parts, and for each launch they are combined on the panels that it reaches (`panel_forces`).
 """
 
 from typing import Any, NamedTuple
@@ -14,40 +14,44 @@ from numpy.polynomial.legendre import leggauss, legvander
 
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 
-# Gauss points of a panel, of the rule for panels far from turning points, and places at which loads are sampled.
+# The number of Gauss points of a panel, that of the rule for panels far from turning points, and the number of places
+# at which loads are sampled.
 NODES, FEW_NODES, SAMPLES = 16, 8, 10
 
 # Bernstein ellipses (sums of half axes) in which V**2 must not vanish for these rules to be accurate to rounding.
 ELLIPSE, FEW_ELLIPSE = 3.2, 10.0
 
-# What a panel has of the path: weights in m at the Gauss points, and at fewer of them; powers of x in [-1, 1] for
-# ds/dlam and kappa; kappa at the samples; whether ds may vanish; and half the panel's length in lam.
+# The data of the path on a panel: weights in m at the Gauss points of both rules; coefficients of ds/dlam and kappa in
+# powers of x in [-1, 1]; kappa at the samples; whether ds may vanish; and half the panel's length in lam.
 WEIGHTS, FEW_WEIGHTS, DS_TERMS, KAPPA_TERMS = 0, NODES, NODES + FEW_NODES, 2 * NODES + FEW_NODES
 KAPPA_SAMPLES = KAPPA_TERMS + NODES
 MAY_STOP = KAPPA_SAMPLES + SAMPLES
 HALF = MAY_STOP + 1
 PATH_ROW = HALF + 1
-# What it has of a part of the potential. Numbers that suffice far from turning points: the potential of the left edge
-# above the reference, two doubles; its increase from edge to edge; its mean; by how much it differs from that on the
-# panel and in both ellipses, at most; the size of what the first is a sum of; and the potential at the samples.
+# The data of a part of the potential on a panel. These numbers suffice far from turning points: the potential at the
+# left edge relative to the reference, as two doubles; its increase from edge to edge; its mean; the largest difference
+# from the mean on the panel and in both ellipses; the size of the terms of the first number; and the potential at the
+# samples.
 BASE, BASE_LOW, INCREASE, MIDDLE, SPREAD, REACH, FEW_REACH, BASE_SIZE, POTENTIAL_SAMPLES = range(9)
 FEW_POTENTIAL = POTENTIAL_SAMPLES + 1
-# Then the potential from either edge: above that of the left edge it is r*(c0 + c1*r + c2*r**2 + ...) with r = 1 + x,
-# and above that of the right edge the same with r = x - 1, so that it has all its digits next to an edge, however many
-# of the first coefficients vanish there. Then the coefficients of x, x**2, ... about the middle of the panel; at last
-# its values at the Gauss points, and its Legendre coefficients.
+# Then the potential relative to either edge: relative to the left edge it is r*(c0 + c1*r + c2*r**2 + ...) with r = 1 +
+# x, and relative to the right edge the same with r = x - 1, so that it keeps all its digits next to an edge even if the
+# first coefficients vanish there. Then the coefficients of x, x**2, ... about the middle of the panel; finally its
+# values at the Gauss points, and its Legendre coefficients.
 LEFT_TERMS = POTENTIAL_SAMPLES + SAMPLES
 RIGHT_TERMS, MIDDLE_TERMS, POTENTIAL, SERIES = (LEFT_TERMS + k * NODES for k in range(1, 5))
 POTENTIAL_ROW = SERIES + NODES
-# What it has of a part of the load n0: powers of x, and values at the samples. A row of `panel_forces` has both.
+# The data of a part of the load n0 on a panel: coefficients of powers of x, and values at the samples. A row of
+# `panel_forces` has both kinds of data.
 LOAD_TERMS, LOAD_SAMPLES = POTENTIAL_ROW, POTENTIAL_ROW + NODES
 LOAD_ROW = NODES + SAMPLES
 
 
 def _gauss(n: int) -> tuple[Array, Array, Array]:
-    """Gauss points, their weights, and factors that take values at the points to Legendre coefficients.
+    """Return Gauss points, their weights, and the matrix that maps values at the points to Legendre coefficients.
 
-    They are exact for the points as doubles; the weights of `leggauss` are off by 70 last places.
+    Weights and matrix are accurate for the points as doubles; the weights of `leggauss` have errors of 70 units in the
+    last place.
     """
     points = leggauss(n)[0]
     values = legvander(points.astype(np.longdouble), n - 1)
@@ -57,7 +61,7 @@ def _gauss(n: int) -> tuple[Array, Array, Array]:
     return points, (2.0 * factors[0]).astype(np.float64), factors.T.astype(np.float64)
 
 
-# FIT takes values at the Gauss points to Legendre coefficients, and `powers` takes these to powers.
+# FIT maps values at the Gauss points to Legendre coefficients, and `powers` maps these to coefficients of powers.
 POINTS, GAUSS_WEIGHTS, FIT = _gauss(NODES)
 FEW_POINTS, FEW_GAUSS_WEIGHTS, _ = _gauss(FEW_NODES)
 SAMPLE_POINTS = np.concatenate([[-1.0], FEW_POINTS, [1.0]])
@@ -73,11 +77,11 @@ class CurveTable(NamedTuple):
     edges : (n+1,) array
         The places at the edges of the panels; n is 0 if there is no table.
     edge_lows : (n+1,) array
-        What these are rounded by.
+        The rounding errors of the edges.
     paths : (n, PATH_ROW) array
-        What the panels have of the path.
+        The data of the path on each panel.
     parts : (n, potentials*POTENTIAL_ROW + loads*LOAD_ROW) array
-        What they have of the parts of the potential and of the load.
+        The data of the parts of the potential and of the load on each panel.
     potentials : int
         The number of parts of the potential.
     is_exact : bool

@@ -20,13 +20,15 @@ from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
 from gqm_sym.runtime.sweep.tables.places import edge_place, locate
 from gqm_sym.runtime.sweep.tables.potential import potential_on, value_on
 
-# Steps of the search for a zero of N between two samples.
+# The number of steps of the search for a zero of N between two samples.
 MAX_STEPS = 80
 
 
 @Inner
 def signed_force(curve, k, slack, side, x):  # type: ignore[no-untyped-def]
-    """N per unit mass at a place of panel k, positive where the track pushes; zero where it is zero within rounding."""
+    """Return N per unit mass at a place of panel k, positive if the track pushes, and zero if it is zero within
+    rounding.
+    """
     rows = curve.rows
     inertia = 2.0 * value_on(curve.table.paths, k, KAPPA_TERMS, x) * (slack - potential_on(rows, k, x))
     load = value_on(rows, k, LOAD_TERMS, x)
@@ -36,7 +38,9 @@ def signed_force(curve, k, slack, side, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def change_between(curve, k, slack, side, before, after):  # type: ignore[no-untyped-def]
-    """Where N changes its sign between a place of panel k at which the track pushes and one at which it pulls."""
+    """Return the place at which N changes its sign, between a place of panel k at which the track pushes and one at
+    which it pulls.
+    """
     pushes, pulls = before, after
     f, g = signed_force(curve, k, slack, side, pushes), signed_force(curve, k, slack, side, pulls)
     for step in range(MAX_STEPS):
@@ -56,7 +60,7 @@ def change_between(curve, k, slack, side, before, after):  # type: ignore[no-unt
 
 @Inner
 def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-untyped-def]
-    """The first place at which the track would pull, from a place ``begin`` to one end of a passage.
+    """Return the first place between ``begin`` and one end of a passage at which the track would pull.
 
     Parameters
     ----------
@@ -98,7 +102,7 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
 
 @Inner
 def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyped-def]
-    """The place at which a body leaves the track before it comes to an end of it; NaN if it never does."""
+    """Return the place at which a body leaves the track before it reaches an end of it; NaN if it never does."""
     table, period = curve.table, curve.period
     index, x, _ = locate(table, period, orbit.lam0)
     j, last = index - passage.first, passage.panels - 1

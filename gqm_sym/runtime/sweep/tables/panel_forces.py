@@ -1,7 +1,8 @@
-"""The potential and the load of one launch on the panels that it comes to: parts of a table times its factors.
+"""The potential and the load of one launch on the panels that it reaches: sums of the parts of a table times the
+launch's factors.
 
-A launch needs few numbers of most panels that it passes, and more of those next to its turning points. They are put
-together when they are first needed, and kept for launches with the same factors.
+A launch needs few numbers on most panels that it passes, and more on those next to its turning points. They are
+computed when they are first needed, and kept for launches with the same factors.
 """
 
 from math import fabs, inf
@@ -31,22 +32,22 @@ from gqm_sym.runtime.sweep.tables.layout import (
     SPREAD,
 )
 
-# What a panel's row contains so far: numbers that suffice far from turning points, its polynomials, the load.
+# Flags for the contents of a panel's row: numbers that suffice far from turning points, its polynomials, the load.
 FAR, NEAR, LOAD = 1, 2, 4
 
-# How often a panel is halved towards an edge to find out from where on the potential is convex.
+# The largest number of times that a panel is halved towards an edge to find a part on which the potential is convex.
 HALVINGS = 20
 
-# A row: as `layout` has it for one part; then an upper bound of the potential on the panel above the reference,
-# infinite where ds may vanish; a better one; whether the potential rises (1) or falls (-1) throughout, 0 if neither is
-# certain; and the level from which it is certain that it is convex.
+# A row has the numbers that `layout` lists for one part; then an upper bound of the potential on the panel relative to
+# the reference, infinite if ds may vanish; a better bound; 1 if the potential rises throughout, -1 if it falls, 0 if
+# neither is certain; and the level above which it is certainly convex.
 HIGHEST, TOP, SLOPE_SIGN, CONVEX_FROM = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)
 ROW = CONVEX_FROM + 1
 
 
 @Inner
 def fill_sums(parts, stride, factors, out):  # type: ignore[no-untyped-def]
-    """Fill numbers with sums of parts times their factors; from part to part it is so many columns."""
+    """Fill numbers with sums of parts times their factors; the columns of successive parts are ``stride`` apart."""
     for j in range(out.size):
         out[j] = factors[0] * parts[j]
     for i in range(1, factors.size):
@@ -56,7 +57,7 @@ def fill_sums(parts, stride, factors, out):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_far(curve, k):  # type: ignore[no-untyped-def]
-    """Fill what suffices far from turning points."""
+    """Fill the numbers that suffice far from turning points."""
     parts, row, factors, count = curve.table.parts[k], curve.rows[k], curve.factors, curve.table.potentials
     fill_sums(parts, POTENTIAL_ROW, factors[:count], row[:LEFT_TERMS])
     spread, reach, few_reach, base_size, base, base_low = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -75,10 +76,10 @@ def fill_far(curve, k):  # type: ignore[no-untyped-def]
 
 @Inner
 def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
-    """The least height above an edge from which the potential is certainly convex; infinite if there is none.
+    """Return the smallest height above an edge from which the potential is certainly convex; infinity if there is none.
 
-    That is where one term of its second derivative, in powers of the distance from the edge, outweighs all that are
-    negative. A flat well has such small terms in front of that one as the edge is beside its lowest place.
+    It is convex where one term of its second derivative, in powers of the distance from the edge, outweighs all
+    negative terms. In a flat well the terms before this one are as small as the edge is near the lowest place.
     """
     lead, behind, way, first = 0.0, 0.0, 1.0, 0
     for j in range(1, NODES):
@@ -103,7 +104,7 @@ def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_near(curve, k):  # type: ignore[no-untyped-def]
-    """Fill the polynomials, and what they say of the potential's slope and bound."""
+    """Fill the polynomials, and the sign of the slope and the bound that follow from them."""
     parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
     fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
     change, slope, spread, bend = 0.0, row[MIDDLE_TERMS], 0.0, 2.0 * row[MIDDLE_TERMS + 1]
@@ -132,7 +133,7 @@ def fill_load(curve, k):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_missing(curve, k, missing):  # type: ignore[no-untyped-def]
-    """Fill what is missing of the row of panel k."""
+    """Fill the missing parts of the row of panel k."""
     if missing & FAR:
         fill_far(curve, k)
     if missing & NEAR:
@@ -144,7 +145,7 @@ def fill_missing(curve, k, missing):  # type: ignore[no-untyped-def]
 
 @Inlined
 def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
-    """Fill the row of panel k, as far as ``wanted`` (FAR, NEAR and LOAD, added up) and not there yet."""
+    """Fill those parts of the row of panel k that are ``wanted`` (a sum of FAR, NEAR and LOAD) and still missing."""
     missing = wanted & ~curve.levels[k]
     if missing != 0:
         fill_missing(curve, k, missing)
@@ -152,7 +153,7 @@ def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
 
 @Inner
 def take_factors(curve, given):  # type: ignore[no-untyped-def]
-    """Make factors those of the launch; what was put together with others is forgotten."""
+    """Set the factors to those of the launch; rows that were computed with other factors are discarded."""
     changed = False
     for i in range(given.size):
         changed |= curve.factors[i] != given[i]

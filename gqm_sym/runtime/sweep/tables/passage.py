@@ -15,10 +15,10 @@ from gqm_sym.runtime.sweep.tables.places import from_left, from_right, locate, n
 from gqm_sym.runtime.sweep.tables.potential import difference_on, potential_on, rise_between, rise_on
 from gqm_sym.runtime.sweep.tables.turning_points import downhill, end_ahead, polished, turn_from
 
-# By how much the potential may differ between turning points that doubles found, as a share of what it falls from them.
+# The largest difference of the potential between turning points found in doubles, as a share of its decrease from them.
 MAX_MISMATCH = 1e-14
 
-# Which ends of a passage are turning points.
+# Codes for the ends of a passage that are turning points.
 BOTH, LOWER, UPPER, NEITHER = range(4)
 
 
@@ -28,23 +28,24 @@ class Passage(NamedTuple):
     Attributes
     ----------
     first, panels : int
-        The index of the first panel, and how many there are. On a closed curve indices go on from lap to lap.
+        The index of the first panel, and the number of panels. On a closed curve indices continue from lap to lap.
     low_x, high_x : float
         The places of both ends on their panels, in [-1, 1].
     low_rest, high_rest : float
-        From the lower end to the right edge of its panel, and from the left edge of the last panel to the upper end, in
-        halves of these panels.
+        The distances from the lower end to the right edge of its panel, and from the left edge of the last panel to the
+        upper end, in units of half these panels.
     width : float
         The distance between both ends.
     turns : int
-        Which ends are turning points: BOTH, LOWER or UPPER, or NEITHER of a lap and of a body that runs through.
+        The ends that are turning points: BOTH, LOWER or UPPER; NEITHER for a lap and for a body that passes through.
     v2 : float
         V**2 at the lower end if NEITHER is.
     is_polished : bool
-        Whether both ends have all digits.
+        Whether both ends are accurate to all digits.
     middle : int
-        The last panel on which time is measured from the lower end, and the first on which it is from the upper one: on
-        that in the middle of an orbit with two turning points it is from either. -1 if it is from the upper end only.
+        The last panel on which time is measured from the lower end. On an orbit with two turning points this is the
+        panel in the middle, on which time is measured from both ends, and on later panels it is measured from the upper
+        end. -1 if it is measured from the upper end only.
     """
 
     first: int
@@ -65,7 +66,7 @@ NOWHERE = Passage(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, BOTH, 0.0, False, 0)
 
 @Inner
 def middle_of(curve, orbit, first, panels, turns):  # type: ignore[no-untyped-def]
-    """The number ``middle`` of a passage."""
+    """Return the number ``middle`` of a passage."""
     if turns != BOTH:
         return -1 if turns == UPPER else panels - 1
     found = locate(curve.table, curve.period, orbit.lam0 + 0.5 * (orbit.low + orbit.high))
@@ -74,7 +75,7 @@ def middle_of(curve, orbit, first, panels, turns):  # type: ignore[no-untyped-de
 
 @Inner
 def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
-    """The orbit of a launch and the panels that it passes; no panels where the table does not decide."""
+    """Return the orbit of a launch and the panels that it passes; no panels if the table does not decide."""
     table, w0 = curve.table, v0 * v0
     count = curve.levels.size
     none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0, 0), NOWHERE
@@ -110,7 +111,7 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
             other, back, v2 = end_ahead(curve, launch, w0, -direction)
     signs = curve.rows[front[0] % count, SLOPE_SIGN], curve.rows[back[0] % count, SLOPE_SIGN]
     if leaves == 0 and not table.is_exact and (signs[0] == 0.0 or signs[1] == 0.0):
-        return none  # a swing about the lowest place of a panel has more digits without the table
+        return none  # a swing about the lowest place of a panel is more accurate without the table
     last_end = ahead if leaves == direction else behind
     if leaves != 0 and not (last_end == LIMIT and v2 > 0.0 and curve.period == 0.0):
         return none
@@ -126,7 +127,7 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
 
 @Inner
 def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
-    """The panels that a known orbit passes; none if the curve is not tabulated."""
+    """Return the panels that a known orbit passes; none if the curve is not tabulated."""
     table, count = curve.table, curve.levels.size
     if count == 0:
         return NOWHERE
@@ -135,7 +136,7 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
         rests = from_right(x, near), from_left(x, near)
         return Passage(first, count + 1, x, x, rests[0], rests[1], curve.period, NEITHER, orbit.v2, False, count)
     last, y, close = locate(table, curve.period, orbit.lam0 + orbit.high)
-    if close == 0.0 and y < 0.0 and last > first:  # at an edge: nothing of the panel behind it is passed
+    if close == 0.0 and y < 0.0 and last > first:  # at an edge, the body passes nothing of the panel beyond
         last, y = last - 1, 1.0
     inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
     panels, rests = last - first + 1 if inside or curve.period > 0.0 else 0, (from_right(x, near), from_left(y, close))
@@ -145,7 +146,9 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
 
 @Inner
 def are_level(curve, passage):  # type: ignore[no-untyped-def]
-    """Whether the potential is the same at both turning points of a passage, if an exact table determines it."""
+    """Return whether the potential is the same at both turning points of a passage, as far as an exact table determines
+    it.
+    """
     if passage.panels < 2 or passage.turns != BOTH or not curve.table.is_exact:
         return True
     rows, count = curve.rows, curve.levels.size
@@ -163,9 +166,10 @@ def are_level(curve, passage):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
-    """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
+    """Fill V**2/2 at the left edge of each panel of a passage; return whether all values keep enough digits.
 
-    They are measured from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
+    They are computed from the nearer turning point. On a panel with a turning point, the value is that of the potential
+    continued beyond it.
     """
     rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
     turns, paths, middle, enough = passage.turns, curve.table.paths, passage.middle, True

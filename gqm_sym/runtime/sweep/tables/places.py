@@ -1,8 +1,8 @@
 """Places on a tabulated curve, and distances between them with all their digits.
 
-A place is the index of its panel, x in [-1, 1] on it, and the distance from the nearer edge in halves of the panel: the
-left one if x is not positive. A small distance from an edge has all its digits. On a closed curve indices go on from
-lap to lap.
+A place is given by the index of its panel, x in [-1, 1] on it, and the distance from the nearer edge (the left one if x
+is not positive) in units of half the panel. So a small distance from an edge keeps all its digits. On a closed curve
+indices continue from lap to lap.
 """
 
 from math import floor
@@ -13,7 +13,7 @@ from gqm_sym.runtime.sweep.tables.layout import HALF
 
 @Inner
 def locate(table, period, place):  # type: ignore[no-untyped-def]
-    """A place in lam as a place on the table."""
+    """Convert a place in lam to a place on the table."""
     edges, lows = table.edges, table.edge_lows
     count, laps = edges.size - 1, 0.0
     if period > 0.0:
@@ -33,7 +33,7 @@ def locate(table, period, place):  # type: ignore[no-untyped-def]
 
 @Inlined
 def neighbour(k, direction, count):  # type: ignore[no-untyped-def]
-    """The panel next to panel k; on a closed curve the first is next to the last."""
+    """Return the panel next to panel k; on a closed curve the first panel follows the last one."""
     k += direction
     if k == count:
         return 0
@@ -42,7 +42,7 @@ def neighbour(k, direction, count):  # type: ignore[no-untyped-def]
 
 @Inner
 def edge_place(table, period, index):  # type: ignore[no-untyped-def]
-    """The place of the left edge of a panel; on a closed curve by its index over all laps."""
+    """Return the place of the left edge of a panel, which on a closed curve is given by its index over all laps."""
     count = table.edges.size - 1
     if period == 0.0:
         return table.edges[index]
@@ -52,7 +52,7 @@ def edge_place(table, period, index):  # type: ignore[no-untyped-def]
 
 @Inner
 def edge_distance(table, one, other):  # type: ignore[no-untyped-def]
-    """The distance from the left edge of a panel to that of the same or a later one, at most a lap further."""
+    """Return the distance from the left edge of a panel to that of the same or a later panel, at most a lap further."""
     edges, lows, count = table.edges, table.edge_lows, table.edges.size - 1
     lap = one // count
     one, other = one - lap * count, other - lap * count
@@ -65,19 +65,19 @@ def edge_distance(table, one, other):  # type: ignore[no-untyped-def]
 
 @Inlined
 def from_left(x, near):  # type: ignore[no-untyped-def]
-    """The distance of a place from the left edge of its panel, in halves of the panel."""
+    """Return the distance of a place from the left edge of its panel, in units of half the panel."""
     return near if x <= 0.0 else 2.0 - near
 
 
 @Inlined
 def from_right(x, near):  # type: ignore[no-untyped-def]
-    """The distance of a place from the right edge of its panel, in halves of the panel."""
+    """Return the distance of a place from the right edge of its panel, in units of half the panel."""
     return near if x > 0.0 else 2.0 - near
 
 
 @Inner
 def way_between(table, lower, higher):  # type: ignore[no-untyped-def]
-    """The distance from a place on a table to a higher one."""
+    """Return the distance from a place on a table to a higher one."""
     (i, x, near), (j, y, close) = lower, higher
     count, paths = table.edges.size - 1, table.paths
     if i == j:

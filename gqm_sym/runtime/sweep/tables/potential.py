@@ -1,4 +1,6 @@
-"""The potential on the panels of a tabulated curve, above that at an edge: small differences have all digits."""
+"""The potential on the panels of a tabulated curve relative to its value at an edge, so that small differences keep all
+digits.
+"""
 
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.sweep.tables.layout import BASE, BASE_LOW, INCREASE, LEFT_TERMS, NODES, RIGHT_TERMS
@@ -6,7 +8,7 @@ from gqm_sym.runtime.sweep.tables.layout import BASE, BASE_LOW, INCREASE, LEFT_T
 
 @Inner
 def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
-    """The polynomial of panel k whose coefficients begin at column ``at``, at x."""
+    """Return the value at x of the polynomial of panel k whose coefficients begin at column ``at``."""
     total = 0.0
     for j in range(NODES - 1, -1, -1):
         total = total * x + rows[k, at + j]
@@ -15,22 +17,24 @@ def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def rise_on(rows, k, at, r):  # type: ignore[no-untyped-def]
-    """The potential on panel k above that of the edge whose numbers begin at column ``at``.
+    """Return the potential on panel k relative to the edge whose numbers begin at column ``at``.
 
-    The place is ``r`` away from it in halves of the panel.
+    The place is at the distance ``r`` from the edge, in units of half the panel.
     """
     return r * value_on(rows, k, at, r)
 
 
 @Inner
 def potential_on(rows, k, x):  # type: ignore[no-untyped-def]
-    """The potential of panel k above its left edge at a place x in [-1, 1]."""
+    """Return the potential of panel k relative to its left edge at a place x in [-1, 1]."""
     return rise_on(rows, k, LEFT_TERMS, 1.0 + x)
 
 
 @Inner
 def difference_from(rows, k, at, r, q):  # type: ignore[no-untyped-def]
-    """The first divided difference of the potential of panel k over two places, which are r and q away from an edge."""
+    """Return the first divided difference of the potential of panel k over two places at the distances r and q from an
+    edge.
+    """
     value, first = 0.0, 0.0
     for j in range(NODES - 1, -1, -1):
         first = first * q + value
@@ -40,9 +44,10 @@ def difference_from(rows, k, at, r, q):  # type: ignore[no-untyped-def]
 
 @Inner
 def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
-    """The first divided difference of the potential of panel k over two places on it, by x.
+    """Return the first divided difference of the potential of panel k, as a function of x, over two places on the
+    panel.
 
-    It is taken from the nearer edge: there the slope of a fitted polynomial is less accurate than its value.
+    It is computed from the nearer edge, because the slope of a fitted polynomial is less accurate there than its value.
     """
     at, edge = (LEFT_TERMS, -1.0) if x + y < 0.0 else (RIGHT_TERMS, 1.0)
     return difference_from(rows, k, at, x - edge, y - edge)
@@ -50,7 +55,7 @@ def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
 
 @Inner
 def rise_from_left(rows, k, x, near):  # type: ignore[no-untyped-def]
-    """The potential at a place of panel k above that of the left edge."""
+    """Return the potential at a place of panel k relative to the left edge."""
     if x <= 0.0:
         return rise_on(rows, k, LEFT_TERMS, near)
     return rows[k, INCREASE] + rise_on(rows, k, RIGHT_TERMS, -near)
@@ -58,7 +63,7 @@ def rise_from_left(rows, k, x, near):  # type: ignore[no-untyped-def]
 
 @Inner
 def rise_from_right(rows, k, x, near):  # type: ignore[no-untyped-def]
-    """The potential at a place of panel k above that of the right edge."""
+    """Return the potential at a place of panel k relative to the right edge."""
     if x > 0.0:
         return rise_on(rows, k, RIGHT_TERMS, -near)
     return rise_on(rows, k, LEFT_TERMS, near) - rows[k, INCREASE]
@@ -66,5 +71,5 @@ def rise_from_right(rows, k, x, near):  # type: ignore[no-untyped-def]
 
 @Inlined
 def rise_between(rows, k, other):  # type: ignore[no-untyped-def]
-    """The potential at the left edge of another panel above that at the left edge of panel k."""
+    """Return the potential at the left edge of another panel relative to that at the left edge of panel k."""
     return (rows[other, BASE] - rows[k, BASE]) + (rows[other, BASE_LOW] - rows[k, BASE_LOW])

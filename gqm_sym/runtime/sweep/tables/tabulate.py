@@ -1,8 +1,8 @@
 """Making the table of a curve (`layout`).
 
-Where a curve is known in double-double arithmetic (`charts.double_double.parts`), parts of the potential and lengths of
-panels are rounded from there: the places of a chart of many short pieces are doubles, and their differences have few
-digits.
+If a curve is known in double-double arithmetic (`charts.double_double.parts`), parts of the potential and lengths of
+panels are rounded from there, because the places of a chart of many short pieces are doubles, and their differences
+have few digits.
 """
 
 from math import fabs
@@ -60,19 +60,20 @@ from gqm_sym.runtime.sweep.tables.layout import (
 )
 from gqm_sym.runtime.sweep.tables.potential import potential_on, rise_on, value_on
 
-# The same next to an edge at which the potential is level: its slope there is at most such a share of what it is on
-# average. Small swings there have far less energy than what the panel spreads over, and still need all their digits.
-# If the potential has one part, panels are cut where it is level farther than so much from their edges, at multiples of
-# such a share of a piece. A sum of several is level where its factors say.
+# The largest share of the last coefficients for a panel next to an edge at which the potential is level; and the
+# largest slope there, as a share of the mean slope, for which it counts as level. Small swings there have far less
+# energy than the range of the potential on the panel, and still need all their digits. If the potential has one part
+# only, a panel is cut at a place where it is level if that is farther from the edges than MIN_CUT, at multiples of
+# CUT_STEP as shares of a piece. The level places of a sum of several parts depend on their factors.
 MAX_LEVEL_TAIL_RATIO, LEVEL_SHARE, MIN_CUT, CUT_STEP = 1e-20, 1e-3, 1e-3, 2.0**-20
 
-# How often an interval is halved to find a level place.
+# The number of times that an interval is halved to find a level place.
 HALVINGS = 50
 
-# Values below this share of what is usual on the curve need no relative accuracy of their own.
+# Values below this share of the typical size on the curve need no relative accuracy of their own.
 NEGLIGIBLE = 1e-2
 
-# How many panels a piece of the curve may be cut into on average.
+# The largest mean number of panels into which a piece of the curve is cut.
 MAX_PARTS = 4
 
 
@@ -88,7 +89,7 @@ class Source(NamedTuple):
     potentials, loads : int
         The numbers of their parts.
     mass : int
-        Which run-time parameter is the mass of the body.
+        The index of the mass of the body among the run-time parameters.
     """
 
     fns: Any
@@ -116,7 +117,9 @@ def fill_terms_at(source, p, n, a, places, offsets, out):  # type: ignore[no-unt
 
 @Inner
 def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
-    """Fill what a panel has of the path from ds/dlam and kappa at the Gauss points; returns whether it is resolved."""
+    """Fill the data of the path on a panel from ds/dlam and kappa at the Gauss points; return whether it is
+    resolved.
+    """
     work, one = np.empty(NODES), row.reshape(1, PATH_ROW)
     resolved = fill_terms(ds, work, row, DS_TERMS, 0.0)
     least_ds = 2.0 * work[0]
@@ -134,10 +137,10 @@ def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_potential(half, differences, is_exact, slope, row):  # type: ignore[no-untyped-def]
-    """Fill what a panel has of a part of the potential, all but its base; returns whether it is resolved.
+    """Fill the data of a part of the potential on a panel, except its base; return whether it is resolved.
 
-    ``differences`` (2, 2, NODES) are its divided differences from both edges, two doubles each, of which the second
-    count only where ``is_exact``; and ``slope`` is how steep the part is elsewhere on the curve.
+    ``differences`` (2, 2, NODES) are its divided differences from both edges, two doubles each, the second of which
+    count only if ``is_exact``; and ``slope`` is the slope of the part elsewhere on the curve.
     """
     values, work, one, resolved = np.empty((2, NODES)), np.empty(NODES), row.reshape(1, POTENTIAL_ROW), True
     sums, size = np.zeros((2, NODES)), NEGLIGIBLE * half * slope
@@ -173,7 +176,9 @@ def fill_potential(half, differences, is_exact, slope, row):  # type: ignore[no-
 
 @Inner
 def level_place(row):  # type: ignore[no-untyped-def]
-    """Where inside a panel a part of the potential that is not monotone on it is stationary; NaN if it is nowhere."""
+    """Return the place inside a panel at which a part of the potential that is not monotone on it is stationary; NaN if
+    there is none.
+    """
     low, high, sign, x = -1.0, 1.0, row[LEFT_TERMS], 0.0
     if not sign * row[RIGHT_TERMS] < 0.0:
         return np.nan
@@ -190,25 +195,27 @@ def level_place(row):  # type: ignore[no-untyped-def]
 
 @Inner
 def cut_between(part, begin, end):  # type: ignore[no-untyped-def]
-    """The share of a piece at which to cut a panel between two shares, for the potential is level; NaN if it is not."""
+    """Return the share of a piece, between two shares, at which to cut a panel because the potential is level there;
+    NaN if there is none.
+    """
     cut = CUT_STEP * np.rint((begin + 0.5 * (1.0 + level_place(part)) * (end - begin)) / CUT_STEP)
     return cut if begin < cut < end else np.nan
 
 
 @Inner
 def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-untyped-def]
-    """Fill what a panel has of the path and of all parts; returns whether all are resolved.
+    """Fill the data of the path and of all parts on a panel; return whether all are resolved.
 
-    The values of the potential at its left edge are filled in only where they are known (`fill_bases`).
+    The values of the potential at the left edge are filled in only if they are known (`fill_bases`).
 
     Parameters
     ----------
     source, true, p
         As `tabulate` takes them.
     panel : (left, right, piece, span)
-        The places of its edges, the piece that it lies on, and its beginning and end there.
+        The places of its edges, the piece on which it lies, and its beginning and end as shares of the piece.
     scales : array
-        How steep the parts of the potential are elsewhere on the curve, and how large those of the load.
+        The slopes of the parts of the potential elsewhere on the curve, and the sizes of the parts of the load.
     path, parts : arrays
         Filled.
     """
@@ -249,7 +256,9 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
 
 @Inner
 def scales_of(source, p, pieces):  # type: ignore[no-untyped-def]
-    """How steep the parts of the potential are at the edges of pieces, and how large those of the load, at most."""
+    """Return the largest slopes of the parts of the potential at the edges of pieces, and the largest values of the
+    parts of the load.
+    """
     scales, offset = np.zeros(source.potentials + source.loads), np.zeros(1)
     out = np.empty((scales.size + 2, 1))
     for k in range(pieces.size):
@@ -261,9 +270,9 @@ def scales_of(source, p, pieces):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_bases(parts, potentials, known):  # type: ignore[no-untyped-def]
-    """Fill the parts of the potential at the left edges of panels, each above the edge where it is lowest.
+    """Fill the parts of the potential at the left edges of panels, each relative to the edge at which it is lowest.
 
-    They are sums of the increases before, unless they are ``known`` above another reference.
+    They are sums of the increases over the panels before, unless they are ``known`` relative to another reference.
     """
     for i in range(potentials):
         rows = parts[:, i * POTENTIAL_ROW : (i + 1) * POTENTIAL_ROW]
@@ -281,7 +290,7 @@ def fill_bases(parts, potentials, known):  # type: ignore[no-untyped-def]
 
 @Inlined
 def place_on_piece(true, pieces, k, share):  # type: ignore[no-untyped-def]
-    """The place at a share of piece k, as two doubles."""
+    """Return the place at a share of piece k, as two doubles."""
     if true.values.size > 0:
         high, low, _ = true.curve.lengths[k]
         high, low = multiply_pairs(high, low, share, 0.0)
@@ -298,16 +307,17 @@ def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
     source : Source
         The module's functions.
     true : TrueParts
-        The parts of the potential in double-double arithmetic, on the same pieces; of no size if there are none.
+        The parts of the potential in double-double arithmetic, on the same pieces; its arrays are empty if there are
+        none.
     p : array
-        Run-time parameters, of which those count that the functions read, and the chart behind them.
+        Run-time parameters, of which only those that the functions read matter, followed by the chart.
     pieces : (n+1,) array
-        The edges of the pieces that the curve is smooth on.
+        The edges of the pieces on which the curve is smooth.
 
     Returns
     -------
     CurveTable
-        An empty one if the pieces would have to be cut into too many panels.
+        The table; it is empty if the pieces would have to be cut into too many panels.
     """
     capacity = MAX_PARTS * (pieces.size - 1)
     width = source.potentials * POTENTIAL_ROW + source.loads * LOAD_ROW

@@ -38,17 +38,18 @@ from gqm_sym.runtime.sweep.tables.passage import BOTH, NEITHER
 from gqm_sym.runtime.sweep.tables.places import edge_distance, neighbour
 from gqm_sym.runtime.sweep.tables.potential import difference_from, potential_on, rise_on, value_on
 
-# By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
+# The factor by which V**2 at the middle of a panel must exceed the value that the panel's rule requires.
 SAFETY = 1.05
 
-# The last Legendre coefficients of an integrand, as a share of the first, up to which its integral is accurate to
-# rounding: they belong to degrees 14 and 15, the error to degree 32. Otherwise the part is halved, so often at most.
+# The largest last Legendre coefficients of an integrand, as a share of the first, for which its integral is accurate to
+# rounding: they belong to degrees 14 and 15, the error to degree 32. Otherwise the part is halved, at most this many
+# times.
 MAX_TAIL_RATIO, MAX_HALVINGS = 2e-8, 5
 
-# The largest ratio of phase angles at both ends of a part behind an edge that lies next to a turning point.
+# The largest ratio of phase angles at the ends of a part that follows an edge next to a turning point.
 MAX_PHASE_RATIO = 4.0
 
-# What their extrapolation to that degree may be, and what counts as rounding noise.
+# The largest extrapolation of these coefficients to degree 32, and the share below which they count as rounding noise.
 MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
 
 few_rates = on_stack(FEW_NODES)
@@ -57,10 +58,10 @@ rates_buffer, angle_buffer, place_buffer, fall_buffer = (on_stack(NODES) for _ i
 
 @Inner
 def fill_falls_from_turn(rows, k, end, sign, x, falls):  # type: ignore[no-untyped-def]
-    """Fill what the potential of panel k falls from a turning point on it to places x, ever farther from it.
+    """Fill the decreases of the potential of panel k from a turning point on it to places x at increasing distances.
 
-    ``end`` is the turning point, and how far it is from the edge on whose side the places are, both in halves of the
-    panel; ``sign`` is 1 if they lie above it. Divided differences are taken from the edge that is nearer.
+    ``end`` contains the turning point and its distance from the edge on whose side the places are, both in units of
+    half the panel; ``sign`` is 1 if the places lie above it. Divided differences are computed from the nearer edge.
     """
     y, rest = end
     inner, outer, edge = (RIGHT_TERMS, LEFT_TERMS, -1.0) if sign > 0.0 else (LEFT_TERMS, RIGHT_TERMS, 1.0)
@@ -79,10 +80,10 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
     """Fill the time per unit of u on panel j of a passage at the Gauss points u, which ascend.
 
     u is the orbit's phase angle, or the place on the panel if the passage has no turning point. Phase angles are
-    counted from the nearer one, because a small time next to it needs a small angle with all digits; ``from_above``
-    says whether that is the upper one. ``slack`` and
-    ``gap`` belong to the panel's edge that is nearer to it: V**2/2 there, and the distance from the turning point. An
-    end of the curve stands for a turning point that there is not.
+    measured from the nearer turning point, because a small time next to it requires a small angle with all digits;
+    ``from_above`` says whether that is the upper one. ``slack`` and ``gap`` belong to the panel's edge that is nearer
+    to it: V**2/2 there, and the distance from the turning point. An end of the curve takes the place of a missing
+    turning point.
     """
     rows, paths, last = curve.rows, curve.table.paths, passage.panels - 1
     k = (passage.first + j) % curve.levels.size
@@ -101,7 +102,7 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
         for i in range(n):
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
             near, far = width * s * s, width * c * c
-            # V**2/2 is its value at a turning point or an edge, and what the potential falls from there.
+            # V**2/2 is its value at a turning point or an edge plus the decrease of the potential from there.
             way = near / half if on_panel else (near - gap) / half
             x[i], falls[i] = (end[0] if on_panel else -sign) + sign * way, sign * way
             out[i] = far * half if on_panel else near * far
@@ -116,9 +117,10 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
 
 @Inner
 def fill_falls_within(rows, k, passage, u, x, falls):  # type: ignore[no-untyped-def]
-    """Fill places at phase angles u where panel k has both turning points, and V**2/2 as in `fill_rates`.
+    """Fill places at phase angles u on a panel k that contains both turning points, and V**2/2 as in `fill_rates`.
 
-    V**2/2 is (x - low)*(high - x) times the second divided difference of the potential, whose powers are found once.
+    V**2/2 is (x - low)*(high - x) times the second divided difference of the potential, whose coefficients are computed
+    once.
     """
     low, high, terms, first, second = passage.low_x, passage.high_x, rates_buffer(), 0.0, 0.0
     for j in range(NODES, 1, -1):
@@ -135,7 +137,7 @@ def fill_falls_within(rows, k, passage, u, x, falls):  # type: ignore[no-untyped
 
 @Inner
 def time_on_part(curve, passage, j, from_above, slack, gap, begin, end):  # type: ignore[no-untyped-def]
-    """The time between two values of u (`fill_rates`) on panel j of a passage; NaN where it is not accurate."""
+    """Return the time between two values of u (`fill_rates`) on panel j of a passage; NaN if it is not accurate."""
     u, rates = angle_buffer(), rates_buffer()
     prepare(curve, (passage.first + j) % curve.levels.size, NEAR)
     parts = 1
@@ -147,7 +149,8 @@ def time_on_part(curve, passage, j, from_above, slack, gap, begin, end):  # type
             for i in range(NODES):
                 u[i] = middle + half * POINTS[i]
             fill_rates(curve, passage, j, from_above, slack, gap, u, rates)
-            # The weights add up to 2: what differs from one rate is less than a sum of all, and so is its rounding.
+            # The weights add up to 2. Only the differences from one of the rates are summed, because they, and so their
+            # rounding, are smaller.
             usual, size, last, before, earlier, earliest = rates[NODES // 2], 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(NODES):
                 size += GAUSS_WEIGHTS[i] * (rates[i] - usual)
@@ -158,8 +161,8 @@ def time_on_part(curve, passage, j, from_above, slack, gap, begin, end):  # type
             size += 2.0 * usual
             total += half * size
             tail, middle = max(fabs(last), fabs(before)), max(fabs(earlier), fabs(earliest))
-            # Sixteen degrees on, the terms are these if they go on to decrease as they do over the last four. Next to a
-            # turning point behind a joint they decrease more slowly than the first ones.
+            # This is the size of the terms sixteen degrees further on if they continue to decrease as over the last
+            # four. Next to a turning point beyond a joint they decrease more slowly than the first ones.
             beyond = tail * (tail / middle) ** 4 if tail > NOISE_RATIO * size else 0.0
             resolved &= tail <= MAX_TAIL_RATIO * size and beyond <= MAX_ERROR_RATIO * size
         if resolved:
@@ -170,9 +173,9 @@ def time_on_part(curve, passage, j, from_above, slack, gap, begin, end):  # type
 
 @Inner
 def time_behind_edge(curve, passage, j, from_above, slack, gap, begin, end):  # type: ignore[no-untyped-def]
-    """As `time_on_part`, for a panel that is next to one with a turning point very near the edge.
+    """Return the result of `time_on_part` for a panel next to one that has a turning point very near their common edge.
 
-    Where the curvature jumps at that edge, dt/du has terms in gap/u**2.
+    If the curvature jumps at that edge, dt/du has terms in gap/u**2.
     """
     total = 0.0
     while begin > 0.0 and end > MAX_PHASE_RATIO * begin:
@@ -183,13 +186,15 @@ def time_behind_edge(curve, passage, j, from_above, slack, gap, begin, end):  # 
 
 @Inner
 def time_on_panel_of_both(curve, passage):  # type: ignore[no-untyped-def]
-    """The half period of a body both of whose turning points are on one panel; NaN where it is not accurate."""
+    """Return the half period of a body with both turning points on one panel; NaN if it is not accurate."""
     return time_on_part(curve, passage, 0, False, 0.0, 0.0, 0.0, pi)
 
 
 @Inner
 def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
-    """The time on a whole panel far from turning points by its own Gauss points; NaN if it is too near to one."""
+    """Return the time on a whole panel far from turning points by its own Gauss points; NaN if a turning point is too
+    near.
+    """
     rows, paths = curve.rows, curve.table.paths
     distance, total = slack - rows[k, MIDDLE], 0.0
     if distance > SAFETY * rows[k, FEW_REACH]:
@@ -212,13 +217,13 @@ def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
 
 @Inner
 def phase_of(below, above):  # type: ignore[no-untyped-def]
-    """The phase angle of a place by its distances from the lower and the upper end."""
+    """Return the phase angle of a place, given its distances from the lower and the upper end."""
     return 2.0 * atan2(sqrt(max(below, 0.0)), sqrt(max(above, 0.0)))
 
 
 @Inner
 def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyped-def]
-    """The time that a body takes from one place of its orbit to a higher one; NaN where it is not accurate.
+    """Return the time that a body takes from one place of its orbit to a higher one; NaN if it is not accurate.
 
     ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
     """
@@ -277,9 +282,10 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
 
 @Inner
 def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
-    """The first time at which a body is at a place, or for NaN the time of half a period, of a lap or until it leaves.
+    """Return the first time at which a body is at a place or, if that is NaN, the time of half a period, of a lap or
+    until it leaves.
 
-    It is NaN where it is not accurate, and inf if the body is never there.
+    It is NaN if it is not accurate, and inf if the body never reaches the place.
     """
     width, laps, onwards = passage.width, 0.0, True
     here, there, start, end = (0.0, width), (width, 0.0), (0.0, width), (width, 0.0)
@@ -299,7 +305,7 @@ def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untype
             return np.inf
     turn = end if orbit.direction > 0 else start
     time = 0.0
-    # To the place, or to the end ahead and back from there to the place; then all laps before that.
+    # The time is that to the place, or to the end ahead and back to the place; the time of all laps before is added.
     for stretch in range(1 if onwards and laps == 0.0 else 2):
         first, last = here, there
         if not onwards:

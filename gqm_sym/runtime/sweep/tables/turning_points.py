@@ -1,4 +1,4 @@
-"""The first turning points of a body on a tabulated curve, or the ends through which it leaves it."""
+"""The first turning points of a body on a tabulated curve, or the ends through which it leaves the curve."""
 
 from math import fabs
 
@@ -19,26 +19,31 @@ from gqm_sym.runtime.sweep.tables.potential import (
     rise_on,
 )
 
-# The last step of Newton's method to a turning point, in halves of the panel: the error is about its square.
+# The last step of Newton's method to a turning point, in units of half the panel; the error is about its square.
 MAX_LAST_STEP = 2.0**-32
 
-# How many steps follow from where the body comes from: in flat wells the place before them has few digits.
+# The number of further steps in which V**2 is measured from the side from which the body comes; before them the place
+# has few digits in flat wells.
 LAST_STEPS = 2
 
-# How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
+# The largest rounding error of a turning point, as a share of the panel, for which doubles distinguish it from an
+# equilibrium.
 MAX_ZERO_ERROR = 1e-6
 
-# The slope of the potential at a launch from rest, as a share of what it spreads over on the panel, above which the
-# body certainly falls.
+# The slope of the potential at a launch from rest above which the body certainly moves, as a share of the range of the
+# potential on the panel.
 MIN_SLOPE_SHARE = 1e-6
 
-# V**2 at an end of the curve, as a share of the size of its terms, above which a body certainly leaves there.
+# The value of V**2 at an end of the curve above which a body certainly leaves there, as a share of the size of its
+# terms.
 MIN_LEAVING_SHARE = 1e-9
 
 
 @Inner
 def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
-    """Where the potential of panel k reaches ``slack`` between a place below it and one above it (see `polished`)."""
+    """Return the place at which the potential of panel k reaches ``slack``, between a place below this level and one
+    above it (see `polished`).
+    """
     x = 0.5 * (near + far)
     for _ in range(60):
         value, slope, r = 0.0, 0.0, 1.0 + x
@@ -62,9 +67,9 @@ def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
 
 @Inner
 def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
-    """The end of a motion in one direction from a place on the table: its kind, the panel, and the place on it.
+    """Return the end of a motion in one direction from a place on the table: its kind, the panel, and the place on it.
 
-    It is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL where the table does not decide it.
+    Its kind is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL if the table does not decide it.
     """
     rows, count, period = curve.rows, curve.levels.size, curve.period
     index, x, near_edge = launch
@@ -80,7 +85,7 @@ def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
         if may_turn and not rows[k, TOP] < energy - error:
             sign, slack = rows[k, SLOPE_SIGN] * direction, energy - rows[k, BASE]
             if sign == 0.0 and energy - error > rows[k, CONVEX_FROM]:
-                sign = 1.0  # where a convex potential reaches a level that it was below, it rises
+                sign = 1.0  # a convex potential rises where it reaches a level from below
             if sign == 0.0 or not rows[k, TOP] < np.inf:
                 return CRITICAL, index, x
             if sign > 0.0:
@@ -104,7 +109,7 @@ def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
 
 @Inner
 def downhill(curve, k, x):  # type: ignore[no-untyped-def]
-    """The direction in which a body released at a place of panel k falls; 0 next to an equilibrium."""
+    """Return the direction in which a body released at a place of panel k falls; 0 next to an equilibrium."""
     prepare(curve, k, FAR | NEAR)
     sign, slope = curve.rows[k, SLOPE_SIGN], difference_on(curve.rows, k, x, x)
     if sign == 0.0 and fabs(slope) > MIN_SLOPE_SHARE * curve.rows[k, SPREAD]:
@@ -114,7 +119,7 @@ def downhill(curve, k, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def slack_at_edge(curve, launch, w0, index, direction):  # type: ignore[no-untyped-def]
-    """V**2/2 at the edge through which a body comes to a panel, which is another one than that of the launch."""
+    """Return V**2/2 at the edge through which a body enters a panel other than that of the launch."""
     rows, count = curve.rows, curve.levels.size
     start, x, near = launch
     k = start % count
@@ -125,9 +130,9 @@ def slack_at_edge(curve, launch, w0, index, direction):  # type: ignore[no-untyp
 
 @Inner
 def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped-def]
-    """A turning point with all digits, by steps of Newton's method: its offset from the launch, and its place.
+    """Return a turning point to all digits, by steps of Newton's method: its offset from the launch, and its place.
 
-    V**2 is measured from the launch if that is on the same panel, else from the edge through which the body comes.
+    V**2 is computed from the launch if that is on the same panel, else from the edge through which the body enters.
     """
     table, rows, count = curve.table, curve.rows, curve.levels.size
     k = index % count
@@ -154,7 +159,9 @@ def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped
 
 @Inner
 def end_ahead(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
-    """The offset of the end of the curve in one direction, its place, and V**2 there; NaN if a body may not leave."""
+    """Return the offset of the end of the curve in one direction, its place, and V**2 there; NaN if the body may not
+    leave there.
+    """
     rows, last = curve.rows, curve.levels.size - 1
     start, x, near = launch
     if direction > 0:
