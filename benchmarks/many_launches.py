@@ -178,7 +178,7 @@ def _swinging(mu: float, drag: float, events: Callable[[Any, Any, Any], dict[str
 
 
 def _turned(mu: float) -> Callable[[Any, int], bool]:
-    """What happens at a turn: the body stays, or goes back."""
+    """Decide what happens at a turn: the body stays, or goes back."""
 
     def turned(body: Any, _: int) -> bool:
         if abs(sin(body.state[0])) <= mu * cos(body.state[0]):

@@ -45,7 +45,7 @@ class Result:
 
     @property
     def missed(self) -> bool:
-        """Whether the error exceeds the limit of the row."""
+        """Return whether the error exceeds the limit of the row."""
         return not self.error <= self.row.line
 
 

@@ -151,7 +151,7 @@ def example2(work: str, error: Error) -> list[Row]:
 
 
 def has(peer: str) -> bool:
-    """Whether a peer is installed."""
+    """Return whether a peer is installed."""
     return importlib.util.find_spec(peer) is not None
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 12, input 8861fdb976fb, body e69acb251efa
+# interface 12, input 8861fdb976fb, body 20197f852d44
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -141,11 +141,11 @@ def exact_effective_potential_slope(op, theta, p):
     return L*g*op.sin(theta)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, op.pi
 
 
@@ -296,7 +296,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
         middle, rest = middles[i], rests[i]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input b0d8ff0ac753, body dda9ab67a31a
+# interface 12, input b0d8ff0ac753, body 54d99547667e
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -143,7 +143,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*L*(-g*op.sin(theta) - mu*nu*v*(g*op.cos(theta) + w/L))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 12, input f2f11f54325e, body 939f97bc2f07
+# interface 12, input f2f11f54325e, body f7cadcae8667
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -141,7 +141,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*L*(-b*v*w/m - g*op.sin(theta))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

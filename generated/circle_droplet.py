@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 12, input 38113942f710, body 1dd3c5e235b7
+# interface 12, input 38113942f710, body 8bb3818f8971
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -142,7 +142,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*L*(-g*op.sin(theta) - ell_c**2*gamma*v/(L*m))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 12, input 2718db879066, body 281df49a0ac9
+# interface 12, input 2718db879066, body 5de7b850afb5
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -145,7 +145,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*L*(-g*op.sin(theta) - v*w*(c1 + c2*w))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

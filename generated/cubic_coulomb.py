@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input f472752dd3ba, body aeb0e06aa483
+# interface 12, input f472752dd3ba, body ae372b663320
 """Cubic track with Coulomb friction
 
 x              = x
@@ -147,7 +147,7 @@ def exact_speed_slope(op, x, w, v, nu, p):
     return 2*_t1*(-3*_t2*x**2 - mu*nu*v*(_t2 + 6*w*x/_t0**(op.mpf(3)/2)))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 

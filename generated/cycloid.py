@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 12, input 350ae6cf923a, body a33768bb8969
+# interface 12, input 350ae6cf923a, body d3901373f20a
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -145,11 +145,11 @@ def exact_effective_potential_slope(op, theta, p):
     return 2*R*g*op.sin(_t0)*op.cos(_t0)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return 0, 2*op.pi, None
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return -op.pi, 2*op.pi
 
 
@@ -303,7 +303,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         middle, rest = middles[i], rests[i]

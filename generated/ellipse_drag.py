@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 12, input f2717a5ad91f, body 159134e9ffca
+# interface 12, input f2717a5ad91f, body 09ba9c1976c8
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -154,7 +154,7 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     return 2*_t1*(-_t0*b*g/_t1 - b_air*v*w/m)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 

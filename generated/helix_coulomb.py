@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input 3f2dfaf376e9, body 30f8dad11a29
+# interface 12, input 3f2dfaf376e9, body 442b8451ecef
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -215,7 +215,7 @@ def exact_load_along_curvature(op, theta, p):
     return 0
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 12, input a0162e77d64e, body 94eea6e286fc
+# interface 12, input a0162e77d64e, body b21202233fe5
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -213,11 +213,11 @@ def exact_effective_potential_slope(op, E, p):
     return _t0*k*(_t1*_t2 + _t3)*abs(a)/(a**2*(_t0**2*_t2 + _t3**2)**(op.mpf(3)/2))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 2*op.pi
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, op.pi
 
 
@@ -412,7 +412,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (15, n))
     for i in range(n):
         a, ecc, _a, b, middle, rest = p[0, i], p[1, i], lows[i], highs[i], middles[i], rests[i]
@@ -469,7 +469,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
     for i in range(n):
         a, ecc, half = p[0, i], p[1, i], halves[i]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 12, input 702c9ef6b67b, body 113e4f8388c7
+# interface 12, input 702c9ef6b67b, body 21229be27a87
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -132,11 +132,11 @@ def exact_effective_potential_slope(op, x, p):
     return w**2*(25*x/4 + 6)/4
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return op.mpf(-24)/25, None
 
 

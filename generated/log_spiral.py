@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 12, input 8cb1e254c2ba, body 349c40aa3f42
+# interface 12, input 8cb1e254c2ba, body ce2b1053c66b
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -160,7 +160,7 @@ def exact_effective_potential_slope(op, theta, p):
     return g*r0*(b*op.sin(theta) + op.cos(theta))*op.exp(b*theta)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 
@@ -324,7 +324,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (5, n))
     for i in range(n):
         b, a, _b, middle, rest = p[1, i], lows[i], highs[i], middles[i], rests[i]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 12, input a497e433309c, body 525a73d2b61c
+# interface 12, input a497e433309c, body f399ffc925ae
 """Loop of a roller coaster
 
 x              = x(s)
@@ -118,7 +118,7 @@ def exact_rail(op, p):
     return 0, 0, 0, a, c, 0, _t0, R, -_t0*c + 2*op.pi, c, _t0, 0, a
 
 def exact_factors(op, p):
-    """What stands before the parts of U, then before those of n0."""
+    """Factors of the parts of U, then of the parts of n0."""
     g = p[3]
     return g, g
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 12, input 2c8bf584b06a, body 1b3d9549e50c
+# interface 12, input 2c8bf584b06a, body a9f4c7303daf
 """Bead in a parabolic bowl
 
 x              = x
@@ -141,11 +141,11 @@ def exact_effective_potential_slope(op, x, p):
     return 2*a*g*x
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, None
 
 
@@ -309,7 +309,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (1, n))
     for i in range(n):
         half = halves[i]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 12, input 016fa3c6503a, body 981a8c25ab98
+# interface 12, input 016fa3c6503a, body b0e6594b4122
 """Droplet in a parabolic channel
 
 x              = x
@@ -152,7 +152,7 @@ def exact_speed_slope(op, x, w, v, nu, p):
     return 2*_t1*(-2*a*g*x/_t1 - 2*ell_c**2*gamma*v*abs(a)/(_t0**(op.mpf(3)/2)*m))
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 

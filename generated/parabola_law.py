@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 12, input 6669068dcbd5, body c0b98a1aad86
+# interface 12, input 6669068dcbd5, body 27c02115b337
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -153,7 +153,7 @@ def exact_speed_slope(op, x, w, v, nu, p):
     return 2*_t0*(-r*v/(w/w1 + 1) - 2*a*g*x/_t0)
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 12, input 6fc25406b912, body a96d32523f1d
+# interface 12, input 6fc25406b912, body 92e04210841c
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -184,11 +184,11 @@ def exact_inertia(op, p):
     return beta + 1
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, None
 
 
@@ -364,7 +364,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (5, n)), carray(out, (4, n))
     for i in range(n):
         a, _a, b = p[0, i], lows[i], highs[i]
@@ -394,7 +394,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (3, n))
     for i in range(n):
         a, half = p[0, i], halves[i]

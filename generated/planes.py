@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 12, input 1c6e3a707056, body 2babf59fd1d2
+# interface 12, input 1c6e3a707056, body 42874dd117e5
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -176,7 +176,7 @@ def exact_effective_potential(op, x, z, p):
     return g*z, 0, g
 
 def exact_factors(op, p):
-    """What stands before the parts of U, then before those of n0."""
+    """Factors of the parts of U, then of the parts of n0."""
     g = p[0]
     return g, g
 

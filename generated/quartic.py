@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 12, input 79764b04feb4, body 5b5855211cda
+# interface 12, input 79764b04feb4, body e994a2958862
 """Bead in a quartic bowl
 
 x              = x
@@ -136,11 +136,11 @@ def exact_effective_potential_slope(op, x, p):
     return 4*g*x**3
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, None
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return 0, None
 
 
@@ -301,7 +301,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (1, n))
     for i in range(n):
         half = halves[i]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 12, input 761b603021f8, body 072237dc6f68
+# interface 12, input 761b603021f8, body 19ecd4735edb
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -156,7 +156,7 @@ def exact_level(op, x, z, p):
     return -_t0*_t1 + _t2*_t3, 2*_t3*x, -_t0 - 2*_t1*z - _t2
 
 def exact_factors(op, p):
-    """What stands before the parts of U, then before those of n0."""
+    """Factors of the parts of U, then of the parts of n0."""
     g = p[1]
     return g, g
 

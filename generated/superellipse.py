@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 12, input fe6d2f95d843, body c9849077921d
+# interface 12, input fe6d2f95d843, body 03d08aa01a21
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -149,7 +149,7 @@ def exact_level(op, x, z, p):
     return _t0*x**4 + _t1*z**4 - 1, 4*_t0*x**3, 4*_t1*z**3
 
 def exact_factors(op, p):
-    """What stands before the parts of U, then before those of n0."""
+    """Factors of the parts of U, then of the parts of n0."""
     g = p[2]
     return g, g
 

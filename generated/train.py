@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 12, input b87305fcd75e, body 60683052da87
+# interface 12, input b87305fcd75e, body 425cc23adeb0
 """A train of five cars on hills
 
 x              = x(s)
@@ -175,12 +175,12 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_train(op, p):
-    """The length of a train, what gravity is, and its coefficient of friction."""
+    """Length of the train, acceleration of gravity, and coefficient of friction."""
     length, g = p[0], p[1]
     return length, g, 0
 
 def exact_factors(op, p):
-    """What stands before the parts of U, then before those of n0."""
+    """Factors of the parts of U, then of the parts of n0."""
     g = p[1]
     return g, g
 

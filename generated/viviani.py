@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 12, input c93b8a64a5a5, body a323e72e00bd
+# interface 12, input c93b8a64a5a5, body 436c932fec94
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -195,11 +195,11 @@ def exact_load_along_curvature(op, theta, p):
     return -_t1**3*_t2*op.sin(theta) + _t2*_t3*(_t3 + 2)*op.sin(_t0)/2
 
 def exact_domain(op, p):
-    """Both ends of the domain, and the period; None where there is none."""
+    """Both ends of the domain and the period; None for an open end or without a period."""
     return None, None, 4*op.pi
 
 def exact_axes(op, p):
-    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
     return -op.pi, 2*op.pi
 
 
@@ -366,7 +366,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
-    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         _a, b, middle, rest = lows[i], highs[i], middles[i], rests[i]
@@ -392,7 +392,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]

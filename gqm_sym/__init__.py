@@ -103,7 +103,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Fetch a public name from where it lives."""
+    """Fetch a public name from the module that defines it."""
     if name not in _HOMES:
         from gqm_sym.arguments import nearest
 

@@ -1,4 +1,4 @@
-"""Arguments of what a user calls: by their names, of the right types, and refused with a remedy.
+"""The arguments of public functions: they are passed by name, their types are checked, and errors name a remedy.
 
 Python's own errors say that a function takes no positional arguments; these say what to write instead.
 """
@@ -10,6 +10,7 @@ from functools import wraps
 from itertools import islice
 from os import PathLike, fspath
 from pathlib import Path
+from types import FunctionType
 from typing import Any, ParamSpec, TypeVar
 
 from gqm_sym.errors import ArgumentError, DeclarationError
@@ -20,25 +21,25 @@ T = TypeVar("T")
 
 _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-# Of a name with fewer letters than this, one of two letters may be wrong.
+# In names with fewer letters than this, one of two letters may be wrong.
 MIN_LENGTH = 4
 # The largest number of items in an argument, so that endless iterators are refused.
 MAX_ITEMS = 2_000_000
-# No longer path is the name of a file.
+# A longer text is not taken for the name of a file.
 MAX_PATH = 4096
-# Arguments that a method does not get from its caller.
+# Arguments that callers of a method do not pass.
 _OWN = frozenset({"cls", "self"})
 
 
 def checked(called: str, also: Iterable[str] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a decorator that refuses arguments which a function does not have, with the remedy.
+    """Return a decorator that refuses arguments which a function does not have, and names the remedy.
 
     Parameters
     ----------
     called
         The function's name as a user writes it: ``Gravity``, ``Curve.graph``.
     also
-        Names that the function takes in a mapping of its own.
+        Further names that the function takes as keywords.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -46,15 +47,53 @@ def checked(called: str, also: Iterable[str] = ()) -> Callable[[Callable[P, R]],
 
         @wraps(function)
         def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
-            try:
-                signature.bind(*args, **kwargs)
-            except TypeError:
-                raise ArgumentError(_reason(called, signature, tuple(also), args, kwargs)) from None
+            _check(called, signature, tuple(also), args, kwargs)
             return function(*args, **kwargs)
 
         return wrapper
 
     return decorate
+
+
+class ChecksArguments:
+    """A base of classes whose public methods refuse arguments that they do not have, with the remedy.
+
+    The arguments are checked only when Python has refused them, so that a call takes hardly longer.
+    """
+
+    # The name of an instance in messages, which subclasses set.
+    _called = ""
+
+    def __init_subclass__(cls) -> None:
+        """Wrap the public methods that a subclass defines."""
+        super().__init_subclass__()
+        for name, method in list(vars(cls).items()):
+            if isinstance(method, FunctionType) and not name.startswith("_"):
+                setattr(cls, name, _checked_when_refused(f"{cls._called}.{name}", method))
+
+
+def _checked_when_refused(called: str, method: Callable[P, R]) -> Callable[P, R]:
+    """Return a method that explains the TypeError of a call with wrong arguments."""
+
+    @wraps(method)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return method(*args, **kwargs)
+        except TypeError:
+            _check(called, inspect.signature(method), (), args, kwargs)
+            raise
+
+    return wrapper
+
+
+def _check(
+    called: str, signature: inspect.Signature, also: tuple[str, ...], args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> None:
+    """Refuse arguments that a function does not have."""
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError:
+        raise ArgumentError(_reason(called, signature, also, args, kwargs)) from None
 
 
 def _reason(
@@ -84,19 +123,21 @@ def _reason(
 
 
 def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "argument") -> str:
-    """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
+    """Return a message that says that there is no argument of this name, suggests a similar one, and lists all."""
     listed = list(names)
     return f"{called}: there is no {what} {short(name)}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
 
 
 def _hint(name: str, listed: Iterable[str]) -> str:
-    """The known name that was probably meant, as the beginning of a sentence; nothing if none is near."""
+    """Return the known name that was probably meant, as the beginning of a sentence; an empty text if none is
+    similar.
+    """
     near = nearest(name, listed)
     return f"did you mean {near!r}? " if near else ""
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that a user may have meant, in whatever case; None if none is near."""
+    """Return the known name that a user may have meant, ignoring case; None if none is similar."""
     by_lower = {one.lower(): one for one in known}
     cutoff = 0.5 if len(name) < MIN_LENGTH else 0.6
     near = difflib.get_close_matches(name.lower(), list(by_lower), n=1, cutoff=cutoff)
@@ -126,20 +167,20 @@ def launch_arguments(
 
 
 def short(value: object) -> str:
-    """A value as a message shows it: on one line, and not too long."""
+    """Return a value as it is shown in a message: on one line, and not too long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 def several(given: Any, *, where: str, what: str) -> tuple[Any, ...]:
-    """Return the items of what must be several things in order: no text, no mapping, no set.
+    """Return the items of an argument that must be an ordered sequence: not a text, a mapping or a set.
 
     Parameters
     ----------
     given
-        What a user gave.
+        The argument.
     where, what
-        What it is for, and what it must be, for the message.
+        The name of the argument, and a description of what it must be, for the message.
     """
     if not isinstance(given, str | bytes | Mapping | Set):
         try:
@@ -152,7 +193,7 @@ def several(given: Any, *, where: str, what: str) -> tuple[Any, ...]:
 
 
 def mapping(given: Any, *, where: str, example: str) -> Mapping[str, Any]:
-    """Return values by names; none if nothing was given."""
+    """Return a mapping of values by names; an empty one if nothing was given."""
     if given is None or (isinstance(given, Mapping) and all(isinstance(name, str) for name in given)):
         return given or {}
     raise DeclarationError(f"{where}: must be a dict of names and values, as {example}, got {short(given)}")
@@ -163,7 +204,7 @@ def compiled_model(module: Any, *, where: str) -> Any:
     model = getattr(module, "MODEL", None)
     if not (hasattr(model, "solve") and callable(getattr(module, "sweep", None))):
         raise ArgumentError(
-            f"{where}: module: must be what gqm.build returns, or an imported module, got {short(module)}"
+            f"{where}: module: must be a generated module, built by gqm.build or imported, got {short(module)}"
         )
     return model
 
@@ -179,7 +220,7 @@ def names(given: Any, *, where: str) -> tuple[str, ...]:
 
 
 def file_path(given: Any, *, where: str) -> Path:
-    """Return the path of a file, which text or a `pathlib.Path` gives."""
+    """Return the path of a file that is given as text or as a `pathlib.Path`."""
     text = fspath(given) if isinstance(given, str | PathLike) else None
     if isinstance(text, str) and len(text) <= MAX_PATH:
         return Path(text)
@@ -194,14 +235,14 @@ def one_line(given: Any, *, where: str) -> str:
 
 
 def flag(given: Any, *, where: str) -> bool:
-    """Return True or False, given as nothing else."""
+    """Return True or False, and refuse anything else."""
     if not isinstance(given, bool):
         raise DeclarationError(f"{where}: must be True or False, got {short(given)}")
     return given
 
 
 def one_of(given: Any, known: tuple[str, ...], *, where: str) -> str:
-    """Return one of some words."""
+    """Return an argument that must be one of several words."""
     if not (isinstance(given, str) and given in known):
         hint = _hint(given, known) if isinstance(given, str) else ""
         raise DeclarationError(f"{where}: {hint}must be one of {', '.join(known)}, got {short(given)}")
@@ -209,7 +250,7 @@ def one_of(given: Any, known: tuple[str, ...], *, where: str) -> str:
 
 
 def instance(given: Any, kind: type[T], *, where: str, what: str) -> T:
-    """Return what is of a class, or say what it should be."""
+    """Return an argument that must be an instance of a class, or raise an error that says what it should be."""
     if isinstance(given, kind):
         return given
     name = getattr(given, "__name__", getattr(given, "name", "it"))

@@ -1,8 +1,8 @@
-"""Processor time that a stage may take: symbolic work has no bound that could be seen from its input.
+"""Limits of the processor time of stages, because the cost of symbolic work cannot be bounded from its input.
 
-Processor time is measured, not the time of the clock, so that nothing is refused because a machine is busy. Nor is a
-large program: what collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what
-it is called from says nothing of budgets, and stages may lie within one another.
+Processor time is measured and not the time of the clock, so that nothing is refused because a machine is busy. The time
+of garbage collections does not count, so that nothing is refused because a program is large. Work in a stage calls
+`spend` often; its callers need not know of budgets, and stages may be nested.
 """
 
 import gc
@@ -48,16 +48,16 @@ def _without_collections(own: _Budget) -> Callable[[str, Any], None]:
 
 @contextmanager
 def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
-    """Let the block take so many seconds of processor time.
+    """Limit the processor time of the ``with`` block to so many seconds.
 
     Parameters
     ----------
     stage
-        What it does, as the error should call it: ``derivation``.
+        The name of the stage in the error, such as ``derivation``.
     seconds
         The limit of time.
     remedy
-        What to try if that is not enough.
+        A remedy to try if that is not enough.
     """
     own = _Budget(stage, seconds, remedy, thread_time() + seconds, _CURRENT.get())
     token, collecting = _CURRENT.set(own), _without_collections(own)
@@ -73,7 +73,7 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
 
 @contextmanager
 def outside_budgets() -> Iterator[None]:
-    """Let the block's time count for no stage around it: what it does is bounded by its size."""
+    """Exclude the time of the ``with`` block from the budgets around it, because its work is bounded by its size."""
     around, begin = _CURRENT.get(), thread_time()
     token = _CURRENT.set(None)
     try:
@@ -87,12 +87,12 @@ def outside_budgets() -> Iterator[None]:
 
 
 def spend() -> None:
-    """End the stage if its time, or that of a stage around it, is used up.
+    """End the stage if its time, or that of an enclosing stage, is used up.
 
     Raises
     ------
     BudgetError
-        Which says what stage it was, how long it had, and what to try.
+        If it is; the message names the stage, its limit and a remedy.
     """
     found = _CURRENT.get()
     while found is not None:

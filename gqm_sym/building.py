@@ -42,7 +42,7 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     Parameters
     ----------
     model : Model
-        What `derive` returned.
+        The model that `derive` returned.
     name : str
         The module's name, a Python identifier that no installed module has.
     folder : path
@@ -75,12 +75,12 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
 
 
 def transient(model: Model) -> ModuleType:
-    """Import the module of a model without leaving a file; it is compiled once a process."""
+    """Import the module of a model without leaving a file; it is compiled once in each process."""
     return load_text("", emit(model, name="model"), "model")
 
 
 def draw_curve(curve: Curve, lam: Any, axes: Any, parameters: dict[str, Any]) -> Any:
-    """Draw a curve; `Curve.plot` is the public way to it."""
+    """Draw a curve; the public method is `Curve.plot`."""
     from gqm_sym.figures.curves import drawn
 
     for name in parameters.keys() - set(curve.parameters):
@@ -101,7 +101,7 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
     Parameters
     ----------
     text : str
-        What `emit` returned.
+        The text that `emit` returned.
     path : path
         The file; missing folders are created.
     force : bool
@@ -174,7 +174,7 @@ def difference(text: str, path: str | os.PathLike[str]) -> str:
 
 
 def _read(path: Path) -> str:
-    """Return the text of a file, or nothing if it is not a plain file: a device may have no end."""
+    """Return the text of a file, or an empty text if it is not a plain file, because a device may have no end."""
     if not path.is_file():
         return ""
     try:

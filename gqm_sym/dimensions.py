@@ -1,9 +1,9 @@
 """The dimensions of parameters, as far as the formulas that contain them determine these.
 
 Every parameter has unknown powers of mass, length and time. A formula of known dimension gives linear equations for
-them: terms of a sum are alike, arguments of functions are numbers. Numbers are often written without units (z = x**2 is
-a curve, in metres). Therefore numbers, and terms without parameters, give no equation where they might hide a unit, and
-formulas that contradict each other determine nothing.
+them: all terms of a sum have the same dimension, and arguments of functions are numbers. Numbers are often written
+without units (z = x**2 is a curve, in metres). Therefore numbers, and terms without parameters, give no equation if
+they might stand for a quantity with a unit, and formulas that contradict each other determine nothing.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ Dimension = tuple[Fraction, Fraction, Fraction]
 
 
 def dimension(kilogram: int = 0, metre: int = 0, second: int = 0) -> Dimension:
-    """Return a dimension by its powers."""
+    """Return the dimension with these powers."""
     return Fraction(kilogram), Fraction(metre), Fraction(second)
 
 
@@ -33,9 +33,9 @@ class Formulas:
     Attributes
     ----------
     equal
-        Pairs of a formula and its dimension; None where only its parts determine anything.
+        Pairs of a formula and its dimension, which is None if only parts of the formula determine dimensions.
     variables
-        Dimensions of symbols that are no parameters, None where one is to be found.
+        Dimensions of symbols that are not parameters; None for those to be determined.
     """
 
     equal: list[tuple[sp.Expr, Dimension | None]] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Formulas:
 
 
 def found_dimensions(formulas: Formulas, known: Mapping[str, Dimension]) -> dict[str, Dimension]:
-    """Return the dimensions of all symbols that the formulas leave only one; none if they contradict each other."""
+    """Return the dimensions of all symbols that the formulas determine uniquely; none if they contradict each other."""
     equations = _Equations(formulas.variables, known)
     for form, wanted in formulas.equal:
         equations.require(form, wanted)
@@ -54,7 +54,9 @@ def found_dimensions(formulas: Formulas, known: Mapping[str, Dimension]) -> dict
 
 
 def unit_of(found: Dimension | None) -> str:
-    """The SI unit of a dimension, as text; "1" of a number, and empty where it is unknown or has no name."""
+    """Return the SI unit of a dimension as text; "1" for a number, and an empty text if it is unknown or has no
+    name.
+    """
     if found is None or any(power.denominator != 1 for power in found):
         return ""
     powers = {name: int(power) for name, power in zip(("kg", "m", "s"), found, strict=True) if power}
@@ -69,7 +71,7 @@ def _power(name: str, power: int) -> str:
 
 @dataclass(slots=True)
 class _Form:
-    """A dimension with unknowns in it: powers of those of symbols, and a known part."""
+    """A dimension with unknowns: powers of the dimensions of symbols, and a known part."""
 
     powers: dict[str, Fraction]
     known: Dimension = NUMBER
@@ -96,10 +98,12 @@ class _Equations:
     def __init__(self, variables: Mapping[str, Dimension | None], known: Mapping[str, Dimension]) -> None:
         self.variables = variables
         self.known = {**{name: found for name, found in variables.items() if found is not None}, **known}
-        self.rows: list[_Form] = []  # each is the dimension of a number
+        self.rows: list[_Form] = []  # each row is the dimension of a number
 
     def require(self, form: sp.Expr, wanted: Dimension | None) -> None:
-        """Note that a formula has a dimension; term by term, for another may hide a unit in its number."""
+        """Add equations that say that a formula has a dimension. Each term gives its own, because a number in another
+        term may stand for a quantity with a unit.
+        """
         if wanted is None:
             self._of(form)
             return
@@ -108,7 +112,7 @@ class _Equations:
                 self._same(self._of(term), _Form({}, wanted))
 
     def solved(self) -> dict[str, Dimension]:
-        """Solve by elimination; empty if there is a contradiction."""
+        """Solve the equations by elimination; the result is empty if there is a contradiction."""
         done: dict[str, _Form] = {}
         for row in self.rows:
             for name, other in done.items():
@@ -135,7 +139,7 @@ class _Equations:
             self.rows.append(one.times(other.to(Fraction(-1))))
 
     def _of(self, form: sp.Expr) -> _Form | None:
-        """The dimension of a formula; None where a number in it may hide one."""
+        """Return the dimension of a formula; None if a number in it may stand for a quantity with a unit."""
         if form.is_number:
             return _Form({})
         if isinstance(form, sp.Symbol):
@@ -176,7 +180,7 @@ class _Equations:
         told = [found for term in with_parameters if (found := self._of(term)) is not None]
         others = [self._of(term) for term in form.args if term not in with_parameters]
         numbers = any(other is not None and other.is_number for other in others)
-        # cos(u) - ecc: the cosine is a number, and hides no unit as a 1 may.
+        # for example cos(u) - ecc: the cosine is a number without a unit, while a 1 may stand for a quantity with one
         waves = any(
             other is not None and other.is_number and term.free_symbols
             for term, other in zip((t for t in form.args if t not in with_parameters), others, strict=True)

@@ -1,6 +1,6 @@
 """Exceptions, one for each kind of error; `InputError` and its subclasses are mistakes in the input.
 
-Every message says, in this order: where, what was given, what would be right.
+Every message gives, in this order, the place of the error, the value that was given, and the values that are allowed.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -8,7 +8,7 @@ from typing import NoReturn
 
 
 class GQMError(Exception):
-    """Anything that this package refuses or cannot do."""
+    """The base class of all errors of this package."""
 
 
 class InputError(GQMError):
@@ -20,7 +20,7 @@ class ExpressionError(InputError):
 
 
 class NumberError(InputError):
-    """Something given for a number that is not a finite real number."""
+    """A value that is not a finite real number where a number is expected."""
 
 
 class DeclarationError(InputError):
@@ -43,7 +43,7 @@ class SpecFileError(InputError):
     mistakes: tuple[str, ...]
 
     def __init__(self, mistakes: Iterable[str]) -> None:
-        # A lone string is one mistake; iterating over its characters helps nobody.
+        # A single string is one mistake; iterating over its characters would be of no use.
         self.mistakes = (mistakes,) if isinstance(mistakes, str) else tuple(mistakes)
         super().__init__(self.mistakes)
 
@@ -52,7 +52,7 @@ class SpecFileError(InputError):
 
 
 class LaunchError(InputError):
-    """A launch that cannot be: outside the domain, with a negative speed, not finite."""
+    """A launch that is not possible: outside the domain, with a negative speed, or not finite."""
 
 
 class ParameterError(InputError):
@@ -72,7 +72,7 @@ class EmissionError(GQMError):
 
 
 class BudgetError(GQMError):
-    """A stage that was not done when its time was used up."""
+    """A stage that was not finished when its time was used up."""
 
 
 class SolutionError(GQMError):
@@ -84,23 +84,23 @@ class OutdatedModuleError(GQMError):
 
 
 class NoisyPointsWarning(UserWarning):
-    """Surveyed points whose scatter is most of the curvature of the track through them."""
+    """Surveyed points whose scatter dominates the curvature of the track through them."""
 
 
 def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn]:
-    """Return a ``__getattr__`` for a class or a module whose error says the new name of a renamed attribute.
+    """Return a ``__getattr__`` for a class or a module whose error gives the new name of a renamed attribute.
 
     Parameters
     ----------
     old_to_new : mapping of str to str
         The old names, each with its new name.
     owner : str
-        What has the attributes, as the message shall call it ("a motion", "module 'gqm_sym'").
+        The owner of the attributes, as it is named in the message ("a motion", "module 'gqm_sym'").
 
     Returns
     -------
     callable
-        It takes the arguments of ``__getattr__``, of which the last is the attribute's name, and raises an
+        A function that takes the arguments of ``__getattr__``, the last of which is the attribute's name, and raises an
         AttributeError.
 
     Examples
@@ -115,7 +115,7 @@ def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn
     def missing(*arguments: object) -> NoReturn:
         name = str(arguments[-1])
         remedy = f"; it is called {old_to_new[name]!r} now" if name in old_to_new else ""
-        # Python's traceback suggests a name that the object has.
+        # Python's traceback would otherwise suggest a name that the object has.
         raise AttributeError(f"{owner} has no attribute {name!r}{remedy}", name=name, obj=arguments[0])
 
     return missing

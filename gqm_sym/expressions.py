@@ -1,8 +1,7 @@
-"""Text or SymPy -> SymPy, in few heads: what every later stage may rely on.
+"""Reading of text or SymPy expressions as SymPy expressions of few functions, on which all later stages rely.
 
-An expression read here consists of real symbols, rational numbers, pi, E, Add, Mul, Pow, Abs and
-sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log. It holds no Float, and nothing
-that is complex or infinite.
+An expression read here consists of real symbols, rational numbers, pi, E, Add, Mul, Pow, Abs and sin cos tan asin acos
+atan sinh cosh tanh asinh acosh atanh exp log. It contains no Float, and nothing that is complex or infinite.
 """
 
 import importlib.util
@@ -31,26 +30,26 @@ Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 
 S = TypeVar("S")
 
-# Names that ``solve`` and its kin have arguments of, or will have.
+# Names of present or future arguments of ``solve`` and similar functions.
 RESERVED_NAMES = frozenset(
     {
         *("lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity", "client", "out"),
         *("wrt", "gradient", "after", "restitution", "scene", "velocity", "spin", "slow", "device"),
     }
 )
-# Of a name; longer ones fit into no line of a message or of a generated module.
+# The largest length of a name; longer ones do not fit into a line of a message or of a generated module.
 MAX_NAME = 60
 
-# Size in bits of all rational numbers that one operation may melt into one, and of any that stays.
-# SymPy looks for the factors of a number it takes a root of: 3000 bits take it seconds.
+# The largest size in bits of all rational numbers that one operation may combine into one, and of any number in a
+# result. SymPy searches for the factors of a number of which it takes a root, which takes seconds for 3000 bits.
 _MAX_MELTED_BITS = 2**17
 _MAX_BITS = 1400
-# Of anything but a name or a number. SymPy multiplies powers out on many occasions: (x - 1)**999
-# can take it half a minute.
+# The largest exponent of anything but a name or a number. SymPy multiplies powers out on many occasions, which can take
+# half a minute for (x - 1)**999.
 _MAX_POWER = 32
-# To which a number is known that is asked for its being one only.
+# The number of bits to which a number is computed if only its being real matters.
 _REAL_BITS = 10
-# Of processor time for one expression; those that people write take a thousandth of it.
+# The limit of processor time in seconds for one expression; typical ones take a thousandth of it.
 SECONDS = 0.5
 
 _HEADS: dict[str, Callable[[sp.Expr], sp.Expr]] = {
@@ -67,7 +66,7 @@ _HEADS: dict[str, Callable[[sp.Expr], sp.Expr]] = {
     "sec": lambda u: 1 / sp.cos(u),
     "csc": lambda u: 1 / sp.sin(u),
     "coth": lambda u: sp.cosh(u) / sp.sinh(u),
-    # The real root of what is known to be negative; of a symbol, the power, NaN below zero.
+    # For a negative number this is the real root; for a symbol it is the power, which is NaN below zero.
     "cbrt": lambda u: -((-u) ** sp.Rational(1, 3)) if u.is_negative else u ** sp.Rational(1, 3),
 }
 _IMPROPER = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)
@@ -82,22 +81,22 @@ def read_expression(source: Source, *, where: str, unit: str | None = None) -> s
         Text in the grammar of ``gqm_sym.grammar``, a number, or a SymPy expression of the same
         heads. A float means its binary value, text and every other number exactly what it says.
     where
-        What the expression is, as errors should call it: ``curve.graph.z``.
+        The name of the expression in errors, such as ``curve.graph.z``.
     unit
-        The SI unit that a quantity, or a text such as "30 deg", is converted to, "1" for a plain number or an angle;
-        None where no unit is known, so that none is taken.
+        The SI unit to which a quantity, or a text such as "30 deg", is converted, "1" for a plain number or an angle;
+        None if no unit is known, so that none is accepted.
 
     Returns
     -------
     sympy.Expr
-        Whose symbols are all ``Symbol(name, real=True)``.
+        The expression, all of whose symbols are ``Symbol(name, real=True)``.
 
     Raises
     ------
     ExpressionError
         If it is not in the grammar, or not real and finite.
     NumberError
-        If it has a unit of another dimension, or where none is known.
+        If it has a unit of another dimension, or has a unit although none is known.
     BudgetError
         If SymPy takes too long over it.
     """
@@ -121,7 +120,7 @@ def read_expression(source: Source, *, where: str, unit: str | None = None) -> s
 
 
 def _measured(source: object) -> tuple[Any, str] | None:
-    """The number and the unit of a quantity, or of a text such as "30 deg"; None of anything else."""
+    """Return the number and the unit of a quantity, or of a text such as "30 deg"; None for anything else."""
     if is_quantity(source):
         quantity: Any = source
         return quantity.magnitude, unit_of_quantity(quantity)
@@ -130,18 +129,19 @@ def _measured(source: object) -> tuple[Any, str] | None:
 
 
 def common_measure(numbers: Iterable[sp.Rational]) -> sp.Rational:
-    """Return the largest number of which each of some rational ones is a whole multiple.
+    """Return the largest number of which each of some rational numbers is an integer multiple.
 
-    SymPy's own ``gcd_list`` stops at the first 1 that it comes to: of 1, 3 and 7/6 it says 1.
+    SymPy's own ``gcd_list`` stops at the first 1 that it meets: for 1, 3 and 7/6 it returns 1.
     """
     listed = tuple(numbers)
     return sp.Rational(math.gcd(*(int(number.p) for number in listed)), math.lcm(*(int(number.q) for number in listed)))
 
 
 def is_real_at(form: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool | None:
-    """Whether a form is a finite real number where its symbols have some values; None where the grammar has no word.
+    """Return whether a form is a finite real number for given values of its symbols; None if it contains a function
+    that the grammar does not have.
 
-    Each step is bounded. SymPy's own evaluation takes exp(exp(exp(50))) for a number to be computed.
+    Each step is bounded, while SymPy's own evaluation would try to compute exp(exp(exp(50))).
     """
     try:
         tree = tree_of(form, where="form")
@@ -163,9 +163,9 @@ def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NA
     name
         The name of a parameter of a curve, a kernel or a model.
     where
-        What is named, as errors should call it.
+        The named object, as errors should call it.
     reserved
-        Names taken already; a curve's own parameter may be called ``lam``, for one.
+        Names that are not available.
     """
     if not isinstance(name, str):
         raise ExpressionError(f"{where}: {type(name).__name__} given; a name is text")
@@ -199,7 +199,9 @@ def check_module_name(name: str, *, where: str) -> str:
 
 
 def _is_installed(name: str) -> bool:
-    """Whether an installed package has a module of this name; a module in the user's own folders does not matter."""
+    """Return whether an installed package has a module of this name; a module in the user's own folders does not
+    matter.
+    """
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):
@@ -217,8 +219,8 @@ def name_or_value(source: S, default_name: str) -> tuple[str, S | None]:
     Returns
     -------
     tuple
-        ``(source, None)`` if it is text that is one word (whether that can be a name is for
-        ``check_name``), else ``(default_name, source)``.
+        ``(source, None)`` if it is a text of one word (``check_name`` decides whether that can be a name), else
+        ``(default_name, source)``.
     """
     if isinstance(source, str):
         text = source.strip()
@@ -231,8 +233,8 @@ def name_or_value(source: S, default_name: str) -> tuple[str, S | None]:
 class _SymPy:
     """The algebra of SymPy expressions.
 
-    SymPy computes rational powers and products at once, whatever their size: each operation here
-    first looks at how many bits it could melt together.
+    SymPy computes rational powers and products at once, whatever their size, so each operation here first determines
+    the number of bits that it could combine.
     """
 
     def number(self, value: Fraction) -> sp.Expr:
@@ -252,7 +254,7 @@ class _SymPy:
 
     def product(self, factors: list[sp.Expr]) -> sp.Expr:
         _check_bits(factors)
-        # Roots of numbers become one root, in whose product SymPy looks for factors.
+        # Roots of numbers become one root, and SymPy searches for the factors of their product.
         roots = (part for factor in factors for part in sp.Mul.make_args(factor) if part.is_Pow)
         _check_bits([root.base for root in roots if root.base.is_Rational], most=_MAX_BITS)
         return _proper(sp.Mul(*factors))
@@ -281,8 +283,7 @@ class _SymPy:
         try:
             return _proper(_HEADS[function](argument))
         except Exception as error:
-            # SymPy evaluates numbers by itself, and stumbles over some: asin(sin(10**300)) gives
-            # an AttributeError.
+            # SymPy evaluates numbers by itself, and fails for some: asin(sin(10**300)) gives an AttributeError.
             raise ValueError(f"SymPy cannot take {function} of it") from error
 
 
@@ -297,7 +298,7 @@ def _check_bits(operands: list[sp.Expr], *, times: int = 1, most: int = _MAX_MEL
 
 
 def _proper(value: sp.Expr) -> sp.Expr:
-    """Refuse what is complex, infinite or undefined, and what SymPy would fail on later."""
+    """Refuse expressions that are complex, infinite or undefined, and those on which SymPy would fail later."""
     for node in sp.preorder_traversal(value):
         if node in _IMPROPER:
             raise ValueError("not a finite real number")

@@ -40,7 +40,7 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Notes
     -----
     The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
-    derivatives by JAX are not there.
+    derivatives by JAX are not available.
     """
     return _for_jax(module, "half_period")
 
@@ -67,7 +67,9 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
     from jax import numpy as jnp
 
     def computed(names: tuple[str, ...], wrt: tuple[str, ...], arguments: tuple[Any, ...]) -> Any:
-        """A sweep as one step of JAX: the values, or with names to differentiate by the derivatives, an axis more."""
+        """Return a sweep as one step of JAX: the values or, if names to differentiate by are given, the derivatives,
+        with one more axis.
+        """
 
         def call(*given: Any) -> Any:
             arrays = {name: np.asarray(array, dtype=np.float64) for name, array in zip(names, given, strict=True)}

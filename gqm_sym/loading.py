@@ -12,7 +12,9 @@ from gqm_sym.errors import InputError
 
 
 class _Source(SourceFileLoader):
-    """It always reads the source, because Python distinguishes cached versions by size and whole seconds only."""
+    """A loader that always reads the source, because Python distinguishes cached versions by size and whole seconds
+    only.
+    """
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)
@@ -21,7 +23,7 @@ class _Source(SourceFileLoader):
 
 
 def load(path: str | os.PathLike[str], name: str) -> ModuleType:
-    """Import a generated module from its file, anew."""
+    """Import a generated module from its file, even if it has been imported before."""
     location = Path(path).resolve()
     spec = importlib.util.spec_from_file_location(name, location, loader=_Source(name, str(location)))
     if spec is None or spec.loader is None or not location.is_file():
@@ -33,9 +35,9 @@ def load(path: str | os.PathLike[str], name: str) -> ModuleType:
 
 @lru_cache(maxsize=16)
 def load_text(source: str, text: str, name: str) -> ModuleType:
-    """Import a generated module by its text, in another process or on another machine.
+    """Import a generated module from its text, in another process or on another machine.
 
-    The file is used where it is the same here, because compiled code lies beside it.
+    The file is used if it has the same text here, because compiled code is stored beside it.
 
     Parameters
     ----------

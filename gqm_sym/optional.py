@@ -1,4 +1,4 @@
-"""Packages that only some calls need, and what to install where one is missing."""
+"""Packages that only some calls need, and the extra to install if one is missing."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def require(extra: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Mark a function that imports what an extra of the package installs."""
+    """Mark a function that imports packages which an extra of this package installs."""
 
     def marked(call: Callable[P, T]) -> Callable[P, T]:
         @wraps(call)

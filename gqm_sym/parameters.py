@@ -1,4 +1,4 @@
-"""Names of run-time parameters and the exact values they have where none is given."""
+"""Names of run-time parameters and their exact default values."""
 
 from collections.abc import Iterable, Mapping
 from decimal import Decimal, Inexact, localcontext
@@ -16,26 +16,26 @@ from gqm_sym.literals.rationals import is_numpy_span
 from gqm_sym.literals.units import Unit, is_quantity, read_unit, scale_of, split_unit, unit_of_quantity
 
 Value: TypeAlias = float | int | str
-"""A default: a float means its binary value, an int or a text exactly what it spells."""
+"""A default: a float means its binary value, an int or a text exactly the number that is written."""
 
 Given: TypeAlias = Value | Decimal | Fraction | sp.Expr
-# Parameters as they are declared: with their defaults, or names alone.
+# Parameters as they are declared: names with their defaults, or names alone.
 Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
-"""What a user may write for a value."""
+"""The types that a user may give for a value."""
 
-# More places than this are not written as a decimal.
+# A number with more decimal places than this is not written as a decimal.
 _PLACES = 60
 
-# Mass and gravity mean the same everywhere, so several sources may use these two names.
+# Mass and gravity have the same meaning everywhere, so several sources may use these two names.
 COMMON = ("g", "m")
 COMMON_DEFAULTS: dict[str, Value] = {"g": "9.81", "m": "1"}
 
-# The coordinates of the plane: a potential is written in them, so no parameter may be called so.
+# The coordinates of the plane, in which potentials are written, so that no parameter may have these names.
 COORDINATES = ("x", "z")
 
 
 def read_value(given: Given | Any, *, where: str) -> Value:
-    """Return a finite real number as it will be kept: exactly as it was given."""
+    """Return a finite real number in the form in which it is kept, exactly as it was given."""
     if isinstance(given, bool):
         raise NumberError(f"{where}: must be a number, got {given}")
     if isinstance(given, Measured):
@@ -71,7 +71,8 @@ def read_value(given: Given | Any, *, where: str) -> Value:
 
 
 class Measured(str):
-    """A default that was given with a unit: the number in SI units, with the dimension that it must have.
+    """A default that was given with a unit: the number in SI units, with the unit, whose dimension the parameter must
+    have.
 
     Attributes
     ----------
@@ -92,7 +93,7 @@ class Measured(str):
 
 
 def in_si(value: Value, unit: str) -> str:
-    """The text of an exact number given in a unit, as the same number in SI base units."""
+    """Return the text of the number in SI base units that equals an exact number given in a unit."""
     scale = read_unit(unit, where="") if unit else Unit()
     if scale.is_si and isinstance(value, str):
         return value
@@ -109,9 +110,9 @@ def check_measured(defaults: Mapping[str, Value | None], units: Mapping[str, str
     defaults
         Parameters with their defaults.
     units
-        What they are measured in, as far as that is known.
+        The units of the parameters, as far as they are known.
     final
-        Whether a parameter of which nothing is known is refused too.
+        Whether a parameter with an unknown unit is refused too.
 
     Raises
     ------
@@ -156,7 +157,7 @@ def read_parameters(
     found
         The free symbols, in order of appearance.
     where
-        What is being declared, for messages.
+        The name of the declared object, for messages.
     """
     order = tuple(found)
     if given is None:
@@ -167,7 +168,7 @@ def read_parameters(
         declared = dict.fromkeys(names(given, where=f"{where}: parameters"))
     for name in declared:
         if not isinstance(name, str):
-            raise DeclarationError(f"{where}: parameters: {name!r:.60} is no name; names are text")
+            raise DeclarationError(f"{where}: parameters: {name!r:.60} is not a name; names are text")
         if name not in order:
             raise DeclarationError(
                 f"{where}: parameter {short(name)} is declared but not used; "
@@ -182,7 +183,7 @@ def read_parameters(
 
 
 def check_parameter(name: str, *, where: str) -> str:
-    """Return ``name`` if a run-time parameter may be called so."""
+    """Return ``name`` if a run-time parameter may have this name."""
     if name in COORDINATES:
         raise DeclarationError(
             f"{where}: {name!r} is a coordinate and cannot be a run-time parameter; give the parameter another name"
@@ -191,9 +192,9 @@ def check_parameter(name: str, *, where: str) -> str:
 
 
 def read_argument(given: Given | None, name: str, *, where: str) -> tuple[str, Value | None]:
-    """Read what a kernel or a family was given for a parameter: another name, a value or nothing.
+    """Read the argument of a kernel or a family for a parameter: another name, a value or nothing.
 
-    Returns the parameter's name and default.
+    The function returns the parameter's name and default.
     """
     called: str = name
     value: Given | None = given
@@ -206,12 +207,12 @@ def read_argument(given: Given | None, name: str, *, where: str) -> tuple[str, V
 
 
 def exact_value(value: Value) -> sp.Expr:
-    """Return the number that a default means, exactly."""
+    """Return the exact number that a default means."""
     return read_expression(value, where="default")
 
 
 def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Expr]:
-    """Values of parameters to try a form with: their defaults, or numbers like 1."""
+    """Return values of parameters with which to try a form: their defaults, or numbers near 1."""
     return {
         sp.Symbol(name, real=True): sp.Rational(17 + 2 * place, 16 + place) if value is None else exact_value(value)
         for place, (name, value) in enumerate(defaults.items())
@@ -219,7 +220,7 @@ def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Exp
 
 
 def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> str:
-    """Name parameters with their defaults and units, on one line: ``L = 2 m, b (1/m, no default)``."""
+    """Return parameters with their defaults and units on one line, such as ``L = 2 m, b (1/m, no default)``."""
     told = []
     for name, value in defaults.items():
         unit = "" if units.get(name, "1") == "1" else units[name]
@@ -231,7 +232,7 @@ def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> 
 
 
 def is_positive(value: Value | None) -> bool:
-    """Whether a default allows its parameter to be taken as positive; no default allows it."""
+    """Return whether a default allows its parameter to be taken as positive, as the absence of a default does."""
     return value is None or bool(exact_value(value) > 0)
 
 
@@ -256,7 +257,9 @@ def refuse_out_of_range(
 
 
 def names_in_order(*expressions: sp.Expr) -> tuple[str, ...]:
-    """Return the names of the free symbols by first appearance; the same in every process."""
+    """Return the names of the free symbols in the order of their first appearance, which is the same in every
+    process.
+    """
     seen: dict[str, None] = {}
     for expression in expressions:
         for node in sp.preorder_traversal(expression):

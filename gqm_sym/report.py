@@ -181,7 +181,9 @@ def _mathml(form: sp.Basic) -> str:
 
 
 def _unfenced(text: str) -> str:
-    """Write parentheses as characters: SymPy before 1.14 uses an element for them that browsers no longer draw."""
+    """Write parentheses as characters, because SymPy before 1.14 uses an element for them that browsers no longer
+    draw.
+    """
     closing: list[str] = []
 
     def replaced(found: re.Match[str]) -> str:
@@ -195,7 +197,7 @@ def _unfenced(text: str) -> str:
 
 
 def _character(entity: str) -> str:
-    # XML's own entities stay. SymPy's double-struck e is missing from most fonts and becomes a plain one.
+    # XML's own entities are kept. SymPy's double-struck e is missing from most fonts and is replaced by a plain one.
     return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity).replace("\u2147", "e")
 
 
@@ -205,14 +207,14 @@ def _character(entity: str) -> str:
 def _figures(motion: Motion) -> Iterator[str]:
     for what, caption in FIGURES.items():
         if what == "track" and motion.problem.formulas.rider_loads is not None:
-            continue  # the ride has it
+            continue  # the figure of the ride contains the track
         # A motion that loses energy has no phase portrait.
         with suppress(SolutionError):
             yield _svg(motion.plot(what), what, caption)
 
 
 def _riders(motion: Motion) -> Iterator[str]:
-    """Yield what riders feel, on a banked track: the extremes of loads, and in a train those of three cars."""
+    """Yield the loads on riders of a banked track: their extremes, and for a train those in three cars."""
     from gqm_sym.figures.rides import SEAT_TIMES, ride, seat_extremes, seats
 
     if motion.problem.formulas.rider_loads is None:

@@ -1,8 +1,8 @@
 """The coordinates of a charted curve as SymPy functions of its arc length.
 
-A curve that is known by numbers only (implicit, sampled, put together from pieces) has no formula x(s). These heads
-stand for what its chart holds: they are read as ``x(s)``, and lowered to calls of the chart. A track in space has a
-chart of each coordinate, with its first three derivatives by arc length, and may have one of its roll angle.
+A curve that is known as numbers only (implicit, sampled or piecewise) has no formula x(s). These functions stand for
+the rows of its chart: they are printed as ``x(s)``, and lowered to calls of the chart. A track in space has a chart of
+each coordinate, with its first three derivatives by arc length, and may have one of its roll angle.
 """
 
 from typing import ClassVar
@@ -12,7 +12,7 @@ from sympy.printing.printer import Printer
 
 from gqm_sym.errors import DerivationError
 
-# How often coordinates in space are differentiated: rates of loads have third derivatives.
+# The highest order of derivatives of coordinates in space; rates of loads contain third derivatives.
 MOST_DERIVATIVES = 3
 
 
@@ -33,25 +33,25 @@ class ChartFunction(sp.Function):  # type: ignore[misc]
 
 
 class chart_x(ChartFunction):
-    """Horizontal coordinate."""
+    """The horizontal coordinate."""
 
     row, symbol = "x", "x"
 
 
 class chart_z(ChartFunction):
-    """Height."""
+    """The height."""
 
     row, symbol = "z", "z"
 
 
 class chart_alpha(ChartFunction):
-    """Angle of the tangent."""
+    """The angle of the tangent."""
 
     row, symbol = "alpha", r"\alpha"
 
 
 class chart_kappa(ChartFunction):
-    """Signed curvature."""
+    """The signed curvature."""
 
     row, symbol = "kappa", r"\kappa"
 
@@ -71,7 +71,7 @@ class SpaceFunction(ChartFunction):
     order: ClassVar[int]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return its derivative by arc length."""
+        """Return the derivative by arc length."""
         heads = SPACE_CHARTS[self.axis]
         if self.order + 1 == len(heads):
             raise DerivationError(f"{self}: no derivative of it is known")
@@ -85,12 +85,13 @@ def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
 
 
 class TrainLoad(sp.Function):  # type: ignore[misc]
-    """The mean of |N|/m over the cars of a train, by the place of its middle, V**2, length, number of cars and g.
+    """The mean of |N|/m over the cars of a train, as a function of the place of its middle, V**2, length, number of
+    cars and g.
 
     Attributes
     ----------
     by_speed, by_place
-        The heads of its derivatives by V**2 and by the place; None where that is not known.
+        The functions for its derivatives by V**2 and by the place; None if they are not known.
     """
 
     nargs = 5
@@ -99,7 +100,7 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
     by_place: "ClassVar[type[TrainLoad] | None]" = None
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return its derivative by the place, or by V**2."""
+        """Return the derivative by the place, or by V**2."""
         head = (self.by_place, self.by_speed)[argindex - 1] if argindex <= 2 else None
         if head is None:
             raise DerivationError(f"{self}: no derivative of it is known")
@@ -107,25 +108,25 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
 
 
 class train_load_slope(TrainLoad):
-    """Its derivative by V**2."""
+    """The derivative of `train_load` by V**2."""
 
 
 class train_load_rate(TrainLoad):
-    """Its derivative by the place."""
+    """The derivative of `train_load` by the place."""
 
 
 class train_load(TrainLoad):
-    """Of a track in space."""
+    """The mean of |N|/m for a track in space."""
 
     by_speed, by_place = train_load_slope, train_load_rate
 
 
 class train_load_slope_in_plane(TrainLoad):
-    """Of a planar track the derivative by V**2."""
+    """The derivative of `train_load_in_plane` by V**2."""
 
 
 class train_load_in_plane(TrainLoad):
-    """Of a planar track."""
+    """The mean of |N|/m for a planar track."""
 
     by_speed = train_load_slope_in_plane
 
@@ -134,7 +135,7 @@ TRAIN_LOADS: dict[str, tuple[str, ...]] = {
     **{head.__name__: ("along_x", "along_y", "along_z") for head in (train_load, train_load_slope, train_load_rate)},
     **{head.__name__: ("chart",) for head in (train_load_in_plane, train_load_slope_in_plane)},
 }
-"""The charts that each of these reads."""
+"""The charts that each of these functions reads."""
 
 ROLL = "roll"
 AXES = ("x", "y", "z")
@@ -149,4 +150,4 @@ space_roll: type[SpaceFunction] = SPACE_ROWS[ROLL][0]
 MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for order in range(3))
 """The mean height of a train with its derivatives, by the place of its middle."""
 SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {**SPACE_ROWS, "h": MEAN_HEIGHT}
-"""All that has a chart of its own, with its derivatives."""
+"""All functions that have charts of their own, with their derivatives."""

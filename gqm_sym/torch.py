@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gqm_sym.arguments import launch_arguments
+from gqm_sym.errors import SolutionError
 from gqm_sym.optional import require
 
 __all__ = ["half_period", "period"]
@@ -31,7 +32,7 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Raises
     ------
     SolutionError
-        If PyTorch is not installed (extra ``[torch]``).
+        If PyTorch is not installed (extra ``[torch]``), or for second derivatives.
     InputError
         Raised by the returned function for a name that is not a parameter of the module, or for a parameter without
         default that was not given.
@@ -39,7 +40,7 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Notes
     -----
     The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
-    derivatives by PyTorch are not there.
+    derivatives by PyTorch are not available.
     """
     return _for_torch(module, "half_period")
 
@@ -65,7 +66,9 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
     import torch
 
     class Swept(torch.autograd.Function):  # type: ignore[misc, unused-ignore]
-        """A sweep as one step of PyTorch: the values, or with names ``wrt`` the derivatives by them, an axis more."""
+        """A sweep as one step of PyTorch: the values or, with names ``wrt``, the derivatives by these, with one more
+        axis.
+        """
 
         @staticmethod
         def forward(names: tuple[str, ...], wrt: tuple[str, ...], *given: Any) -> Any:
@@ -100,7 +103,7 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
 
     def _slopes(ctx: Any, wrt: tuple[str, ...]) -> Any:
         if ctx.wrt:
-            raise NotImplementedError("second derivatives by PyTorch are not there")
+            raise SolutionError(f"torch.{quantity}: second derivatives by PyTorch are not there")
         return Swept.apply(ctx.names, wrt, *ctx.saved_tensors)
 
     def function(lam0: Any, v0: Any = 0.0, **parameters: Any) -> Any:

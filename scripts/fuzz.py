@@ -103,7 +103,7 @@ def mutated(text: str, others: list[str], draw: random.Random) -> str:
 
 
 def outcome(read: Callable[[], object]) -> str:
-    """What became of one input; empty if that is as it must be."""
+    """Return a description of what went wrong with one input; empty if nothing did."""
     try:
         with confined():
             read()

@@ -129,7 +129,7 @@ def in_tests(file: Path) -> str:
 
 
 def found_by(file: Path) -> Path:
-    """Where what a file of tests runs is written down."""
+    """Return the file that records the lines that a file of tests runs."""
     return WORK / f"{in_tests(file).replace('/', '.')}.json"
 
 
@@ -157,7 +157,9 @@ def record(file: Path) -> None:
 
 
 def known_tests() -> tuple[dict[str, float], dict[str, dict[str, list[str]]]]:
-    """How long each test takes, and the tests that run each line of each file; written down once for each file."""
+    """Return the duration of each test, and the tests that run each line of each file; both are recorded once for each
+    file.
+    """
     WORK.mkdir(exist_ok=True)
     taken: dict[str, float] = {}
     lines: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
@@ -275,7 +277,7 @@ def mutated(tree: ast.Module, number: int, kind: str) -> tuple[ast.Module, ast.A
 
 
 def quiet(tests: list[str], path: Path, tree: ast.Module, seconds: float) -> str:
-    """What becomes of a mutant under some tests: "lives", "dies" or "hangs"."""
+    """Run some tests on a mutant and return the outcome: "lives", "dies" or "hangs"."""
     child = os.fork()
     if child:
         status = os.waitpid(child, 0)[1]

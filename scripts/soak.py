@@ -162,7 +162,9 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
 
 
 def lasting(motion: Any, reach: float) -> float:
-    """How long a motion lasts, up to ``reach``: where it leads to the centre of a spiral, it learns that on the way."""
+    """Return the duration of a motion, at most ``reach``; one that leads to the centre of a spiral finds that out on
+    the way.
+    """
     if motion.t_end > reach:
         try:
             motion.lam(reach)
@@ -203,7 +205,7 @@ def exactly(module: ModuleType, lam: Any, launch: dict[str, Any]) -> tuple[Any, 
 
 
 def lost(module: ModuleType, lam: float, launch: dict[str, Any], p: tuple[Any, ...]) -> Any:
-    """What V**2 loses on the way to a place, up to a constant; on charts by its coordinates."""
+    """Return the loss of V**2 on the way to a place, up to a constant; on charts it follows from the coordinates."""
     exact = module.MODEL.exact
     if hasattr(exact, "x"):
         return 2 * exact.effective_potential(mp, mpf(lam), p)

@@ -97,7 +97,7 @@ def signed(draw: random.Random, low: float, high: float) -> float:
 
 
 def outside(motion: Any, truth: Truth, times: list[float]) -> list[str]:
-    """At which times the true place lies outside the bound of the motion's."""
+    """Return a message for each time at which the true place lies outside the motion's error bound."""
     found = []
     for t in times:
         error, bound = abs(mpf(float(motion.lam(t))) - truth(mpf(t))), motion.error_bound(t)
@@ -107,7 +107,7 @@ def outside(motion: Any, truth: Truth, times: list[float]) -> list[str]:
 
 
 def slides(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Along an incline with friction, some of which all but holds the body."""
+    """Launch along an incline with friction, which is in some cases almost enough to hold the body."""
     a, v0, lam0 = signed(draw, -3.0, 1.0), log_uniform(draw, -6.0, 2.0), draw.uniform(-3.0, 3.0)
     mu, direction = log_uniform(draw, -4.0, 0.0), draw.choice((1, -1))
     if draw.random() < 0.3:
@@ -116,7 +116,7 @@ def slides(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def slide(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list[str]:
-    """What is wrong with one motion along an incline: constant acceleration up, then down or rest."""
+    """Return the defects of one motion along an incline: constant acceleration up, then down or rest."""
     motion = modules["rough"].solve(**launch)
     lam0, v0, u, a, mu = (mpf(launch[name]) for name in ("lam0", "v0", "direction", "a", "mu"))
     slope = mp.sqrt(1 + a**2)
@@ -136,7 +136,7 @@ def slide(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list
 
 
 def falls(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """On an incline with two ends: at the ends, next to them and between, from places that are no doubles too."""
+    """Launch on an incline with two ends: at the ends, next to them and between, also from places between doubles."""
     a, end = signed(draw, -3.0, 1.0), draw.choice(("-1", "1/3"))
     inwards = Fraction(draw.randint(1, 9), 10 ** draw.randint(1, 15)) * (1 if end == "-1" else -1)
     lam0: str | float = draw.choice((end, str(Fraction(end) + inwards), "1/7", "-1/7", float(Fraction(end) + inwards)))
@@ -147,7 +147,7 @@ def falls(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def fall(modules: Modules, launch: dict[str, Any], draw: random.Random) -> tuple[list[str], int]:
-    """What is wrong with one motion along an incline until it leaves it."""
+    """Return the defects of one motion along an incline until it leaves it."""
     exact = Fraction(launch["lam0"])
     lam0, v0, a = mpf(exact.numerator) / exact.denominator, mpf(launch["v0"]), mpf(launch["a"])
     slope, (low, high) = mp.sqrt(1 + a**2), (mpf(-1), mpf(1) / 3)
@@ -183,7 +183,7 @@ def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def damp(modules: Modules, launch: dict[str, Any], draw: random.Random, last: float = 30.0) -> list[str]:
-    """What is wrong with one motion on a damped spring: two exponentials, or a swing that decays."""
+    """Return the defects of one motion on a damped spring: two exponentials, or a swing that decays."""
     motion = modules["damped"].solve(**launch)
     place = spring(launch["direction"], *(mpf(launch[name]) for name in ("lam0", "v0", "k", "c")))
     return outside(motion, place, [draw.uniform(0.0, last) for _ in range(TIMES)])
@@ -220,7 +220,7 @@ def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def bounces(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """On stitched planes, with friction or without: constant acceleration from corner to corner."""
+    """Launch on stitched planes, with or without friction: the acceleration is constant from corner to corner."""
     rough, direction = draw.random() < 0.5, draw.choice((1, -1))
     mu, v0 = (log_uniform(draw, -3.0, -0.3) if rough else 0.0), draw.choice((0.0, log_uniform(draw, -2.0, 1.0)))
     points = [(mpf(x), mpf(z)) for x, z in POINTS]
@@ -269,7 +269,7 @@ def _planes(start: tuple[Any, Any, int], mu: Any, edges: list[Any], points: list
 
 
 def tracks(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """With friction along a smooth track through points, which are those of an incline."""
+    """Launch with friction along a smooth track through points of an incline."""
     lam0, v0, mu = draw.uniform(0.1, 9.9), log_uniform(draw, -3.0, 1.0), log_uniform(draw, -4.0, 0.0)
     direction = draw.choice((1, -1))
     motion = modules["rough_track"].solve(lam0, v0, direction, mu=mu)
@@ -288,7 +288,9 @@ def tracks(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def rims(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """In a round valley known as F = 0, with friction and drag, pushed only: turns, lift-off, rest."""
+    """Launch in a round valley declared as F = 0, on a track that can only push, with friction and drag: turns,
+    liftoff, rest.
+    """
     lam0, v0 = draw.uniform(-1.5, 1.5), draw.choice((0.0, log_uniform(draw, -3.0, 1.0)))
     mu, b = (draw.choice((0.0, log_uniform(draw, -3.0, -0.3))) for _ in range(2))
     given = {"mu": mu, "b": b, "contact": "above", "t_max": 20.0}
@@ -309,7 +311,7 @@ def rims(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, ...], Any]:
-    """How a leg ends, and where: V**2 is the solution of a linear equation there."""
+    """Return how and where a leg ends; V**2 is the solution of a linear equation there."""
     g, u = mpf(G), leg.direction
     a = (2 * g - 4 * c * mu * g) / (1 + 4 * c**2)
     b = -2 * u * mu * g - 2 * u * c * a
@@ -331,7 +333,7 @@ def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, .
 
 
 def hills(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """From beside a hilltop with viscous resistance: two exponentials, one of which grows."""
+    """Launch from beside a hilltop with viscous resistance: the motion is two exponentials, and one of them grows."""
     lam0, direction = signed(draw, -30.0, -1.0), draw.choice((1, -1))
     k, c = -log_uniform(draw, -1.0, 1.5), log_uniform(draw, -3.0, 0.5)
     launch = {"lam0": lam0, "v0": 0.0, "direction": direction, "k": k, "c": c}
@@ -384,7 +386,7 @@ def gradients(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def unequal(what: str, slopes: Any, true: Any, allowed: float) -> list[str]:
-    """Whether derivatives differ from true ones; behind these may stand a size that counts too."""
+    """Return a message if derivatives differ from the true ones; more entries of ``true`` count for the scale only."""
     size = max(map(abs, true))
     off = float(max(abs(mpf(float(one)) - other) for one, other in zip(slopes, true, strict=False)) / size)
     return [] if off <= allowed else [f"{what} off by {off:.1e}"]
@@ -454,7 +456,7 @@ def threads(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def pipes(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """From rest in a half pipe of pieces, in a plane and in space: pendulums and a level way between."""
+    """Launch from rest in a half pipe of pieces, in a plane and in space: two pendulums and a level line between."""
     name, lam0 = (
         draw.choice(("pipe", "pipe_in_space")),
         draw.choice((draw.uniform(0.0, 1.5), log_uniform(draw, -6.0, 0.0))),
@@ -531,7 +533,7 @@ def soak(
 
 
 def _told(kind: Kind, own: int, modules: Modules, tally: Counter[str]) -> list[str]:
-    """What is wrong with one motion; what came of it is counted."""
+    """Return the defects of one motion, and count its outcome."""
     with mp.workdps(DIGITS):
         try:
             found, checks = kind(random.Random(own), modules)

@@ -39,7 +39,7 @@ if numba.config.DISABLE_JIT:
 
 @pytest.fixture(scope="session")
 def generated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the suite's modules are written; shared by parallel workers, with numba's cache."""
+    """Return the folder for the suite's modules, which parallel workers share, with numba's cache."""
     base = tmp_path_factory.getbasetemp()
     root = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
     folder = root / "modules"

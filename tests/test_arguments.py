@@ -1,4 +1,4 @@
-"""What careless and hostile callers write: refused by one clear error, or understood."""
+"""Arguments of careless and hostile callers are refused by one clear error, or understood."""
 
 import datetime
 import math
@@ -323,7 +323,7 @@ def test_questions_without_an_answer_take_no_time():
     ],
 )
 def test_the_message_names_the_remedy(call, message):
-    """What Python calls a TypeError is one still, with what to write instead."""
+    """An argument error is still a TypeError where Python raises one, and says what to write instead."""
     with pytest.raises(ArgumentError, match=message) as raised:
         call()
     assert isinstance(raised.value, TypeError)
@@ -372,7 +372,7 @@ def test_a_module_hides_no_other(name, tmp_path):
 
 
 def test_a_module_of_ones_own_may_be_made_again(tmp_path, monkeypatch):
-    """What Python finds under the name in the user's folder is no obstacle."""
+    """A module of the same name in the user's folder does not prevent generating it again."""
     (tmp_path / "my_own_track.py").write_text("")
     monkeypatch.syspath_prepend(tmp_path)
     assert check_module_name("my_own_track", where="name") == "my_own_track"
@@ -401,7 +401,7 @@ def test_an_undecided_domain_is_no_mistake():
 
 
 class Table(dict):
-    """What a DataFrame is to `Curve.sampled`."""
+    """A stand-in for a DataFrame, with all that `Curve.sampled` needs of one."""
 
     @property
     def columns(self):

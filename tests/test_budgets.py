@@ -54,7 +54,7 @@ def test_the_shorter_of_two_budgets_ends_the_work(outer: float, inner: float, na
 
 
 def test_the_stack_is_part_of_it() -> None:
-    """What is nested too deeply for Python's stack is told in the same way."""
+    """Expressions that are nested too deeply for Python's stack are refused in the same way."""
 
     def deeper() -> None:
         deeper()
@@ -108,7 +108,7 @@ ASKED: dict[str, tuple[str, str, Callable[[Any], object] | None]] = {
 def test_extended_precision_is_bounded(
     question: str, module_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is evaluated in extended precision looks at the time it takes, and says what it was and what to try."""
+    """Extended precision has a budget of time; the error says what was computed and what to try."""
     stage, lam0, ask = ASKED[question]
     module = module_of("pendulum")
     motion = module.solve(lam0=lam0, L=1)

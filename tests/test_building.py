@@ -118,7 +118,7 @@ def test_a_binary_file_is_kept(text: str, path: Path) -> None:
 
 
 def test_a_link_is_not_followed(text: str, path: Path, tmp_path: Path) -> None:
-    """What a link points to stays as it is: the link itself is refused, or replaced by force."""
+    """The target of a link stays as it is: the link itself is refused, or replaced by force."""
     link = tmp_path / "link.py"
     other = tmp_path / "other.txt"
     other.write_text("precious\n", encoding="utf-8")
@@ -261,7 +261,7 @@ def test_a_new_version_in_the_same_place(path: Path) -> None:
 
 
 def test_python_forgets_the_old_version(path: Path) -> None:
-    """What Python compiled of the old version goes with it: Python would not know it from the new one."""
+    """Bytecode of the old version is removed with it, because Python could not tell it from that of the new one."""
     cached = Path(py_compile.compile(str(path)))
     assert cached.exists()
     write_module(emitted("7*x**2"), path)

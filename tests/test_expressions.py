@@ -141,7 +141,7 @@ def test_sources_of_every_kind_are_read(source, expected):
     ids=lambda source: str(source)[:40],
 )
 def test_refusal_names_what_is_wrong(source, message):
-    """What is not a real, finite expression of the grammar is refused by name; nothing hangs."""
+    """Anything but a real, finite expression of the grammar is refused by name, and nothing hangs."""
     with pytest.raises((ExpressionError, NumberError)) as caught:
         read_expression(source, where="curve.graph.z")
     assert str(caught.value).startswith("curve.graph.z: ")
@@ -167,7 +167,7 @@ def test_deep_sympy_expressions_are_refused_before_the_stack_ends():
 
 @pytest.mark.parametrize("pattern", ["1+2*sin(", "x*sqrt(1+2*", "1+x*exp(-x*", "1/(x+2)/(1+x*"])
 def test_the_deepest_text_can_be_differentiated(pattern):
-    """What is read must not overrun SymPy's recursion later on."""
+    """An expression that can be read must not exceed SymPy's limit of recursion later on."""
     count = 12 if "-" in pattern or pattern.count("(") == 2 else 25
     text = pattern * count + "x"
     text += ")" * (text.count("(") - text.count(")"))

@@ -53,7 +53,7 @@ def public() -> set[str]:
 
 
 def test_every_public_name_is_explained() -> None:
-    """What is exported, and each public member, has a row; fields of states and events share one."""
+    """Every exported name and every public member has a row; fields of states and events share one."""
     shared = {"Curve.x", "Curve.z", "Leg.lam_start", "Leg.lam_end"}
     assert sorted(public() - set(defined()) - shared) == []
 
@@ -80,7 +80,7 @@ def test_the_reference_page_lists(name: str) -> None:
 
 
 def test_the_reference_page_lists_the_runtime_and_the_errors() -> None:
-    """What `solve` and `sweep` return; the errors come all together."""
+    """The page lists the types that `solve` and `sweep` return; the errors are listed all together."""
     page = (REFERENCE / "api.md").read_text(encoding="utf-8")
     missing = [name for name in ("Motion", "State", "Pass1", "Event", "Leg", "Sweep") if f"runtime.{name}" not in page]
     assert missing == []

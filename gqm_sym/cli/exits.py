@@ -54,7 +54,7 @@ def guarded(program: str, work: Callable[[], int]) -> int:
     except (RecursionError, MemoryError) as error:
         what = "nested too deeply" if isinstance(error, RecursionError) else "too large"
         return _end(f"{program}: an expression is {what}; write it in a simpler form", FAILED)
-    except Exception as error:  # a defect of this package: no traceback even then, but where it happened
+    except Exception as error:  # a defect of this package: the place of the error is printed instead of a traceback
         frame = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(frame.filename).name}:{frame.lineno}"
         what = f"{type(error).__name__}: {error}".replace("\n", " ")
@@ -63,7 +63,7 @@ def guarded(program: str, work: Callable[[], int]) -> int:
 
 @contextmanager
 def _warnings_as_lines(program: str) -> Iterator[None]:
-    """Print a warning of ours as one line; where in the package it arose helps nobody."""
+    """Print warnings of this package as one line, without their place in the package, which helps nobody."""
     with warnings.catch_warnings():
         shown = warnings.showwarning
 

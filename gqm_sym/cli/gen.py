@@ -76,7 +76,7 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     if not options.files:
         parser.error("the following arguments are required: FILE (or --init NAME)")
     if options.diff and not options.check:
-        parser.error("--diff: prints what --check finds; give both options")
+        parser.error("--diff: prints the differences that --check finds; give both options")
     if options.latex is not None and options.check:
         parser.error("--latex: writes a file, but --check writes nothing; give only one of them")
     if options.plot is not None and (options.check or options.stdout):

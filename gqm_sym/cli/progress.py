@@ -14,7 +14,7 @@ class Bar:
     stream
         The stream to draw on; by default standard error.
     things
-        What is counted.
+        The name of the things that are counted.
     """
 
     def __init__(self, stream: TextIO | None = None, things: str = "points") -> None:

@@ -65,7 +65,7 @@ def _launching() -> argparse.ArgumentParser:
 
 
 def _modules() -> argparse.ArgumentParser:
-    """Return the option that says where generated modules are."""
+    """Return the option for the folder of generated modules."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument(
         "-o",
@@ -160,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
         parents=[_modules()],
         help="fit parameters and a launch to measurements",
         description="Fit the parameters that a fit file frees to the table of measurements that it names. Print the "
-        "estimates with their standard deviations, and what the measurements cannot tell.",
+        "estimates with their standard deviations, and the numbers that the measurements do not determine.",
     )
     fit.add_argument("file", metavar="FILE", help="a fit file (YAML)")
     fit.add_argument("--json", metavar="FILE", help="also write the result to this file")

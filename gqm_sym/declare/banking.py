@@ -1,4 +1,4 @@
-"""The banking of a track in space: by an angle, or without lateral force on riders."""
+"""The banking of a track in space, given by an angle or by the condition that there is no lateral force on riders."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -24,10 +24,10 @@ class Banking:
     Attributes
     ----------
     angle
-        The roll angle in radians, in the curve's parameter and run-time parameters; None where the track is banked so
-        that the lateral force vanishes.
+        The roll angle in radians, as an expression in the curve's parameter and run-time parameters; None if the track
+        is banked so that the lateral force vanishes.
     speed
-        The speed at which it vanishes; None where that is the speed of the motion.
+        The speed at which it vanishes; None if that is the speed of the motion.
     heartline
         The height of the declared curve, which the riders follow, over the track.
     """
@@ -38,7 +38,7 @@ class Banking:
 
     @property
     def forms(self) -> tuple[sp.Expr, ...]:
-        """The expressions that it holds."""
+        """The expressions in it."""
         return tuple(form for form in (self.angle, self.speed, self.heartline) if form is not None)
 
 
@@ -47,24 +47,24 @@ def _is_coordinated(given: Any) -> bool:
 
 
 def is_formula(roll: Any) -> bool:
-    """Whether a roll is given by a formula or a word, and not by angles of points."""
+    """Return whether a roll is given by a formula or a word, and not by angles at points."""
     return isinstance(roll, str | int | sp.Expr) or (isinstance(roll, tuple | list) and len(roll) <= 2)
 
 
 def read_banking(roll: Roll | None, heartline: Source, where: str = "space") -> Banking | None:
-    """Read the arguments ``roll`` and ``heartline`` of a space curve; None where no roll is declared.
+    """Read the arguments ``roll`` and ``heartline`` of a space curve; return None if no roll is declared.
 
     Parameters
     ----------
     roll, heartline
         As `Curve.space` has them; the roll may also be the chart of angles at points.
     where
-        What declares the curve, for messages.
+        The name of the function that declares the curve, for messages.
 
     Raises
     ------
     DeclarationError
-        If they are no such thing, or there is a heartline without a roll.
+        If they are not valid, or there is a heartline without a roll.
     """
     height = read_expression(heartline, where=f"{where}: heartline", unit="m")
     if roll is None:

@@ -1,4 +1,4 @@
-"""The period of a closed curve: found from its formulas where they determine it, and verified where it is given."""
+"""The period of a closed curve, which is found from its formulas if they determine it, and verified if it is given."""
 
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -12,21 +12,21 @@ from gqm_sym.parameters import Value, tried_values
 
 Point = tuple[sp.Expr, ...]
 
-# Places at which a period is tried, and the share of the coordinates that may be left.
+# Places at which a period is verified, and the largest difference of coordinates as a share of their size.
 PLACES = (-2.71, -1.3, -0.37, 0.113, 0.59, 1.17, 1.93, 2.83)
 SHARE = 1e-6
-# Shares of a period that may be one themselves.
+# Fractions of a period that may be a period themselves.
 PRIMES = (2, 3, 5, 7, 11, 13)
 MOST_TIMES = 10
-# Heads that are real and finite for every real argument.
+# Functions that are real and finite for every real argument.
 _EVERYWHERE = (sp.sin, sp.cos, sp.exp, sp.sinh, sp.cosh, sp.tanh, sp.atan, sp.asinh, sp.Abs)
 _WAVES = (sp.sin, sp.cos)
 
 
 def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
-    """Return the least period of a curve whose coordinates are made of waves of commensurate rates.
+    """Return the smallest period of a curve whose coordinates consist of sines and cosines of commensurate rates.
 
-    None if there is no period, or if it is not certain that the curve is real and finite everywhere.
+    The result is None if there is no period, or if it is not certain that the curve is real and finite everywhere.
     """
     rates: set[sp.Expr] = set()
     if not all(_of_waves(form, lam, rates) for form in point) or not rates:
@@ -46,7 +46,7 @@ def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
 
 
 def _least_share(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr | None:
-    """The least fraction of a period after which a curve is where it was; None if the curve does not move."""
+    """Return the smallest fraction of a period after which the curve repeats; None if its point does not move."""
     for prime in PRIMES:
         for _ in range(MOST_TIMES):
             gap = _gap(point, lam, period / prime, values)
@@ -61,18 +61,18 @@ def _least_share(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[
 def check_period(
     kind: str, point: Point, lam: sp.Symbol, period: sp.Expr, defaults: Mapping[str, Value | None]
 ) -> None:
-    """Refuse a period after which the curve is somewhere else.
+    """Refuse a period after which the curve does not repeat.
 
     Raises
     ------
     DeclarationError
-        Which says how far away, and names a period where one is found.
+        If it does not; the message gives the distance, and a period if one is found.
     """
     unset = {sp.Symbol(name, real=True) for name, value in defaults.items() if value is None}
     inside = [argument for form in point for node in form.atoms(sp.Function, sp.Pow) for argument in node.args]
     told = {symbol for argument in inside if lam in argument.free_symbols for symbol in argument.free_symbols}
     if unset & (told | period.free_symbols):
-        return  # the values at run time decide
+        return  # this depends on the values at run time
     values = tried_values(defaults)
     gap = _gap(point, lam, period, values)
     if gap is None or gap <= SHARE:
@@ -85,7 +85,9 @@ def check_period(
 
 
 def _of_waves(form: sp.Expr, lam: sp.Symbol, rates: set[sp.Expr]) -> bool:
-    """Whether a form depends on λ by sines and cosines alone, and is real and finite; notes their rates."""
+    """Return whether a form depends on λ by sines and cosines alone, and is real and finite; add their rates to
+    ``rates``.
+    """
     if lam not in form.free_symbols:
         return True
     if isinstance(form, _WAVES):
@@ -114,7 +116,9 @@ def _not_negative(form: sp.Expr) -> bool:
 
 
 def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> float | None:
-    """How far a curve is from where it was a period before, at most, as a share of its size; None without numbers."""
+    """Return the largest distance between points of a curve one period apart, as a share of its size; None without
+    numbers.
+    """
     length = float(period.xreplace(dict(values)))
     functions = [sp.lambdify(lam, form.xreplace(dict(values)), "math") for form in point]
 

@@ -56,13 +56,13 @@ class Curve(Declaration):
     title
         One line of text for readers.
     positive
-        Names of run-time parameters that must be positive; checked when a module runs.
+        Names of run-time parameters that must be positive, which is checked when a module runs.
     radius
         The radius r(θ) of a polar curve in m, whose derivatives give shorter forms than those of x and z.
     definition
         The points, pieces or equation of a curve without formulas, whose coordinates are numbers.
     banking
-        How a space curve is banked; None where that is not declared.
+        The banking of a space curve; None if none is declared.
     """
 
     def in_arc_length(self) -> "Curve":

@@ -99,8 +99,8 @@ def parameter_symbol(name: str, kind: str) -> sp.Symbol:
 
 
 def check_parameter_name(name: str, kind: str) -> str:
-    """Return the name of a curve's own parameter, which alone may be called ``lam``."""
-    # "lam" is reserved because emitted functions call their argument so, and that is the curve's parameter.
+    """Return the name of a curve's own parameter, which is the only one that may be called ``lam``."""
+    # "lam" is reserved because it is the name of the argument of emitted functions that is the curve's parameter.
     own = isinstance(name, str) and name == "lam"
     return name if own else check_name(name, where=f"{kind}: parameter")
 

@@ -1,4 +1,4 @@
-"""The ends of a curve's parameter: read, and checked as far as they are numbers."""
+"""The ends of the range of a curve's parameter, which are read, and checked as far as they are numbers."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
@@ -14,12 +14,13 @@ Ends: TypeAlias = tuple[sp.Expr | None, sp.Expr | None]
 
 
 def read_ends(domain: Iterable[Source | None] | None, kind: str, unit: str | None) -> Ends:
-    """Read both ends of a domain, each None where it is open; ``unit`` is that of the parameter, None if not known.
+    """Read both ends of a domain, each of which is None if it is open; ``unit`` is that of the parameter, None if not
+    known.
 
     Raises
     ------
     DeclarationError
-        If it is not a pair.
+        If the domain is not a pair.
     """
     if domain is None:
         return (None, None)
@@ -43,7 +44,7 @@ def check_ends(kind: str, domain: Ends, period: sp.Expr | None, parameter: sp.Sy
 
 
 def check_order(kind: str, domain: Ends, period: sp.Expr | None, defaults: Mapping[str, Value | None]) -> None:
-    """Refuse ends out of order and a period that is not positive, where the defaults make numbers of them."""
+    """Refuse ends out of order and a period that is not positive, if they are numbers with the defaults."""
     values = {sp.Symbol(name, real=True): exact_value(value) for name, value in defaults.items() if value is not None}
     low, high, turn = (None if end is None else end.xreplace(values) for end in (*domain, period))
     used = {symbol.name for end in (*domain, period) if end is not None for symbol in end.free_symbols}

@@ -1,8 +1,7 @@
 """The curves of the paper's Table 3, and space curves, by name: a table with one call for each row.
 
-``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value
-is given at run time, and whose b is called ``b_e``. A new family is a row here and one in
-``tests/support/problems.py``.
+``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value is given at run time,
+and whose semi-axis b is called ``b_e``. A new family takes a row here and one in ``tests/support/problems.py``.
 """
 
 from collections.abc import Callable, Iterable
@@ -180,7 +179,7 @@ def _whole(given: object, value: int, where: str) -> sp.Expr:
     return sp.Integer(number)
 
 
-# The largest whole number that shapes a curve: derivations of more windings take minutes.
+# The largest whole number that shapes a curve; with more windings a derivation takes minutes.
 MAX_WHOLE = 12
 
 

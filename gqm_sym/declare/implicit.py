@@ -1,4 +1,4 @@
-"""Curves given by an equation F(x, z) = 0, from a start point on."""
+"""Curves given by an equation F(x, z) = 0 and a start point."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Level:
     start
         x and z of the start point, where arc length is 0.
     tangent
-        Arc length grows along (-F_z, F_x)/|grad F| where it is 1, along the opposite where it is -1.
+        If it is 1, arc length grows along (-F_z, F_x)/|grad F|; if it is -1, along the opposite direction.
     """
 
     value: sp.Expr
@@ -35,23 +35,23 @@ class Level:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the run-time parameters in it, by first appearance."""
+        """Names of the run-time parameters in it, in the order of their first appearance."""
         return tuple(name for name in names_in_order(self.value, *self.start) if name not in COORDINATES)
 
 
 def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: str) -> Level:
-    """Read and check what an implicit curve is declared by.
+    """Read and check the declaration of an implicit curve.
 
     Parameters
     ----------
     F
-        An expression in x and z; the curve is where it vanishes.
+        An expression in x and z, which vanishes on the curve.
     start
         x and z of a point of the curve: numbers, or expressions in run-time parameters.
     tangent
         1 or -1.
     parameter
-        What arc length is called.
+        The name of the arc length.
 
     Raises
     ------

@@ -1,4 +1,6 @@
-"""The units of a curve's formulas, and the curve in words: coordinates are lengths, and angles are numbers."""
+"""The units of a curve's formulas, in which coordinates are lengths and angles are numbers; and a description of the
+curve.
+"""
 
 from typing import Protocol, cast
 
@@ -34,7 +36,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def title(self) -> str:
-        """One line for people."""
+        """One line of text for readers."""
 
     @property
     def definition(self) -> object:
@@ -42,7 +44,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def banking(self) -> Banking | None:
-        """How a space curve is banked; None for any other."""
+        """The banking of a space curve; None for any other."""
 
 
 PER_LENGTH = dimension(metre=-1)
@@ -76,16 +78,16 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
 
 
 def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension | None]]:
-    """The formulas of a banking with their dimensions."""
+    """Return the formulas of a banking with their dimensions."""
     forms = ((banking.angle, NUMBER), (banking.speed, SPEED), (banking.heartline, LENGTH))
     return [(form, wanted) for form, wanted in forms if form is not None]
 
 
 def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
-    """Return what a curve's parameter is measured in; None if its formulas do not determine it immediately."""
+    """Return the dimension of a curve's parameter; None if its formulas do not determine it immediately."""
     lam = curve.parameter
     if curve.kind in ("parametric", "space"):
-        # The argument of a wave with a number for its rate is an angle.
+        # The argument of a sine or cosine whose rate is a number is an angle.
         waves = [node for _, form in curve.coordinates for node in form.atoms(sp.sin, sp.cos, sp.tan)]
         return NUMBER if any(node.args[0].free_symbols == {lam} for node in waves) else None
     return NUMBER if curve.kind == "polar" else LENGTH
@@ -100,7 +102,7 @@ def _rail_formulas(rail: Rail) -> Formulas:
         if piece.curve is None:
             total += Formulas(list(zip(piece.numbers, _PIECES[piece.kind], strict=True)))
             continue
-        # Each curve has a parameter of its own, by whatever name.
+        # Each curve has a parameter of its own, with any name.
         curve = cast(DeclaredCurve, piece.curve)
         lam = curve.parameter
         own = sp.Symbol(f"{lam.name} of {count}", real=True)

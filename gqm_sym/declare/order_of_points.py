@@ -1,4 +1,4 @@
-"""Whether points lie along a track: in order, near enough to each other, and without much scatter."""
+"""Checks that points lie along a track: in order, near enough to each other, and without much scatter."""
 
 import warnings
 from itertools import pairwise
@@ -14,7 +14,7 @@ SAME = 1e-12
 # A smooth track that turns by more than this from one chord to the next is out of order, or sampled too coarsely.
 SHARPEST = pi / 2
 
-# Planes that turn by more than this lead back along themselves.
+# Straight lines that turn by more than this lead back along themselves.
 BACKWARDS = pi - 1e-6
 
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
@@ -23,18 +23,18 @@ JUMP = 100.0
 # A chord of measured points has the direction of the track if it is this many times longer than their scatter.
 LONG = 8.0
 
-# Curvature that rises and falls by turns between more than this share of neighbours is scatter,
+# Curvature that alternately rises and falls between more than this share of neighbours is scatter,
 RESTLESS = 0.5
-# if it changes loads by this many g where a body is as fast as after a fall from one side of the track to the other.
+# if it changes loads by this many g at the speed of a body that has fallen over the size of the track.
 FELT = 0.1
 
-# So many turns in a row, to alternating sides and by more than this, are a zigzag through which no smooth track passes:
-# the lengths of the spline between such points never settle.
+# So many successive turns to alternating sides by more than this are a zigzag through which no smooth track passes: the
+# lengths of the spline between such points do not converge.
 ZIGZAGS, ZIGZAG = 5, pi / 9
 
 
 def extent(places: list[Place]) -> float:
-    """The longer side of the box around all points."""
+    """Return the longer side of the box around all points."""
     if not places:
         return 0.0
     return float(max(max(axis) - min(axis) for axis in zip(*places, strict=True)))
@@ -71,7 +71,7 @@ def _chords(places: list[Place], joined: bool) -> list[float]:
 
 
 def _turns(places: list[Place], joined: bool) -> list[float]:
-    """By how much the track turns at each point between two others; in space it has no sign."""
+    """Return the angle by which the track turns at each point between two others; in space it has no sign."""
     around = [*places, *places[:2]] if joined else places
     if len(places[0]) == IN_SPACE:
         steps = [tuple(there - here for here, there in zip(*pair, strict=True)) for pair in pairwise(around)]
@@ -81,7 +81,7 @@ def _turns(places: list[Place], joined: bool) -> list[float]:
 
 
 def _angle(one: Place, two: Place) -> float:
-    """The angle between two vectors in space."""
+    """Return the angle between two vectors in space."""
     crossed = [one[i] * two[j] - one[j] * two[i] for i, j in ((1, 2), (2, 0), (0, 1))]
     return atan2(hypot(*crossed), sum(first * second for first, second in zip(one, two, strict=True)))
 
@@ -114,8 +114,9 @@ def _refuse_turn(turn: float, row: int) -> None:
 def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
     """Warn of a curvature that changes its sign from point to point, which the curvature of a real track does not.
 
-    Scatter of points at distances h is in the curvature over h**2. Where it is most of that, the sign changes between
-    most neighbours; that the sign of the curvature's changes does shows it earlier, and on a loop as well.
+    Scatter of points at distances h contributes to the curvature divided by h**2. If it dominates the curvature, the
+    sign of the curvature changes between most neighbours; the sign of the curvature's changes shows it earlier, and on
+    a loop as well.
     """
     chords = _chords(places, joined)
     if joined:

@@ -1,4 +1,4 @@
-"""Points of a curve with formulas, for a picture of it."""
+"""Points of a curve with formulas, for drawing it."""
 
 from collections.abc import Mapping
 from math import pi
@@ -17,12 +17,12 @@ SAMPLES = 400
 
 
 def values_of(curve: "Curve", given: Mapping[str, Any]) -> dict[str, Any]:
-    """The value of each run-time parameter, as it was given or by its default.
+    """Return the value of each run-time parameter: the given one, or its default.
 
     Raises
     ------
     ParameterError
-        If one has no value.
+        If a parameter has no value.
     """
     values = {**dict(curve.defaults), **given}
     for name, value in values.items():
@@ -32,7 +32,8 @@ def values_of(curve: "Curve", given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def outline(curve: "Curve", lam: Any, given: Mapping[str, Any]) -> tuple[list[float], ...]:
-    """The coordinates x and z, or x, y and z, of points of a curve with formulas, in order; NaN where it has none.
+    """Return the coordinates x and z, or x, y and z, of successive points of a curve with formulas; NaN where they are
+    not real.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rails put together from pieces: lines, arcs, clothoids, transitions in space and curves with formulas."""
+"""Rails that consist of pieces: lines, arcs, clothoids, transitions in space and curves with formulas."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,20 +12,20 @@ from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
 from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
 
-# What each standard piece is given by; the first of them must be positive.
+# The arguments of each standard piece; the first of them must be positive.
 STANDARD = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
 # The highest power of s in the rates of a transition.
 MAX_POWER = 5
-# An arc by a larger angle is meant in degrees.
+# A larger angle of an arc was probably meant in degrees.
 MAX_ARC = 4.0 * pi
-# The SI units of these.
+# The SI units of these arguments.
 DISTANCE = sp.Symbol("s", real=True)
 _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kappa_end": "1/m"}
 
 
 @runtime_checkable
 class FormulaCurve(Protocol):
-    """The attributes that a rail needs of a piece with formulas; `curve.Curve` has them."""
+    """The attributes of a piece with formulas that a rail uses; `curve.Curve` has them."""
 
     @property
     def kind(self) -> str:
@@ -45,7 +45,7 @@ class FormulaCurve(Protocol):
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Those promised to be positive."""
+        """The run-time parameters that must be positive."""
 
     @property
     def defaults(self) -> tuple[tuple[str, Value | None], ...]:
@@ -61,8 +61,8 @@ class Piece:
     kind
         "line", "arc", "clothoid", "transition" or "curve".
     numbers
-        What `STANDARD` says, or the ends of the curve's parameter; of a transition its length, then the coefficients
-        of yaw, of pitch and of roll, lowest power first.
+        The arguments listed in `STANDARD`, or the ends of the curve's parameter; for a transition its length, then the
+        coefficients of yaw, of pitch and of roll, lowest power first.
     curve
         The curve, if the piece is one with formulas.
     """
@@ -79,15 +79,15 @@ class Rail:
     Attributes
     ----------
     start
-        x, z and heading, or x, y and z, heading, climb and roll; None where the first piece has a place of its own.
+        x, z and heading, or x, y and z, heading, climb and roll; None if the first piece has a place of its own.
     pieces
-        In order.
+        The pieces, in order.
     closed
-        Whether the last is joined to the first.
+        Whether the last piece is joined to the first.
     in_space
-        Whether it has three coordinates.
+        Whether the rail has three coordinates.
     banked
-        Whether the roll of its pieces is that of the track.
+        Whether the roll of the pieces is that of the track.
     """
 
     start: tuple[sp.Expr, ...] | None
@@ -196,7 +196,7 @@ def transition(*, length: Source, yaw: Source = 0, pitch: Source = 0, roll: Sour
 
 
 def _polynomial(given: Source, name: str) -> tuple[sp.Expr, ...]:
-    """The coefficients of a rate in powers of s, lowest first."""
+    """Return the coefficients of a rate in powers of s, lowest first."""
     rate = sp.expand(read_expression(given, where=f"transition: {name}", unit="1/m"))
     found = tuple(rate.coeff(DISTANCE, power) for power in range(MAX_POWER + 1))
     rest = sp.expand(rate - sp.Add(*(c * DISTANCE**power for power, c in enumerate(found))))
@@ -232,12 +232,12 @@ def declare_rail(
     parameters: Parameters | None,
     forms: tuple[sp.Expr, ...] = (),
 ) -> tuple[Rail, tuple[tuple[str, Value | None], ...], tuple[str, ...]]:
-    """Read and check the pieces of a rail, whose run-time parameters are those of other forms too.
+    """Read and check the pieces of a rail; ``forms`` are further expressions in its run-time parameters.
 
     Returns
     -------
     rail, defaults, positive
-        The definition, the run-time parameters with their defaults, and those promised to be positive.
+        The definition, the run-time parameters with their defaults, and those that must be positive.
     """
     flag(closed, where="piecewise: closed")
     what = "pieces in a list, as in [line(length=2), arc(radius=1, angle=pi)]"
@@ -307,7 +307,7 @@ def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_spac
 def _parameters(
     rail: Rail, parameters: Parameters | None, forms: tuple[sp.Expr, ...]
 ) -> tuple[tuple[tuple[str, Value | None], ...], tuple[str, ...]]:
-    """Join the parameters of all pieces; a name means the same in each."""
+    """Join the parameters of all pieces; a name has the same meaning in each."""
     found = dict.fromkeys(names_in_order(*(rail.start or ())))
     own: dict[str, Value | None] = {}
     positive: dict[str, None] = {}

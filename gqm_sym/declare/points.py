@@ -1,4 +1,4 @@
-"""Points of a track, read row by row in any of the ways in which they are given; each keeps its exact text."""
+"""Points of a track, which are read row by row from any of the accepted forms; each point keeps its exact text."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,7 +19,9 @@ _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def in_metres(given: Any) -> Any:
-    """Lengths that were given as quantities, alone or in sequences, as numbers of metres; anything else as it is."""
+    """Convert lengths that were given as quantities, alone or in sequences, to numbers of metres; return anything else
+    unchanged.
+    """
     if is_quantity(given):
         high, _, shape = read_numbers(given, where="sampled", unit="m")
         return high.reshape(shape).tolist()
@@ -35,10 +37,10 @@ def _holds_quantity(given: Any) -> bool:
 
 
 def as_rows(points: Any, z: Any) -> tuple[Any, Any]:
-    """Points as rows, whichever way they were given, and their roll angles in a table that has them."""
+    """Return points in any accepted form as rows, and their roll angles if they are a table with these."""
     if z is not None:
         return _paired("sampled: x and z", points, z), None
-    # Any kind of table will do, whoever made it.
+    # Any kind of table is accepted.
     names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
     if names is None:
         return points, None
@@ -55,7 +57,7 @@ def as_rows(points: Any, z: Any) -> tuple[Any, Any]:
 
 
 def _paired(where: str, *columns: Any) -> list[tuple[Any, ...]]:
-    """Rows of two or three columns."""
+    """Return rows of two or three columns."""
     read = [_column(column, where) for column in columns]
     if len({len(column) for column in read}) > 1:
         lengths = " and ".join(str(len(column)) for column in read)
@@ -69,12 +71,12 @@ def _column(values: Any, where: str) -> tuple[Any, ...]:
 
 
 def read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
-    """Read rows of two coordinates or three: the text and the values of each."""
+    """Read rows of two or three coordinates; return the text and the values of each."""
     if isinstance(points, str):
         raise DeclarationError(
             f"sampled: points: must be rows of x and z, got {short(points)}; read a file first, by gqm_sym.read_track"
         )
-    # An array of numbers gives Python's own floats at once, which is many times quicker than row by row.
+    # An array of numbers is converted to Python's floats at once, which is many times faster than row by row.
     rows = points.tolist() if hasattr(points, "tolist") else points
     try:
         numbered = enumerate(rows, start=1)
@@ -97,19 +99,20 @@ def read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
 
 
 def _read(value: Any, count: int) -> tuple[str, float]:
-    """A coordinate's text and value."""
+    """Return a coordinate's text and value."""
     if isinstance(value, str | Decimal):
         text = str(value).strip()
         if not _DECIMAL.fullmatch(text):
             raise DeclarationError(f"sampled: row {count}: {text[:40]!r} is not a decimal number")
     elif isinstance(value, bool):
-        raise DeclarationError(f"sampled: row {count}: {value} is no number")
+        raise DeclarationError(f"sampled: row {count}: {value} is not a number")
     else:
         try:
-            # All digits of a float, which means its binary value and not the shortest decimal that is read as it.
+            # All digits of a float are kept, because it means its binary value and not the shortest decimal that is
+            # read as it.
             text = str(value) if isinstance(value, int) else str(Decimal(float(value)))
         except (TypeError, ValueError, OverflowError):
-            raise DeclarationError(f"sampled: row {count}: {value!r:.40} is no number") from None
+            raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not a number") from None
     number = float(text)
     if not isfinite(number):
         raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not finite; leave the row out or mend it")
@@ -117,7 +120,7 @@ def _read(value: Any, count: int) -> tuple[str, float]:
 
 
 def read_angles(given: Any, places: list[Place]) -> list[str]:
-    """Read the roll angle at each point, and return its text; none where none are given."""
+    """Read the roll angle at each point, and return its text; return no texts if there are no angles."""
     if given is None:
         return []
     if places and len(places[0]) != IN_SPACE:

@@ -1,4 +1,4 @@
-"""Tracks known as polynomials, piece by piece: what the functions of `gqm_sym.design` find."""
+"""Tracks that are known as polynomials, piece by piece; the functions of `gqm_sym.design` find such tracks."""
 
 from dataclasses import dataclass
 
@@ -10,8 +10,8 @@ class PolynomialPieces:
     Attributes
     ----------
     pieces : str
-        A line for each piece: both ends of its parameter u, then the coefficients of x and those of z in powers of u,
-        equally many, as decimal numbers. Pieces meet exactly.
+        A line for each piece: both ends of its parameter u, then the coefficients of x and as many of z, in powers of
+        u, as decimal numbers. Pieces meet exactly.
     origin : int
         The number of pieces before the place where arc length is 0.
     breaks : tuple of int

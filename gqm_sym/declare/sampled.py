@@ -1,7 +1,7 @@
 """Tracks given by points: checked row by row, and kept as the exact text of their coordinates.
 
-Points that were smoothed are kept instead of those that were measured: a module has no more to do than to go through
-them, and a smooth track needs fewer of them.
+Smoothed points are kept in place of the measured ones: a module only has to pass through them, and a smooth track needs
+fewer of them.
 """
 
 from dataclasses import dataclass, field
@@ -19,33 +19,35 @@ if TYPE_CHECKING:
     from gqm_sym.smoothing import Smoothing
 
 KINDS = ("spline", "linear")
-# The fewest different points: a quintic polynomial has six; a closed ring of planes is a triangle.
+# The smallest number of different points: a quintic polynomial has six coefficients, and a closed track of straight
+# lines is at least a triangle.
 FEWEST = {("spline", False): 6, ("spline", True): 6, ("linear", False): 2, ("linear", True): 3}
-# The first and the last point nearer than this share of the track's size: the track closes.
+# A track is closed if its first and its last point are nearer to each other than this share of its size.
 CLOSES = 1e-9
-# Tracks are as large as this, in m: fourth powers of the distances of points are doubles, and so are their inverses.
+# The smallest and the largest size of a track in m: fourth powers of the distances of points, and their inverses, must
+# be in the range of doubles.
 SIZES = 1e-60, 1e60
-# Points do not scatter by more than this, in m; squares of it are doubles.
+# The smallest and the largest scatter of points in m; its square must be in the range of doubles.
 MAX_DEVIATION = 1e100
-# Cross-validation needs more points than a spline does.
+# The smallest number of points for cross-validation, which needs more than a spline does.
 FEWEST_AUTO = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """Points and what lies between them.
+    """Points, and the kind of curve between them.
 
     Attributes
     ----------
     points : str
-        One point a line, x and z, or x, y and z, and perhaps the roll angle, as decimal numbers. A closed track does
-        not repeat its first point.
+        One line for each point, with x and z, or x, y and z, and possibly the roll angle, as decimal numbers. A closed
+        track does not repeat its first point.
     kind : {"spline", "linear"}
         A quintic spline, or straight lines between the points.
     closed : bool
-        Whether the track goes on from the last point to the first.
+        Whether the track continues from the last point to the first.
     smoothing : Smoothing or None
-        What smoothing did to the points as measured, if they were smoothed.
+        The changes that smoothing made to the measured points, if they were smoothed.
     """
 
     points: str
@@ -82,30 +84,30 @@ def read_track(
     Parameters
     ----------
     points
-        Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or a
-        table with columns x and z, perhaps also y; or the x of all points.
+        Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept unchanged; or a
+        table with columns x and z, and possibly y; or the x of all points.
     z
-        The heights of the points, where ``points`` are their x.
+        The heights of the points, if ``points`` are their x.
     kind
         "spline" or "linear".
     closed
-        Whether the track closes; None: if its last point is its first.
+        Whether the track is closed; by default it is if its last point equals its first.
     smoothing
-        The standard deviation of the points in metres, "auto", or None: the track goes through them.
+        The standard deviation of the points in metres, or "auto"; by default the track passes through the points.
     roll
-        In space the roll angle at each point, in radians; None: that of a table which has one. What is no such thing,
-        as a formula, is not for points.
+        In space the roll angle at each point in radians; by default that of a table which has one. A roll in another
+        form, such as a formula, is ignored here.
 
     Raises
     ------
     DeclarationError
-        If a row is no point, or points are too few, repeated, out of order or far away; the message names the row,
-        counted from 1.
+        If a row is not a point, or points are too few, repeated, out of order or too far away; the message names the
+        row, counted from 1.
 
     Warns
     -----
     NoisyPointsWarning
-        If the track's curvature goes up and down from point to point.
+        If the curvature of the track rises and falls from point to point.
     """
     one_of(kind, KINDS, where="sampled: kind")
     if not (closed is None or isinstance(closed, bool)):
@@ -131,11 +133,11 @@ def read_track(
     in_space = bool(places) and len(places[0]) == IN_SPACE
     if in_space and kind != "spline":
         raise DeclarationError(
-            f"sampled: kind {kind!r} is for tracks of x and z only yet; in space declare a spline, of points dense "
+            f"sampled: kind {kind!r} is so far only for tracks of x and z; in space declare a spline, of points dense "
             "enough where the track bends"
         )
     rows = list(range(1, len(places) + 1))
-    if deviation is not None:  # what a recorder that waits for news says again was not measured again
+    if deviation is not None:  # a recorder repeats its last value until there is a new one
         rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
         places = [places[row - 1] for row in rows]
         angles = [angles[row - 1] for row in rows] if angles else angles
@@ -159,7 +161,7 @@ def read_track(
 
 
 def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
-    """The standard deviation of points, "auto" for cross-validation, or None for points that are exact."""
+    """Return the standard deviation of points, "auto" for cross-validation, or None for exact points."""
     if given is None:
         return None
     if kind != "spline":
@@ -185,7 +187,7 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
 def _smoothed(
     places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"], angles: list[str]
 ) -> tuple[list[Place], "Smoothing"]:
-    """The points of the smooth track, and what smoothing did."""
+    """Return the points of the smooth track, and the changes that smoothing made."""
     from gqm_sym.smoothing import smooth
 
     known = None if deviation == "auto" else deviation

@@ -1,9 +1,11 @@
-"""Places inside a curve where its formulas have no continuous tangent or curvature, and powers that need a side.
+"""Places inside a curve at which its formulas have no continuous tangent or curvature, and powers that are real on one
+side only.
 
-A corner takes a rule for what a body does there, and an infinite curvature an infinite contact force: neither is a
-formula's. Where curvature jumps, the contact force does, and a motion must be followed to the joint and on from it.
-A cusp is allowed: the tangent turns round, and a motion ends there. Where an argument of an absolute value changes its
-sign, or the base of a root has a zero of even order, tangents and curvatures to both sides are compared.
+At a corner a rule is needed for the behaviour of a body, and at an infinite curvature the contact force is infinite;
+formulas cannot describe either. Where the curvature jumps, so does the contact force, and a motion must be computed up
+to the joint and from there on. A cusp is allowed: the tangent reverses its direction, and a motion ends there. At
+places where the argument of an absolute value changes its sign, or the base of a root has a zero of even order, the
+tangents and curvatures on both sides are compared.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,12 +25,14 @@ from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.errors import DeclarationError
 from gqm_sym.parameters import Value, tried_values
 
-# Places of a range that are looked at, and their distance where it has no ends.
+# The number of places of a range that are examined, and their distance if the range has no ends.
 PLACES = 120
 STEP = sp.Rational(37, 100)
-# To both sides of a place, relative to its size, and digits to see them by.
+# The distances of places on both sides of a place, relative to its size, and the number of digits with which they are
+# distinguished.
 NEAR, NEARER, DIGITS = sp.Float("1e-12", 90), sp.Float("1e-24", 90), 90
-# Unit tangents that differ by less than this are one; curvatures that grow by more, towards a place, grow for ever.
+# Unit tangents that differ by less than this are equal; curvatures that grow by more than this factor towards a place
+# are infinite there.
 SAME, GROWS = 1e-3, 10
 
 Function = Callable[[float], float]
@@ -36,12 +40,13 @@ Vector = tuple[sp.Expr, ...]
 
 
 def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
-    """Refuse a curve inside whose domain the tangent jumps, or the curvature does or is infinite.
+    """Refuse a curve whose tangent or curvature jumps inside the domain, or whose curvature is infinite there.
 
     Raises
     ------
     DeclarationError
-        With the place, for the defaults; parameters without one are taken to be of the order of 1.
+        If there is such a place; the message names it for the defaults. Parameters without a default are taken to be of
+        the order of 1.
     """
     lam, values = curve.parameter, tried_values(defaults)
     for zero in dict.fromkeys(_zeros(curve.point, lam)):
@@ -55,12 +60,13 @@ def check_powers(
     curve: Curve,
     defaults: Mapping[str, Value | None],
 ) -> None:
-    """Refuse u**n with n given at run time where u is negative somewhere: whether it is real there depends on n.
+    """Refuse u**n with an exponent that is given at run time if u is negative somewhere, because it may not be real
+    there.
 
     Raises
     ------
     DeclarationError
-        Which names the form, the power and what to write instead.
+        If there is such a power; the message names the form, the power and a remedy.
     """
     lam, values = curve.parameter, tried_values(defaults)
     for label, form in forms:
@@ -80,13 +86,13 @@ def check_powers(
 
 
 def without_known_bars(form: sp.Expr, signs: Signs) -> sp.Expr:
-    """Write |u| as u or -u where u has one sign on the domain."""
+    """Replace |u| by u or -u if u has one sign on the domain."""
     known = {bar: signs.sign(bar.args[0]) for bar in form.atoms(sp.Abs)}
     return form.xreplace({bar: sign * bar.args[0] for bar, sign in known.items() if sign is not None})
 
 
 def _zeros(forms: Iterable[sp.Expr], lam: sp.Symbol) -> Iterator[sp.Expr]:
-    """Yield the expressions that may change sign under an absolute value, or in even powers under a root."""
+    """Yield the expressions that may change sign inside an absolute value, or in even powers under a root."""
     for form in forms:
         for node in sorted(form.atoms(sp.Abs, sp.Pow), key=sp.default_sort_key):
             inner = node.args[0]
@@ -120,7 +126,7 @@ def _function(form: sp.Expr, lam: sp.Symbol, values: Mapping[sp.Symbol, sp.Expr]
 
 
 def _sampled(function: Function, curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> Iterator[tuple[float, float]]:
-    """Places inside the domain with the values there, where these are real numbers."""
+    """Return places inside the domain and the values there, as far as these are real numbers."""
     low, high = (None if end is None else end.xreplace(values) for end in curve.domain)
     if low is not None and high is not None:
         places = [low + (high - low) * sp.Rational(2 * k + 1, 2 * PLACES) for k in range(PLACES)]
@@ -140,15 +146,15 @@ def _sampled(function: Function, curve: Curve, values: Mapping[sp.Symbol, sp.Exp
 
 
 def _changes(function: Function, curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> Iterator[tuple[float, float]]:
-    """Pairs of places between which a function changes its sign."""
+    """Return pairs of places between which a function changes its sign."""
     pairs = pairwise(_sampled(function, curve, values))
     found = [(low, high) for (low, before), (high, after) in pairs if before * after < 0.0]
-    # Those near 0 first, where people look.
+    # Places near 0 come first, because readers look there.
     yield from sorted(found, key=lambda ends: abs(ends[0] + ends[1]))
 
 
 def _root(form: sp.Expr, lam: sp.Symbol, low: float, high: float) -> sp.Expr:
-    """Halve an interval until it is one place, in many digits."""
+    """Halve an interval until it is a single place, to many digits."""
     a, b = sp.Float(low, DIGITS), sp.Float(high, DIGITS)
     rising = form.xreplace({lam: b}).evalf(DIGITS) > 0
     while abs(b - a) > sp.Float("1e-80", DIGITS):
@@ -162,7 +168,7 @@ def _root(form: sp.Expr, lam: sp.Symbol, low: float, high: float) -> sp.Expr:
 
 
 def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, at: sp.Expr) -> None:
-    """Compare the tangents to both sides of a place, and the curvature with that nearer to it."""
+    """Compare the tangents on both sides of a place, and the curvatures at decreasing distances from it."""
     lam = curve.parameter
     first = [differentiate(form, lam) for form in curve.point]
     forms = [form.xreplace(values) for form in (*first, *(differentiate(form, lam) for form in first))]
@@ -205,7 +211,7 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
 
 
 def _tangent_and_curvature(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, Vector] | None:
-    """The unit tangent and the curvature by each pair of coordinates; None where they are not real numbers."""
+    """Return the unit tangent and the curvature for each pair of coordinates; None if they are not real numbers."""
     values = [form.xreplace({lam: place}).evalf(DIGITS) for form in forms]
     if not all(value.is_real and value.is_finite for value in values):
         return None

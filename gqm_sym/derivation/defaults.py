@@ -14,7 +14,7 @@ def join(curve: Curve, kernel: Kernel, given: Mapping[str, Given | None]) -> tup
     Raises
     ------
     DeclarationError
-        If a name means two things, a default belongs to no parameter, or is out of its range.
+        If a name has two meanings, or a default belongs to no parameter or is out of range.
     """
     own, forced = dict(curve.defaults), dict(kernel.defaults)
     lam = curve.parameter.name
@@ -59,7 +59,7 @@ def _refuse_own_names(names: tuple[str, ...]) -> None:
 
 
 def _refuse_strangers(kernel: Kernel, names: tuple[str, ...]) -> None:
-    """Refuse what a law of the user's own calls by a name that nothing has here."""
+    """Refuse names in a user's own law that mean nothing here."""
     known = {*names, *COORDINATES, Y.name, W.name, DIRECTION.name}
     for symbol in sorted(kernel.tangential_law.free_symbols, key=str):
         if symbol.name not in known:

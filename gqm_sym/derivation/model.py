@@ -23,14 +23,14 @@ from gqm_sym.parameters import Value, in_words
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium
 
-# Characters of a closed form that a printed model shows.
+# The largest number of characters of a closed form that a printed model shows.
 MOST_SHOWN = 160
-# Variables of integration, as texts and as LaTeX.
+# Variables of integration, as text and as LaTeX.
 _DASHES = (("_", "'"), ("__", "''"))
 
 
 def _read_v2(given: Any) -> sp.Expr:
-    """V² as an expression."""
+    """Return V² as an expression."""
     return given if isinstance(given, sp.Expr) else read_expression(given, where="v2")
 
 
@@ -67,7 +67,7 @@ class Model:
     inertia
         1 + β.
     effective_potential, effective_potential_slope
-        U = Φ/inertia in m²/s², so that W + 2U is constant along a motion, and dU/dλ.
+        U = Φ/inertia in m²/s², for which W + 2U is constant along a motion without losses, and dU/dλ.
     symmetry
         The places about which the effective potential and σ are even; None if none was found, or nothing repeats.
     symmetric_orbits
@@ -95,7 +95,7 @@ class Model:
     side_force
         The force in N out of the plane of a planar track that rotates; 0 for a track at rest, and in space.
     tangential_acceleration
-        A in m/s², so that dW/ds = 2 A; it contains ``W`` in a dissipative model.
+        A in m/s², where dW/ds = 2 A; it contains ``W`` in a dissipative model.
     time_integrand
         dt/dλ = σ/√W, in s per unit of λ.
     regularised_integrand
@@ -115,8 +115,8 @@ class Model:
     level_set
         F of an implicit curve with its derivatives, tangent and curvature, as functions of x and z.
     sided
-        Whether the sign of N, or of its part along the upward direction of riders on a banked space curve, tells on
-        which side of the track a body is.
+        Whether the sign of N, or of its component along the upward direction of riders on a banked space curve, shows
+        on which side of the track a body is.
     rider
         The loads on a rider of a banked space curve; None for other curves.
     """
@@ -185,7 +185,7 @@ class Model:
 
     @property
     def domain(self) -> tuple[sp.Expr | None, sp.Expr | None]:
-        """The two ends of the range of λ, each None where it is open."""
+        """The two ends of the range of λ, each of which is None if it is open."""
         return self.curve.domain
 
     @property
@@ -237,7 +237,7 @@ class Model:
         return along_x, along_y, along_z
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
-        """The vector t × N/m, which has the length of N/m."""
+        """Return the vector t × N/m, which has the length of N/m."""
         return turned_force(self.bend, self.loads, self.coriolis, v2)
 
     @property
@@ -251,7 +251,7 @@ class Model:
     def closed_forms(self) -> tuple[tuple[str, sp.Basic], ...]:
         """Return the closed forms in the order in which they are printed, each with its label.
 
-        In those of a dissipative model V² is the symbol W.
+        In a dissipative model V² is written as the symbol W.
         """
         lam = self.parameter.name
         force, side, rate = self.normal_force, self.side_force, self.time_integrand
@@ -279,13 +279,13 @@ class Model:
         )
 
     def equilibria(self, *, between: Any = None, **parameters: Any) -> "tuple[Equilibrium, ...]":
-        """Find where a body at rest stays, whether it is stable there, and how fast it swings about it.
+        """Find the places at which a body at rest stays, their stability, and the frequency of small oscillations about
+        them.
 
         Parameters
         ----------
         between
-            The range of the curve parameter to look in, a pair of numbers; the whole domain, or one period, if not
-            given.
+            The range of the curve parameter to search, a pair of numbers; by default the whole domain, or one period.
         parameters
             Run-time parameters, by name.
 
@@ -298,9 +298,9 @@ class Model:
         Raises
         ------
         InputError
-            If a parameter is unknown or missing, or the range is none.
+            If a parameter is unknown or missing, or the range is not valid.
         SolutionError
-            If a body rests anywhere on a stretch, or there are too many equilibria to be listed.
+            If the potential is constant, or there are too many equilibria to be listed.
         """
         from gqm_sym.building import transient
 
@@ -356,7 +356,7 @@ class Model:
 
     def _latex_names(self) -> dict[sp.Symbol, str]:
         lam = sp.latex(self.parameter)
-        # A parameter that carries an index already keeps it: λ_{1} becomes λ_{1,0}.
+        # A parameter that already has an index keeps it: λ_{1} becomes λ_{1,0}.
         launch = f"{lam[:-1]},0}}" if lam.endswith("}") and "_{" in lam else f"{lam}_{{0}}"
         return {
             self.lam0: launch,

@@ -122,7 +122,7 @@ def derive(
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
         curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
-    # A frame that turns pushes a body out of every vertical plane.
+    # A rotating frame pushes a body out of every vertical plane.
     heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
         if not curve.in_space:
@@ -149,7 +149,7 @@ def derive(
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
     axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
-    if axes and kernel.radius:  # of the path of a body's centre the sign of σ is known by numbers only
+    if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
         axes = replace(axes, monotone=False)
     start = {lam: LAM0}
     model = Model(
@@ -214,18 +214,18 @@ def derive(
 
 
 def _refuse_planar_forces(kernel: Kernel) -> None:
-    """Refuse forces that are known for planar curves only."""
+    """Refuse forces that are defined for planar curves only."""
     refused = (
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
         ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
     )
     for name, given, what in refused:
         if given:
-            raise DeclarationError(f"derive: {name}: {what} is known for planar curves only yet; leave it out")
+            raise DeclarationError(f"derive: {name}: {what} is so far known for planar curves only; leave it out")
 
 
 def _refuse_of_train(kernel: Kernel) -> None:
-    """Refuse what is not known of a train."""
+    """Refuse forces and curves for which trains are not supported."""
     refused = (
         ("surface_tension", kernel.resistance, "a droplet's resistance"),
         ("rotating_frame", kernel.spin, "a turning frame"),
@@ -248,7 +248,7 @@ def _losses(
             f"derive: {shape.cusp} may vanish, which is a cusp; losses of energy on space curves with cusps are not "
             "supported yet, so give a domain without one"
         )
-    # A curve's own parameter may be called x, and then means that in a law.
+    # A curve's own parameter may be called x, and x then means the parameter in a law.
     coordinates = {symbol: form for symbol, form in zip((X, Y, Z), place, strict=True) if symbol != lam}
     pieces = {
         **{SIGMA: shape.ds, KAPPA: shape.kappa, TURN: shape.turning_rate, TILT: shape.dxds},

@@ -1,4 +1,6 @@
-"""Whether a curve is real anywhere: ``asin(2 + x**2)`` is an expression like any other, and nowhere a height."""
+"""A check that a curve is real somewhere: ``asin(2 + x**2)``, for example, is an expression that is never a real
+height.
+"""
 
 from collections.abc import Iterable, Mapping
 
@@ -8,7 +10,7 @@ from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import is_real_at
 from gqm_sym.parameters import Value, exact_value
 
-# Where to look on a range without ends, and shares of one with ends.
+# The places that are tried on a range without ends, and the shares of a range with ends.
 _PLACES = tuple(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90))
 _SHARES = tuple(sp.Rational(n, 97) for n in (5, 17, 29, 41, 53, 67, 79, 91))
 
@@ -24,8 +26,9 @@ def check_somewhere_real(
     Raises
     ------
     DeclarationError
-        Naming the form. One that is real somewhere passes: where it is not, the motion ends. So does
-        one whose parameters have no defaults: ``sqrt(1 - e_0**2)`` is real for the values it is meant for.
+        If a form is never real; the message names it. A form that is real somewhere is accepted: where it is not, the
+        motion ends. A form whose parameters have no defaults is accepted too: ``sqrt(1 - e_0**2)`` is real for the
+        values for which it is meant.
     """
     values = {sp.Symbol(name, real=True): exact_value(value) for name, value in defaults.items() if value is not None}
     unset = {sp.Symbol(name, real=True) for name, value in defaults.items() if value is None}
@@ -44,7 +47,7 @@ def check_somewhere_real(
 
 
 def tried_places(domain: tuple[sp.Expr | None, sp.Expr | None]) -> list[sp.Expr]:
-    """Places of a range at which to try a form."""
+    """Return places of a range at which to try a form."""
     low, high = domain
     if low is not None and high is not None:
         return [low + (high - low) * share for share in _SHARES]

@@ -1,4 +1,4 @@
-"""Launches and tracks found from what a motion should do; the tracks are curves like any other."""
+"""Launches and tracks that are determined from requirements on a motion; the tracks are curves like any other."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -1,13 +1,13 @@
 """The curve of quickest descent from rest, with dry friction by the whole contact force of the track.
 
 With the tangent's angle alpha, Y = V**2 exp(2 mu alpha) obeys dY/ds = -2 g exp(2 mu alpha) (sin(alpha) + mu cos(alpha))
-where N > 0: the curvature has dropped out, and alpha is the control of a problem with the states x, z and Y.
+where N > 0. The curvature has dropped out, and alpha is the control of a problem with the states x, z and Y.
 Pontryagin's conditions give V as a function of alpha; with tau = tan(alpha), of which tau1 is the value at the end,
 
     dx = C (tau**2 - 2 mu tau + 1 + 2 mu tau1)/(tau**2 + 2 mu tau + 1 - 2 mu tau1)**3 dtau,   dz = tau dx,
 
-from tau = -oo on. N is positive all along. In the angle psi from 0 on, tau + mu = -k cot(psi) with
-k**2 = 1 - mu**2 - 2 mu tau1, both coordinates are sums of waves. Without friction the curve is the cycloid.
+beginning with tau = -oo. N is positive on the whole curve. In terms of the angle psi >= 0 with tau + mu = -k cot(psi),
+k**2 = 1 - mu**2 - 2 mu tau1, both coordinates are sums of sines and cosines. Without friction the curve is the cycloid.
 """
 
 from collections.abc import Sequence
@@ -35,25 +35,25 @@ def brachistochrone(to: Sequence[Source], *, mu: Source = 0, title: str = "") ->
         x and z of the place in m; z is negative.
     mu : number
         Coefficient of dry friction between body and track (`CoulombFriction`). The friction is that of the whole
-        contact force, also of the part that comes from the track's curvature.
+        contact force, including the part due to the track's curvature.
     title : str
         One line of text for readers.
 
     Returns
     -------
     Curve
-        In an angle ``psi`` in rad, from 0, the start, to the end of its domain, the place. It does not depend on
-        gravity. Without friction it is a cycloid whose wheel has turned by 2*psi.
+        The curve with an angle ``psi`` in rad as its parameter, from 0 at the start to the end of its domain at the
+        place. It does not depend on gravity. Without friction it is a cycloid whose wheel has turned by 2*psi.
 
     Raises
     ------
     DeclarationError
-        If the place is so high that a body with this friction does not get there from rest.
+        If the place is so high that a body with this friction does not reach it from rest.
 
     Notes
     -----
-    The closed form in textbooks leaves out the force that comes from the curvature, so that its curve is slower: to
-    (1, -0.45) with mu = 0.3 the body does not even arrive.
+    The closed form in textbooks omits the force due to the curvature, so that its curve is slower: with mu = 0.3 the
+    body does not even reach (1, -0.45).
 
     Examples
     --------
@@ -116,7 +116,7 @@ def _waves(k: Any, tau: Any, mu: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]
 
 
 def _along(row: tuple[Any, ...], psi: Any, op: Any) -> Any:
-    """Return the integral from 0 to psi of a sum of waves."""
+    """Return the integral from 0 to psi of a sum of sines and cosines."""
     mean, cosine, sine, cosine_2, sine_2 = row
     return (
         mean * psi

@@ -18,14 +18,14 @@ from gqm_sym.runtime.launch.request import LaunchRequest, check_contact, read_la
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
 from gqm_sym.runtime.motion.extremes import grid_peaks
 
-# Steps of the first grid over the range; a maximum narrower than one step may be missed.
+# The number of steps of the first grid over the range; a maximum narrower than one step may be missed.
 FIRST_STEPS = 4096
 
-# Points of each finer grid around the maximum, and the number of such grids: each step is a 16th of the one before, so
-# that the last is 2**-48 of the first.
+# The number of points of each finer grid around the maximum, and the number of such grids: each step is a 16th of the
+# one before, so that the last is 2**-48 of the first.
 FINE_POINTS, FINE_GRIDS = 33, 12
 
-# Contact counts as kept if it is lost by less than this, relative to v0**2: that much is rounding.
+# Contact counts as kept if it is lost by less than this, relative to v0**2, because so small an amount is rounding.
 ROUNDING = 1e-13
 
 

@@ -28,7 +28,7 @@ from gqm_sym.parameters import Given, Parameters
 # The last two coefficients of a piece of a track are below this share of its length.
 MAX_LAST_TERM = 1e-22
 
-# A piece that is shorter than this share of the way begins at a place where the track ends.
+# A piece that is shorter than this share of the track shows that the track ends there.
 MIN_SHARE = 1e-4
 
 
@@ -49,11 +49,11 @@ def constant_load(
     n : number or expression
         The contact force in units of the weight, N/(m*g), greater than 1.
     v0 : number or expression
-        The speed in m/s at the lowest places, where the tangent is level; launch with it at ``psi = 0``.
+        The speed in m/s at the lowest places, where the tangent is horizontal; launch with this speed at ``psi = 0``.
     g : number or expression
         Acceleration of gravity in m/s**2. ``"g"`` makes the track follow the model's own.
     domain : pair, optional
-        Ends of ``psi``; without them loop follows loop.
+        Ends of the range of ``psi``; without them, loops follow one another without end.
     parameters : mapping, optional
         Defaults of names in ``n`` and ``v0``.
     title : str
@@ -62,8 +62,9 @@ def constant_load(
     Returns
     -------
     Curve
-        In an angle ``psi`` in rad. The tangent's angle alpha is the same at the lowest and the highest places, 0 and
-        pi, and between them tan(alpha/2) = sqrt((n - 1)/(n + 1))*tan(psi/2). Where psi = 0, x = z = 0.
+        The curve with an angle ``psi`` in rad as its parameter. The tangent's angle alpha equals psi at the lowest and
+        the highest places, 0 and pi, and between them tan(alpha/2) = sqrt((n - 1)/(n + 1))*tan(psi/2). At psi = 0, x =
+        z = 0.
 
     Raises
     ------
@@ -164,7 +165,7 @@ def from_load(
     Returns
     -------
     Curve
-        In arc length s in m from x = z = 0.
+        The curve with the arc length s in m from x = z = 0 as its parameter.
 
     Raises
     ------
@@ -235,7 +236,7 @@ def _piece(motion: _Motion, state: _State, at: Any, width: Any) -> tuple[Piece |
     load = powers(mp, terms, 0)
     alpha, x, z = ([number] for number in state)
     cosines, sines = [mp.cos(state.alpha)], [mp.sin(state.alpha)]
-    # V, and what dalpha/du is multiplied by: V**2 for a law in s, V for one in t.
+    # V, and the factor of dalpha/du: V**2 for a law in s, V for one in t.
     speeds = [mp.sqrt(energy)]
     turned: list[Any] = []
     for k in range(TERMS - 1):

@@ -1,4 +1,4 @@
-"""Tracks on which a quantity of the motion is least, under limits on load and shape."""
+"""Tracks that minimise a quantity of the motion, under limits on load and shape."""
 
 import tempfile
 import warnings
@@ -25,19 +25,20 @@ from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
 
-# What may be limited, and its unit.
+# The quantities that may be limited, with their units.
 LIMITS = {"height": "m", "slope": "1", "curvature": "1/m", "normal_force": "N"}
 
-# Places along the track at which limits are held.
+# The number of places along the track at which limits are imposed.
 PLACES = 201
 
-# Steps of the optimiser, and how far a limit may be exceeded, as a share of it.
+# The largest number of steps of the optimiser, and the share by which a limit may be exceeded.
 MAX_STEPS, MAX_EXCESS = 200, 1e-6
 
 # A body whose motion ends nearer to the end of the track than this share of it has arrived there.
 NEAR_END = 1e-9
 
-# What a track counts, in units of the first guess, along which the motion does not have the quantity.
+# The value, in units of that of the first guess, that is used for a track on which the motion does not have the
+# quantity.
 PENALTY = 1e3
 
 
@@ -52,47 +53,50 @@ def minimise(
     between: tuple[Any, Any] | None = None,
     **given: Any,
 ) -> Curve:
-    """Return the track of a family, or through movable points, on which a quantity of the motion is least.
+    """Return the track of a family, or through movable points, that minimises a quantity of the motion.
 
     Parameters
     ----------
     quantity : str
-        One of ``module.sweep`` that is one number, as "time_at", "period" or "normal_force_max". The place of "time_at"
-        is the argument ``lam``, or the end of the track.
+        A quantity of ``module.sweep`` that is one number, such as "time_at", "period" or "normal_force_max". The place
+        of "time_at" is the argument ``lam``, or the end of the track.
     track : Curve or (n, 2) array
         A curve with run-time parameters, or points of which some may move up and down; the track is then the spline
         through them (`Curve.sampled`), in arc length.
     force : Kernel
         As for `derive`.
     free : mapping or sequence
-        Of a curve the parameters that are to be found, each with ``(low, high)``, or ``(low, guess, high)``. Of points
-        the numbers of those that may move, counted from 0, or a mapping from them to limits of their heights.
+        For a curve, the parameters to be found, each with ``(low, high)`` or ``(low, guess, high)``. For points, the
+        indices of those that may move, counted from 0, or a mapping from these to limits of their heights.
     limits : mapping, optional
         ``(low, high)``, either of them None, for "height" in m, "slope" (dz/dx), "curvature" in 1/m or "normal_force"
-        in N. They are held at 201 places along the track.
+        in N. They are imposed at 201 places along the track.
     between : pair of numbers, optional
-        Ends of the part of a curve on which limits are held, as values of its parameter; without it the whole domain.
+        Ends of the part of a curve on which limits are imposed, as values of its parameter; by default the whole
+        domain.
     given
         Launch (``lam0``, ``v0``, ``direction``), ``contact``, ``lam`` and all other run-time parameters.
 
     Returns
     -------
     Curve
-        The curve with what was found as defaults, or the track through the points.
+        The curve with the parameters found as its defaults, or the track through the points.
 
     Raises
     ------
     DeclarationError
-        If limits contradict each other, or something is unknown.
+        If limits contradict each other, or a name is unknown.
     SolutionError
         If no track meets all limits, or the motion does not have the quantity at the first guess.
 
-    Notes ----- SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference
-    quotients elsewhere. The result is a local minimum.
+    Notes
+    -----
+    The optimiser is SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` if there are such, and difference
+    quotients otherwise. The result is a local minimum.
 
     Examples
     --------
-    The quickest plane to a wall 1 m away falls by 45 degrees, but not if it must not be steeper than 40:
+    The quickest plane to a wall 1 m away descends at 45 degrees:
 
     >>> import gqm_sym as gqm
     >>> plane = gqm.Curve.graph("-k*x", domain=(0, 1), parameters={"k": 1})
@@ -182,19 +186,19 @@ def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: st
 
 
 def _scale(low: float, high: float) -> float:
-    """The size of a limit, by which its margin is measured."""
+    """Return the size of a limit, by which its margin is measured."""
     return max((abs(end) for end in (low, high) if isfinite(end)), default=1.0) or 1.0
 
 
 class _Tracks(ABC):
-    """Tracks that differ by some numbers.
+    """Tracks that differ in some numbers, the unknowns.
 
     Attributes
     ----------
     start, low, high : (n,) arrays
-        First guesses and limits of what is free.
+        First guesses and limits of the unknowns.
     size : float
-        The least number of unknowns.
+        The scale of the unknowns.
     step, tolerance : float
         The step of a difference quotient as a share of the size, and the relative change of the quantity at which the
         optimiser ends.
@@ -221,7 +225,7 @@ class _Tracks(ABC):
 
     @abstractmethod
     def _read(self, track: Any, free: Any) -> None:
-        """Read the track, and what is free."""
+        """Read the track and the unknowns."""
 
     @abstractmethod
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
@@ -229,10 +233,10 @@ class _Tracks(ABC):
 
     @abstractmethod
     def track(self, x: Array) -> Curve:
-        """Return one track as it is declared."""
+        """Return one track as a declared curve."""
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
-        """Return the exact derivatives of a quantity; None where there are none."""
+        """Return the exact derivatives of a quantity; None if there are none."""
         return None
 
     def _launch(self, x: Array) -> tuple[CompiledModel, LaunchRequest, tuple[Any, ...], tuple[float, float]]:
@@ -261,7 +265,7 @@ class _Tracks(ABC):
             return nan
 
     def margins(self, x: Array, held: list[Any], between: Any) -> list[Array]:
-        """Return by how much each limit is met at places along one track, as a share of the limit."""
+        """Return the margin to each limit at places along one track, as a share of the limit."""
         if not held:
             return []
         try:
@@ -300,7 +304,7 @@ def _arrival(motion: Any, low: float, high: float) -> float:
 
 
 class _Family(_Tracks):
-    """Curves that differ by their run-time parameters."""
+    """Curves that differ in their run-time parameters."""
 
     def _read(self, track: Curve, free: Any) -> None:
         self._curve = track
@@ -340,7 +344,7 @@ class _Family(_Tracks):
 
 
 class _Points(_Tracks):
-    """Splines through points that differ by the heights of some; the lengths of a spline are known to 1e-9."""
+    """Splines through points that differ in some of their heights; the lengths of a spline are accurate to 1e-9."""
 
     step, tolerance = 1e-4, 1e-9
 
@@ -372,14 +376,14 @@ class _Points(_Tracks):
         return replace(self._compiled, chart=Sampled(text)), {}
 
     def track(self, x: Array) -> Curve:
-        """Return the track through the points as they are now; they are not measured, so they do not scatter."""
+        """Return the track through the points with these heights. They are not measured, so they have no scatter."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NoisyPointsWarning)
             return Curve.sampled(self._heights(x))
 
 
 def _bounds(limits: Any, guess: float | None, name: str) -> tuple[float, float, float]:
-    """Read lower limit, first guess and upper limit of what is free."""
+    """Read the lower limit, first guess and upper limit of an unknown."""
     if not isinstance(limits, tuple | list) or len(limits) not in (2, 3):
         raise DeclarationError(
             f"design.minimise: free: {name}: must be (low, high) or (low, guess, high), got {limits!r}"

@@ -4,8 +4,8 @@ With w = sqrt(z), z the height above the bottom, the sum of the arc lengths of b
 
     S(w) = sqrt(2 g)/pi * w * integral of T(w**2 cos(psi)**2) cos(psi) over psi from 0 to pi/2.
 
-A share of it lies on the right. Each side exists as far as its arc length grows at least as fast as its height,
-ds/dw >= 2 w; then dx/dw = sqrt((ds/dw)**2 - 4 w**2).
+A given share of it lies on the right. Each side exists as far as its arc length grows at least as fast as its height,
+ds/dw >= 2 w; there dx/dw = sqrt((ds/dw)**2 - 4 w**2).
 """
 
 from collections.abc import Callable, Mapping
@@ -37,16 +37,17 @@ from gqm_sym.parameters import Given
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# Decimal digits of the integral.
+# The number of decimal digits of the integral.
 RULE_DIGITS = 28
 
-# Where a track ends if no height is given, as a share of the height up to which there is one.
+# The height at which a track ends if no height is given, as a share of the largest possible one.
 SHARE_OF_LIMIT = sp.Rational(999, 1000)
 
-# The limit is looked for up to so many times the height of the track whose period is T(0) everywhere, by such steps.
+# The limit is searched for up to so many times the height of the track whose period is T(0) everywhere, in steps of
+# this ratio.
 SEARCHED, STEP = 100.0, 1.0 / 64.0
 
-# Odd derivatives at the bottom below this share mean that both sides are one smooth curve.
+# If odd derivatives at the bottom are below this share, both sides form one smooth curve.
 SMOOTH = 1e-15
 
 
@@ -77,8 +78,8 @@ def from_period(
         The full period in s as a function of ``h``, the height in m above the bottom at which the body turns. It must
         be positive and smooth.
     share : number
-        The part of the arc length between two places of equal height that is on the right of the bottom, between 0 and
-        1. One half gives the symmetric track.
+        The share of the arc length between two places of equal height that lies to the right of the bottom, between 0
+        and 1. One half gives the symmetric track.
     up_to : number, optional
         The height in m up to which the track is built. Without it, it is 99.9 % of `height_limit`.
     g : number
@@ -91,7 +92,7 @@ def from_period(
     Returns
     -------
     Curve
-        In arc length s in m, which is 0 at the bottom, where x = z = 0.
+        The curve with the arc length s in m as its parameter, which is 0 at the bottom, where x = z = 0.
 
     Raises
     ------
@@ -104,7 +105,7 @@ def from_period(
 
     Examples
     --------
-    A period that does not depend on the height gives the cycloid; of 2 s, it is g*T**2/(8*pi**2) high:
+    A period that does not depend on the height gives the cycloid; for 2 s its height is g*T**2/(8*pi**2):
 
     >>> round(height_limit("2"), 5), round(9.81 / 3.141592653589793**2 / 2, 5)
     (0.49698, 0.49698)
@@ -160,7 +161,7 @@ def height_limit(
     Returns
     -------
     float
-        The height at which one side of the track becomes vertical; infinite if neither does within a hundred times
+        The height at which one side of the track becomes vertical; infinite if neither side does within a hundred times
         the height of the cycloid with the period at the bottom.
 
     Raises
@@ -250,8 +251,8 @@ def _side(
 ) -> list[Piece]:
     """Return the pieces of one side from the bottom to the top, to the right.
 
-    Where the side ends shortly before it becomes vertical, at w = w1, everything is smooth in the angle v with
-    w = w1 sin(v).
+    If the side ends shortly before it becomes vertical, at w = w1, everything is smooth in the angle v with w = w1
+    sin(v).
     """
     near = limited and height is not None and top * top > 0.25 * height
     most = mp.sqrt(height) if near else None
@@ -280,7 +281,7 @@ def _side(
         begin = -1 if pieces else 0
         slope, z = (powers(mp, row, begin) for row in terms)
         x = [mp.mpf(0), *(width / (1 - begin) * term / (j + 1) for j, term in enumerate(slope))]
-        if not pieces:  # the track is level at the bottom
+        if not pieces:  # the track is horizontal at the bottom
             z[0] = z[1] = mp.mpf(0)
         pieces.append(Piece(begin, 1, x, [*z, mp.mpf(0)]))
         at += width
@@ -289,6 +290,8 @@ def _side(
 
 
 def _is_odd(piece: Piece) -> bool:
-    """Whether x is an odd function of the parameter at the bottom, so that the mirror image continues it smoothly."""
+    """Return whether x is an odd function of the parameter at the bottom, so that the mirror image continues it
+    smoothly.
+    """
     largest = max(map(abs, piece.x))
     return bool(max(map(abs, piece.x[2::2])) <= SMOOTH * largest)

@@ -16,15 +16,16 @@ from gqm_sym.literals.grammar import FUNCTIONS
 from gqm_sym.parameters import Given, exact_value, read_value
 from gqm_sym.sympy_charts import chart_x, chart_z
 
-# Decimal digits in which tracks are computed; their coordinates are written with so many digits of their size.
+# The number of decimal digits with which tracks are computed, and the number of digits with which their coordinates are
+# written.
 DIGITS, WRITTEN_DIGITS = 45, 28
 
-# Coefficients of a polynomial; the last two must be below this share of the largest one.
+# The number of coefficients of a polynomial; the last two must be below this share of the largest one.
 TERMS, MAX_TAIL = 24, 1e-22
 
-# A piece is not halved more often.
+# The largest number of times that a piece is halved.
 MAX_HALVINGS = 40
-# The size of numbers in a design, other than 0, is within this power of ten and its inverse.
+# Nonzero numbers in a design must lie between this power of ten and its inverse.
 MAX_EXPONENT = 60
 
 _U = sp.Symbol("u")
@@ -49,16 +50,16 @@ class Piece(NamedTuple):
     z: list[Any]
 
     def mirrored(self) -> "Piece":
-        """Return the mirror image about the z axis, run through in the opposite direction."""
+        """Return the mirror image about the z axis, passed in the opposite direction."""
         x, z = ([(-1) ** j * term for j, term in enumerate(row)] for row in (self.x, self.z))
         return Piece(-self.end, -self.begin, [-term for term in x], z)
 
 
 def polynomial_curve(mp: Any, pieces: Sequence[Piece], *, origin: int, breaks: tuple[int, ...], title: str) -> Curve:
-    """Return the curve of polynomials joined end to start; behind the first ``origin`` of them, x = z = s = 0.
+    """Return the curve of polynomials joined end to start; after the first ``origin`` of them, x = z = s = 0.
 
-    Coefficients are written as multiples of one power of ten, and constant terms
-    such that pieces meet exactly.
+    Coefficients are written as multiples of one power of ten, and constant terms are chosen such that pieces meet
+    exactly.
     """
     size = max(abs(term) for piece in pieces for row in (piece.x, piece.z) for term in row)
     places = WRITTEN_DIGITS - int(mp.ceil(mp.log10(size)))
@@ -142,7 +143,7 @@ def read_law(
 
 
 def read_constant(given: Source, name: str, *, where: str, unit: str) -> sp.Expr:
-    """Read a number, exactly."""
+    """Read a number exactly."""
     number = read_expression(given, where=f"{where}: {name}", unit=unit)
     if not number.is_number:
         raise DeclarationError(f"{where}: {name}: must be a number, got {short(given)}")
@@ -150,7 +151,7 @@ def read_constant(given: Source, name: str, *, where: str, unit: str) -> sp.Expr
 
 
 def _bounded(form: sp.Expr, where: str) -> sp.Expr:
-    """Refuse numbers of a size that doubles could not square."""
+    """Refuse numbers whose squares would be out of the range of doubles."""
     if (
         form.is_number
         and form.is_real
@@ -162,7 +163,7 @@ def _bounded(form: sp.Expr, where: str) -> sp.Expr:
 
 
 def read_positive(given: Source, name: str, *, where: str, unit: str) -> sp.Expr:
-    """Read a positive number, exactly."""
+    """Read a positive number exactly."""
     number = read_constant(given, name, where=where, unit=unit)
     if not number > 0:
         raise DeclarationError(f"{where}: {name}: must be positive, got {short(given)}")

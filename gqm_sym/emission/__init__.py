@@ -1,4 +1,4 @@
-"""Emit: a model as the text of a Python module."""
+"""Emission of a model as the text of a Python module."""
 
 import keyword
 
@@ -22,7 +22,7 @@ def emit(model: Model, *, name: str) -> str:
     Parameters
     ----------
     model : Model
-        What `derive` returned.
+        The model that `derive` returned.
     name : str
         The module's name, a Python identifier.
 
@@ -48,7 +48,7 @@ def emit(model: Model, *, name: str) -> str:
 
 
 def _source(model: Model, name: str) -> str:
-    """Everything the module was made from, as one canonical text."""
+    """Return everything from which the module is made, as one canonical text."""
 
     def exact(e: Expr | None) -> str:
         return "-" if e is None else sympy.srepr(e)

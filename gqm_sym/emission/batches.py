@@ -1,4 +1,4 @@
-"""The functions that serve sweeps: those of a conservative model, but each place has its own launch and parameters."""
+"""The functions for sweeps: those of a conservative model in which each place has its own launch and parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,8 +15,9 @@ from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import axis_orbits_batch
 
 _HYPERBOLIC = frozenset({"divdiff2_cosh", "divdiff2_sinh"})
-"""Divided differences that are replaced by their closed form for near points. It is NaN for points that are not near,
-and a sweep then solves the orbit in another way."""
+"""Divided differences that are replaced by their closed form for points near each other. It is NaN for other points,
+and a sweep then computes the orbit in another way.
+"""
 
 _CIRCULAR = frozenset({"divdiff2_cos", "divdiff2_sin"})
 """Divided differences that are split into factors of the orbit and factors of the place (MATHS, section 3)."""
@@ -50,7 +51,9 @@ class _Middle:
 
     @property
     def parts(self) -> tuple[Expr, Expr]:
-        """Second differences of cos and sin over -h, v, h: those of cos and sinc in the square of the argument."""
+        """Return the second differences of cos and sin over -h, v, h, which are those of cos and sinc in the square of
+        the argument.
+        """
         return Function("divdiff1_cos_in_square")(*self.gaps), self.v * Function("divdiff1_sinc_in_square")(*self.gaps)
 
     def second(self, name: str) -> Expr:
@@ -58,21 +61,23 @@ class _Middle:
         return self._turned(sin if name == "divdiff2_sin" else cos, even, odd)
 
     def value(self, head: type[Expr]) -> Expr:
-        """The sine or cosine of y, by that of v: cos v = cos h + (v**2 - h**2) * even, and so for the sine."""
+        """Return the sine or cosine of y, from cos v = cos h + (v**2 - h**2) * even and the same for the sine."""
         even, odd = self.parts
         h, product = (self.w - self.x) / 2, self.gaps[0] * self.gaps[1]
         cosine, sine = cos(h) - product * even, self.v * Function("sinc_near")(h) - product * odd
         return self._turned(head, cosine, sine)
 
     def _turned(self, head: type[Expr], even: Expr, odd: Expr) -> Expr:
-        """Rotate by m: the result for sin(m + v) or cos(m + v), given the results for cos v and sin v."""
+        """Rotate by m: return the result for sin(m + v) or cos(m + v), given the results for cos v and sin v."""
         return sin(self.m) * even + cos(self.m) * odd if head is sin else cos(self.m) * even - sin(self.m) * odd
 
 
 def _apart(
     forms: Sequence[Expr], place: Symbol, ends: tuple[Symbol, Symbol], gaps: tuple[Symbol, Symbol]
 ) -> list[Expr]:
-    """Write sines, cosines and their second differences by factors most of which are constant along an orbit."""
+    """Write sines, cosines and their second differences in terms of factors most of which are constant along an
+    orbit.
+    """
     known = set[tuple[Expr, Expr]]()
 
     def second(t: Expr) -> Expr:
@@ -118,7 +123,7 @@ def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
 
 
 def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
-    """First divided differences of the effective potential, ds and the potential's slopes."""
+    """Return the function for first divided differences of the effective potential, ds and the potential's slopes."""
     model, names, place = lowering.model, lowering.names, lowering.place
     a, d = names.symbol("a"), names.symbol("d")
     starts, places, offsets = (names(name) for name in ("starts", "places", "offsets"))
@@ -135,7 +140,9 @@ def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
 
 
 def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """Second divided differences of the effective potential, and ds, with the terms that an orbit has in common."""
+    """Return the functions for second divided differences of the effective potential and ds, and for the terms that are
+    constant along an orbit.
+    """
     model, names, place = lowering.model, lowering.names, lowering.place
     a, b, da, db = (names.symbol(s) for s in ("a", "b", "da", "db"))
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
@@ -178,7 +185,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     orbit = lowering.function(
         "orbit_invariants_batch",
         (lows, highs, middles, rests),
-        "Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters.",
+        "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters.",
         inside=[*ends, (middle, at(middles)), (rest, at(rests))],
         outputs=tuple(value for _, value in held),
         batch=True,
@@ -187,7 +194,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
 
 
 def bounds_batch(lowering: Lowering) -> FunctionIR:
-    """Enclosures over many intervals."""
+    """Return the function for enclosures over many intervals."""
     once, n = lowering.bounds(), lowering.names("n")
     lo, hi, p, out = once.arguments
     return replace(
@@ -202,7 +209,7 @@ def bounds_batch(lowering: Lowering) -> FunctionIR:
 
 
 def batch_functions(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """All functions of a batch but the bounds; none for a model whose motions are solved one by one."""
+    """Return all functions of a batch except the bounds; none for a model whose motions are solved one by one."""
     model = lowering.model
     if model.dissipation is not None or model.curve.charted:
         return ()

@@ -19,12 +19,14 @@ from gqm_sym.kernels.base import Z as HEIGHT
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
-    """The argument of a chart's maker that says which run-time parameters, by their place, the curve depends on."""
+    """Return the argument of a chart's maker that lists the indices of the run-time parameters on which the curve
+    depends.
+    """
     return f"shaped_by={tuple(sorted({place for formula in formulas for _, place in formula.parameters}))!r}"
 
 
 def _implicit(lowering: Lowering) -> ChartIR:
-    """An implicit curve: F and its derivatives, the start point, and the ends in arc length."""
+    """Return the part for an implicit curve: F and its derivatives, the start point, and the ends in arc length."""
     model = lowering.model
     found = model.level_set
     assert found is not None
@@ -43,7 +45,7 @@ def _implicit(lowering: Lowering) -> ChartIR:
     exact.append(lowering.exact_function("level", doc, (found.value, found.slope_x, found.slope_z), (X, Z)))
     arguments = ["field=field.address", "start=exact_start", f"tangent={found.level.tangent}", "level=exact_level"]
     if model.domain != (None, None):
-        doc = "Both ends in arc length; None where there is none."
+        doc = "Both ends in arc length; None for an open end."
         exact.append(lowering.constants("exact_domain", doc, model.domain))
         arguments.append("domain=exact_domain")
     arguments.append(_shaped_by(field, *exact))
@@ -56,7 +58,7 @@ def _implicit(lowering: Lowering) -> ChartIR:
 
 
 def _sampled(lowering: Lowering) -> ChartIR:
-    """A sampled curve: its points, as text."""
+    """Return the part for a sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
     space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
@@ -68,7 +70,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
 
 
 def _polynomial(lowering: Lowering) -> ChartIR:
-    """A curve of polynomials: their coefficients, as text."""
+    """Return the part for a curve of polynomials: their coefficients, as text."""
     made = lowering.model.curve.definition
     assert isinstance(made, PolynomialPieces)
     return ChartIR(
@@ -79,7 +81,9 @@ def _polynomial(lowering: Lowering) -> ChartIR:
 
 
 def _rail(lowering: Lowering) -> ChartIR:
-    """A piecewise curve: the numbers of each piece, and a function for each piece that is a curve with formulas."""
+    """Return the part for a piecewise curve: the numbers of each piece, and a function for each piece that is a curve
+    with formulas.
+    """
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
@@ -113,7 +117,9 @@ def _rail(lowering: Lowering) -> ChartIR:
 
 
 def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
-    """Position, metric and curvature of a piece that is a curve with formulas, in its own parameter."""
+    """Return the function for position, metric and curvature of a piece that is a curve with formulas, in its own
+    parameter.
+    """
     shape = geometry(curve, may_be_positive=())
     rows = (curve.x, curve.z, shape.ds, shape.dxds, shape.dzds, shape.kappa)
     what = f"x, z, ds/d{curve.parameter}, dx/ds, dz/ds and curvature"
@@ -121,7 +127,9 @@ def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
 
 
 def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
-    """The same of a piece of a rail in space: the derivatives of its coordinates by arc length."""
+    """Return the same function for a piece of a rail in space, with the derivatives of its coordinates by arc
+    length.
+    """
     shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
     tangent = (shape.dxds, shape.dyds, shape.dzds)
     bends = cross(shape.bend, tangent)
@@ -147,7 +155,7 @@ def _function_of_segment(lowering: Lowering, curve: Curve, name: str, what: str,
 
 
 def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
-    """The coordinates of such a piece and their derivatives, over a namespace of operations."""
+    """Return the function for the coordinates of such a piece and their derivatives, over a namespace of operations."""
     place = curve.parameter
     rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
@@ -160,11 +168,11 @@ MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
     "polynomial": _polynomial,
     "sampled": _sampled,
 }
-"""The function that describes the chart, by the kind of the curve."""
+"""The functions that describe the chart, by the kind of the curve."""
 
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:
-    """The maker of a model's chart; None for a curve with formulas."""
+    """Return the part of a module that makes a model's chart; None for a curve with formulas."""
     curve, train = lowering.model.curve, lowering.model.force
     if not curve.charted:
         return None
@@ -176,7 +184,7 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     pull = differentiate(train.potential, HEIGHT)
     numbers = lowering.constants(
         "exact_train",
-        "The length of a train, what gravity is, and its coefficient of friction.",
+        "Length of the train, acceleration of gravity, and coefficient of friction.",
         (train.train_length, pull, train.friction),
     )
     length = lowering.order[train.train_length.name]

@@ -13,26 +13,26 @@ from gqm_sym.kernels.base import DIRECTION
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 FORWARDS = {DIRECTION: sympy.S.One}
-"""Contact forces that depend on the sign of ds/dt are those of motions forwards where functions are not told it."""
+"""In functions without this argument, contact forces that depend on the sign of ds/dt are those of forward motions."""
 
 
 class Names:
-    """Names of our own inside emitted functions: a user's name never begins with an underscore, so ours may."""
+    """Names of our own inside emitted functions. A user's name never begins with an underscore, so ours may."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._taken = frozenset(taken)
 
     def __call__(self, name: str) -> str:
-        """``name``, or ``_name`` where the user has that one."""
+        """Return ``name``, or ``_name`` if the user has that name."""
         return f"_{name}" if name in self._taken else name
 
     def symbol(self, name: str) -> Symbol:
-        """The same as a symbol."""
+        """Return the name as a symbol."""
         return Symbol(self(name), real=True)
 
 
 class Lowering:
-    """The functions of one model, sharing its names."""
+    """The functions of one model, which share its names."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -43,9 +43,9 @@ class Lowering:
         self.order = {name: i for i, name in enumerate(order)}
 
     def _trigonometric(self) -> dict[Expr, Symbol]:
-        """Sines, cosines and tangents of run-time parameters alone, each with a symbol for its value.
+        """Return sines, cosines and tangents of run-time parameters alone, each with a symbol for its value.
 
-        Their values stand behind the parameters: where a parameter is given exactly, such as pi, they are exact too.
+        Their values follow the parameters; if a parameter is given exactly, such as pi, they are exact too.
         """
         model, loss = self.model, self.model.dissipation
         forms = [model.x, model.z, model.ds, model.kappa, model.static_normal_load]
@@ -63,7 +63,9 @@ class Lowering:
         return self.names.symbol("x"), self.names.symbol("z")
 
     def in_plane(self, form: Expr) -> Expr:
-        """A form of a charted curve by the coordinates of the body's path, as far as it depends on these."""
+        """Return a form of a charted curve in terms of the coordinates of the body's path, as far as it depends on
+        these.
+        """
         model, (x, z), radius = self.model, self.coordinates, self.model.force.radius
         of_curve = {chart_x(self.place): x + radius * model.dzds, chart_z(self.place): z - radius * model.dxds}
         found = form.xreplace(of_curve)
@@ -71,11 +73,11 @@ class Lowering:
 
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
         """Yield the function that evaluates them, if there are any."""
-        doc = "What stands behind the run-time parameters in compiled functions."
+        doc = "Trigonometric values, which follow the run-time parameters in the arguments of compiled functions."
         return (self.constants("exact_trigonometric", doc, (*self.trigonometric,)),) if self.trigonometric else ()
 
     def bounds(self) -> FunctionIR:
-        """Interval enclosures of the effective potential's slope and of ds."""
+        """Return the function for interval enclosures of the effective potential's slope and of ds."""
         forms = (self.model.effective_potential_slope, self.model.ds)
         outputs = tuple(form.xreplace(self.trigonometric) for form in forms)
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
@@ -94,7 +96,7 @@ class Lowering:
         )
 
     def constants(self, name: str, doc: str, values: tuple[Expr | None, ...]) -> ExactIR:
-        """A function of the run-time parameters alone."""
+        """Return a function of the run-time parameters alone."""
         return ExactIR(
             name=name,
             doc=doc,
@@ -107,7 +109,7 @@ class Lowering:
     def exact_function(
         self, name: str, doc: str, outputs: tuple[Expr, ...], places: tuple[Symbol, ...] = ()
     ) -> ExactIR:
-        """A formula over a namespace of operations."""
+        """Return a formula over a namespace of operations."""
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
         return ExactIR(
             name=f"exact_{name}",
@@ -129,22 +131,23 @@ class Lowering:
         batch: bool = False,
         rows_behind: int = 0,
     ) -> FunctionIR:
-        """Share common subexpressions, and move what does not depend on the place in front of the loop.
+        """Return a function in which common subexpressions are shared, and those that do not depend on the place are
+        computed before the loop.
 
         Parameters
         ----------
         name, doc
             The function's name, and the text of its docstring.
         arguments
-            Between the number of places and the run-time parameters: the name of an array that has one element for
-            each place, or the symbol of a single number.
+            The arguments between the number of places and the run-time parameters, each the name of an array that has
+            one element for each place, or the symbol of a single number.
         inside
-            What the loop begins with: each symbol that depends on the place, and its value.
+            The assignments at the beginning of the loop: each symbol that depends on the place, and its value.
         outputs
             One form for each row of ``out``.
         batch, rows_behind
-            In a function of a batch each place has run-time parameters of its own, and so many more rows stand behind
-            them.
+            Whether the function is one of a batch, in which each place has run-time parameters of its own, and the
+            number of further rows after these.
         """
         check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))

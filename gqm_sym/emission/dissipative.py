@@ -1,4 +1,6 @@
-"""The functions of a model that is not conservative: what changes V**2 along a leg, and what holds a body at rest."""
+"""The functions of a model that is not conservative: the law for V**2 along a leg, and the forces that hold a body at
+rest.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +33,7 @@ _NAMES = {
     **dict(zip(UPRIGHT, ("n0_upright", "kappa_upright"), strict=True)),
     **{symbol: f"coriolis_{axis}" for symbol, axis in zip(CORIOLIS, "xyz", strict=True)},
 }
-"""The names in emitted code of the geometric forms that a force law is written in."""
+"""The names in emitted code of the geometric forms in a force law."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class _Law:
     outputs
         One form for each row of ``out``, in the symbols of `_NAMES`.
     begin
-        What the loop begins with besides the place.
+        The assignments at the beginning of the loop besides the place.
     symbols
         The names of the signs and of V**2 in emitted code.
     """
@@ -54,7 +56,7 @@ class _Law:
 
 
 def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
-    """P and Q of dW/dλ = P - Q W, beside what the contact force needs."""
+    """Return the function for P and Q of dW/dλ = P - Q W, and for the terms of the contact force."""
     names, lam = lowering.names, lowering.place
     places, speeds, v, nu = names("places"), names("speeds"), names.symbol("v"), names.symbol("nu")
     linearised = "" if loss.linear else ", linearised at V**2 = w"
@@ -80,13 +82,13 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
 
 
 def static_balance(lowering: Lowering, loss: Dissipation) -> FunctionIR:
-    """The accelerations of a body at rest that is about to move forwards, and backwards."""
+    """Return the function for the accelerations of a body at rest that is about to move forwards or backwards."""
     doc = "Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."
     return _in_pieces(lowering, loss, "static_balance", (lowering.names("places"),), doc, _Law(loss.holds, (), {}))
 
 
 def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
-    """The law itself over a namespace of operations: dW/dλ by the place, W and both signs."""
+    """Return the law itself over a namespace of operations: dW/dλ as a function of the place, W and both signs."""
     w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
     form = loss.along(2 * SIGMA * loss.acceleration).xreplace({W: w, DIRECTION: v, CONTACT_SIGN: nu})
     doc = f"dV**2/d{lowering.place} where V**2 = {w}, {v} = sgn(ds/dt) and {nu} = sgn(N) (paper, eq. 19)."
@@ -94,7 +96,9 @@ def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
 
 
 def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
-    """Contact force and law along a charted curve, by what is known at a point; nothing where they depend on more."""
+    """Return contact force and law along a charted curve in terms of the chart's values at a point; nothing if they
+    depend on more.
+    """
     model, place = lowering.model, lowering.place
     point = tuple(lowering.names.symbol(name) for name in ("x", "z", "dxds", "dzds", "kappa"))
     angle = chart_alpha(place)
@@ -115,7 +119,9 @@ def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
 def _in_pieces(
     lowering: Lowering, loss: Dissipation, name: str, arguments: tuple[str | Symbol, ...], doc: str, law: _Law
 ) -> FunctionIR:
-    """A function that evaluates the geometric forms of a law, by name, and then the law as it is written."""
+    """Return a function that evaluates the geometric forms of a law, which have names, and then the law in terms of
+    these.
+    """
     law = replace(law, outputs=[form.xreplace(lowering.trigonometric) for form in law.outputs])
     values = {
         piece: form.xreplace(lowering.trigonometric)
@@ -145,7 +151,9 @@ def _in_pieces(
 def _assembled(
     function: FunctionIR, starts: list[tuple[Symbol, Expr]], made: list[tuple[Symbol, Expr]], forms: list[Expr]
 ) -> tuple[Assignment, ...]:
-    """The loop's statements: what it begins with as far as it is needed, the shared parts, and what they make."""
+    """Return the loop's statements: those at the beginning that are needed, the shared parts, and the named forms made
+    of them.
+    """
     needed = set[Symbol]().union(*(form.free_symbols for form in (*forms, *(value for _, value in made))))
     kept = {a.name for a in function.inside} | {symbol.name for symbol in needed}
     begun = {symbol.name for symbol, _ in starts}
@@ -157,7 +165,7 @@ def _assembled(
 
 
 def _with_names(function: FunctionIR, names: tuple[Symbol, ...]) -> FunctionIR:
-    """Call a shared subexpression that is the first of the outputs by that one's name."""
+    """Give a shared subexpression that equals an output the name of that output."""
     temporary = function.outputs[0] if names else None
     if not any(Symbol(a.name, real=True) == temporary for a in function.inside):
         return function

@@ -1,4 +1,6 @@
-"""Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
+"""Lowered functions as lines of text: the fields that the template prints, and the names of the functions that they
+call.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -11,19 +13,19 @@ from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
 from gqm_sym.sympy_charts import SPACE_CHARTS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
-# What the arrays of charts are called in emitted functions, each with the rows that it has and where. In space each
-# coordinate has a chart, and perhaps the roll angle.
+# The names of the arrays of charts in emitted functions, each with its functions and their rows. In space each
+# coordinate has a chart, and possibly the roll angle.
 CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
     **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
 
-# The width up to which several loads of a value are on one line.
+# The width up to which several loads of array elements are put on one line.
 WIDTH = 112
 
 
 def _statements(assignments: Iterable[Assignment], printer: CodePrinter) -> list[str]:
-    """One assignment a line, but loads of elements of arrays together on one."""
+    """Return one line for each assignment, but put loads of array elements together."""
     lines: list[str] = []
     loads: list[tuple[str, str]] = []
     for a in assignments:
@@ -37,7 +39,7 @@ def _statements(assignments: Iterable[Assignment], printer: CodePrinter) -> list
 
 
 def _together(loads: list[tuple[str, str]]) -> list[str]:
-    """``a, b = p[0], p[1]``: as many loads on a line as fit."""
+    """Return lines such as ``a, b = p[0], p[1]``, with as many loads on a line as fit."""
     lines: list[str] = []
     some: list[tuple[str, str]] = []
     for load in loads:
@@ -57,12 +59,13 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
 
 
 def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str]]:
-    """A function that finds what charts say of its places in the last rows of ``out``, and the lines that fill these.
+    """Return a function that reads values of charts at its places from the last rows of ``out``, and the lines that
+    fill these rows.
 
-    The third is the charts that these lines read.
+    The third result is the names of the charts that these lines read.
 
-    Neighbours often share a piece of the chart, which is then looked for once. Where ``out`` has too few rows, there is
-    an array for it. Without a chart the function is as it was.
+    Neighbouring places often share a piece of the chart, which is then searched for only once. If ``out`` has too few
+    rows, another array takes its place. Without a chart the function is returned unchanged.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
@@ -98,9 +101,9 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
 
 
 def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
-    """The template's fields of a function over many places, and the names that it calls.
+    """Return the template's fields of a function over many places, and the names that it calls.
 
-    ``charts`` are the names of those behind the run-time parameters (`ChartIR`).
+    ``charts`` are the names of the charts that follow the run-time parameters (`ChartIR`).
     """
     function, filled, read = _read_together(function)
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
@@ -131,13 +134,13 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
 
 
 def _views(function: FunctionIR) -> str:
-    """The line that turns pointers into arrays."""
+    """Return the line that makes arrays of pointers."""
     names = ", ".join(name for name, _ in function.views)
     return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
 
 
 def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str]) -> list[str]:
-    """Return the lines that find the charts of the curve, which are stored behind the run-time parameters."""
+    """Return the lines that find the charts of the curve, which are stored after the run-time parameters."""
     if not printer.charts:
         return []
     p, count = function.views[-2]
@@ -148,7 +151,7 @@ def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str
 
 
 def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
-    """The template's fields of a function over intervals, and the names that it calls."""
+    """Return the template's fields of a function over intervals, and the names that it calls."""
     printer = IntervalPrinter()
     *count, lo, hi, p, out = function.arguments
     index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
@@ -175,7 +178,7 @@ def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) 
 
 
 def exact_formula(function: ExactIR) -> dict[str, Any]:
-    """The template's fields of a function over a namespace of operations."""
+    """Return the template's fields of a function over a namespace of operations."""
     printer = ExactPrinter()
     p = "_p" if "p" in {*function.places, *(name for name, _ in function.parameters)} else "p"
     inside = _unpacked(function.parameters, p)

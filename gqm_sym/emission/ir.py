@@ -22,17 +22,17 @@ class FunctionIR:
     name, signature : str
         Its name, and the name of its signature in the runtime's interface.
     arguments : tuple of str
-        In the order of the signature.
+        Its arguments, in the order of the signature.
     doc : str
-        One line.
+        One line of description.
     views : tuple of (str, str)
-        Arguments that are seen as arrays, and their shapes.
+        Arguments that are used as arrays, with their shapes.
     parameters : tuple of (str, int)
-        Run-time parameters used, and where they stand in ``p``.
+        Run-time parameters that are used, and their indices in ``p``.
     before, inside : tuple of Assignment
-        What does not depend on the place, and what does.
+        The assignments that do not depend on the place, and those that do.
     outputs : tuple of Expr
-        One value a row of ``out``.
+        One value for each row of ``out``.
     batch : bool
         Whether every place has run-time parameters of its own.
     """
@@ -53,7 +53,7 @@ class FunctionIR:
 class ExactIR:
     """One formula over a namespace of operations; an output that does not exist is None.
 
-    ``places`` are what it depends on besides the run-time parameters: the curve's parameter, coordinates, or nothing.
+    ``places`` are its arguments besides the run-time parameters: the curve's parameter, coordinates, or nothing.
     """
 
     name: str
@@ -73,14 +73,14 @@ class ChartIR:
     statement : str
         The expression that makes the maker, as in ``Traced(field.address, exact_start, 1)``.
     imports : tuple of str
-        Names it needs from the runtime.
+        Names that it needs from the runtime.
     functions, exact
-        Functions it needs.
+        Functions that it needs.
     data : tuple of (str, str)
-        Names and texts of long literals it needs.
+        Names and texts of long literals that it needs.
     names : tuple of str
-        What emitted functions call the arrays of its charts, in the order in which they stand behind the run-time
-        parameters; those in front of the last one are all of one size.
+        The names of the arrays of its charts in emitted functions, in the order in which they follow the run-time
+        parameters; all except the last one have the same size.
     """
 
     statement: str
@@ -98,11 +98,11 @@ class SeparatedIR:
     Attributes
     ----------
     function : FunctionIR
-        What depends on the place, as `interface` orders its rows.
+        The function for the parts, which depend on the place, with rows in the order of `interface`.
     factors : ExactIR
-        What depends on run-time parameters alone.
+        The factors, which depend on run-time parameters alone.
     parts : ExactIR or None
-        What depends on the place of the potential, by coordinates; None where it depends on more.
+        The parts of the potential in terms of coordinates; None if they depend on more.
     potentials : int
         The number of products that belong to the potential.
     """
@@ -117,16 +117,15 @@ class SeparatedIR:
 class ModuleIR:
     """A whole module, ready to print.
 
-    ``functions`` and ``bounds`` serve one motion, ``batch`` and ``bounds_batch`` exist only for speed: they serve load
-    maps and sweeps. ``dissipation`` holds what is said of a force law that is not conservative; then ``bounds`` and
-    the effective potential are compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body
-    that must fit into its track, empty for any other; ``static_friction_limit`` names beta and mu_static of one that
-    may slip. ``units`` are the SI units of the curve's parameter and of the run-time parameters, as far as they are
-    known. ``in_space`` and ``signed`` say whether it is of a space curve, and whether its contact force has a sign;
-    ``sided`` whether that, or a part of it, tells on which side the body is; ``directed`` whether it depends on the
-    sign of ds/dt; and ``banked`` whether it is told what a rider feels.
-    ``monotone`` says that there are no cusps,
-    and that the effective potential rises or falls all the way between places of symmetry.
+    ``functions`` and ``bounds`` serve one motion; ``batch`` and ``bounds_batch`` serve load maps and sweeps, and exist
+    only for speed. ``dissipation`` describes a force law that is not conservative; ``bounds`` and the effective
+    potential are then compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body that must
+    fit into its track, empty for any other; ``static_friction_limit`` names beta and mu_static of one that may slip.
+    ``units`` are the SI units of the curve's parameter and of the run-time parameters, as far as they are known.
+    ``in_space`` and ``signed`` say whether the curve is a space curve, and whether its contact force has a sign;
+    ``sided``, whether that sign, or that of a component, shows on which side the body is; ``directed``, whether the
+    contact force depends on the sign of ds/dt; and ``banked``, whether loads on riders are known. ``monotone`` says
+    that there are no cusps, and that the effective potential is monotone between places of symmetry.
     """
 
     name: str

@@ -1,4 +1,6 @@
-"""The function of a load map: all its rows in one call, with V**2 by subtraction and the size of what it rounds."""
+"""The function of a load map, which fills all rows in one call, with V**2 by subtraction and the size of its rounded
+terms.
+"""
 
 from collections.abc import Callable
 from math import prod
@@ -11,7 +13,7 @@ from gqm_sym.emission.subscripts import at
 
 
 def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """The function of a load map; none where the size of the terms of the effective potential is not known."""
+    """Return the function of a load map; none if the size of the terms of the effective potential is not known."""
     model, names = lowering.model, lowering.names
     potential = _without_constant(model.effective_potential, lowering.place)
     size = rounded_size(potential, lowering.place)
@@ -36,7 +38,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
 def with_named_exponentials(
     forms: tuple[Expr, ...], symbol: Callable[[str], Symbol]
 ) -> tuple[list[tuple[Symbol, Expr]], tuple[Expr, ...]]:
-    """Give names to exponentials whose reciprocals occur as well; return them and the forms that use them.
+    """Give names to exponentials whose reciprocals occur as well; return the names and the forms that use them.
 
     SymPy writes 1/exp(u) as exp(-u). A division costs a third of a second exponential.
     """
@@ -48,13 +50,15 @@ def with_named_exponentials(
 
 
 def _without_constant(potential: Expr, place: Symbol) -> Expr:
-    """The potential without its constant term, which would only add rounding."""
+    """Return the potential without its constant term, which would only add rounding."""
     factor, rest = potential.as_independent(place, as_Add=False)
     return factor * rest.as_independent(place, as_Add=True)[1]
 
 
 def rounded_size(form: Expr, place: Symbol) -> Expr | None:
-    """The size that the roundings of a form are shares of: its own where nothing cancels in it; None if unknown."""
+    """Return the size to which the rounding errors of a form are relative: its own size if nothing cancels in it; None
+    if unknown.
+    """
     if form.is_Symbol or form.is_number:
         return Abs(form)
     if form.is_Pow and not form.base.has(place) and not form.exp.has(place):
@@ -68,7 +72,7 @@ def rounded_size(form: Expr, place: Symbol) -> Expr | None:
 
 
 def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
-    """The size of a form, given the sizes of its parts."""
+    """Return the size of a form, given the sizes of its parts."""
     if form.is_Add:
         return sum(sizes[1:], sizes[0])
     if form.is_Mul:
@@ -88,6 +92,6 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
 
 
 def _is_exact(form: Expr, place: Symbol) -> bool:
-    """Whether a form is the place times a power of two, which is not rounded."""
+    """Return whether a form is the place times a power of two, which is not rounded."""
     factor = form / place
     return isinstance(factor, Rational) and all(part & (part - 1) == 0 for part in (abs(factor.p), factor.q))

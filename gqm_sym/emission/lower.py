@@ -1,4 +1,4 @@
-"""From a model's closed forms to functions as straight-line code."""
+"""Conversion of a model's closed forms to functions as straight-line code."""
 
 from sympy import Add, Expr, Function
 
@@ -17,11 +17,11 @@ from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
 
 FLAGS = ("friction", "kinked", "linear")
-"""What a module says of a force law that is not conservative."""
+"""The parts of a module for a force law that is not conservative."""
 
 
 def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> ModuleIR:
-    """All functions of the module for ``model``."""
+    """Return all functions of the module for ``model``."""
     _check(model)
     lowering = _ModelLowering(model)
     loss = model.dissipation
@@ -67,7 +67,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
 
 
 def _check(model: Model) -> None:
-    """Refuse a model with a form that has no text."""
+    """Refuse a model with a form that cannot be written as text."""
     names = {model.parameter.name, *model.parameters}
     low, high = model.domain
     forms = {
@@ -99,7 +99,7 @@ class _ModelLowering(Lowering):
     """The functions that every conservative or dissipative module has."""
 
     def path_and_contact_force(self) -> FunctionIR:
-        """Position, metric, curvature and contact force, given the speed squared."""
+        """Return the function for position, metric, curvature and contact force, given the speed squared."""
         model, v2 = self.model, self.names.symbol("v2")
         lam, places, speeds = self.place, self.names("places"), self.names("speeds")
         form = "|N|" if model.loads else "N = m*(kappa*V**2 + n0)"
@@ -112,7 +112,9 @@ class _ModelLowering(Lowering):
         )
 
     def path_in_space(self) -> tuple[FunctionIR, ...]:
-        """The third coordinate of a space curve, and the contact force as a vector; nothing for a planar curve."""
+        """Return the function for the third coordinate of a space curve and the contact force as a vector; nothing for
+        a planar curve.
+        """
         model, v2 = self.model, self.names.symbol("v2")
         places, speeds, v = self.names("places"), self.names("speeds"), self.names.symbol("v")
         if not model.curve.in_space:
@@ -128,7 +130,9 @@ class _ModelLowering(Lowering):
         return (function,)
 
     def rider_loads(self) -> tuple[FunctionIR, ...]:
-        """What a rider feels on a banked track, and where that is; nothing for a track that is not banked."""
+        """Return the function for the loads on a rider of a banked track, and its coordinates; nothing for a track that
+        is not banked.
+        """
         felt, model = self.model.rider, self.model
         if felt is None or model.curve.banking is None:
             return ()
@@ -141,18 +145,18 @@ class _ModelLowering(Lowering):
         function = self.function(
             "rider_loads",
             (places, speeds, v, nu),
-            "What a rider feels, given V**2 and the signs v = sgn(ds/dt) and nu = sgn(N).",
+            "Loads on a rider, their rates, and roll and place of the track; v = sgn(ds/dt), nu = sgn(N).",
             inside=[(self.place, at(places)), (w, at(speeds))],
             outputs=tuple(row.xreplace(symbols) for row in rows),
         )
         return (function,)
 
     def potentials(self) -> tuple[FunctionIR, ...]:
-        """The effective potential and its divided differences."""
+        """Return the functions for the effective potential and its divided differences."""
         return self.effective_potential(), self.potential_divdiff1(), self.potential_divdiff2()
 
     def effective_potential(self) -> FunctionIR:
-        """The effective potential and its slope."""
+        """Return the function for the effective potential and its slope."""
         lam, places = self.place, self.names("places")
         return self.function(
             "effective_potential",
@@ -163,7 +167,7 @@ class _ModelLowering(Lowering):
         )
 
     def potential_divdiff1(self) -> FunctionIR:
-        """First divided difference of the effective potential, from one place."""
+        """Return the function for the first divided difference of the effective potential from one place."""
         a, d = self.names.symbol("a"), self.names.symbol("d")
         places, offsets = self.names("places"), self.names("offsets")
         differences = Differences(self.place, (a, self.place), {(0, 1): d})
@@ -177,7 +181,9 @@ class _ModelLowering(Lowering):
         )
 
     def potential_divdiff2(self) -> FunctionIR:
-        """Second divided difference of the effective potential, over two ends and a place between."""
+        """Return the function for the second divided difference of the effective potential over two ends and a place
+        between them.
+        """
         a, b, da, db = (self.names.symbol(s) for s in ("a", "b", "da", "db"))
         left, right = self.names("left"), self.names("right")
         differences = Differences(self.place, (a, self.place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
@@ -195,7 +201,9 @@ class _ModelLowering(Lowering):
         )
 
     def exact(self) -> tuple[ExactIR, ...]:
-        """The formulas that extended precision and gradients need; of a charted curve the potential by coordinates."""
+        """Return the formulas for extended precision and gradients; for a charted curve the potential in terms of
+        coordinates.
+        """
         model, loss = self.model, self.model.dissipation
         if model.curve.charted:
             return self.exact_potential() if loss is None else chart_law(self, loss)
@@ -220,7 +228,7 @@ class _ModelLowering(Lowering):
         return (*path, *energy, *space)
 
     def _space(self) -> tuple[tuple[str, str, tuple[Expr, ...]], ...]:
-        """What a space curve has besides, each with its name and what it is."""
+        """Return the additional formulas of a space curve, each with its name and description."""
         model = self.model
         if not model.curve.in_space:
             return ()
@@ -232,7 +240,9 @@ class _ModelLowering(Lowering):
         return tuple(found)
 
     def exact_potential(self) -> tuple[ExactIR, ...]:
-        """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""
+        """Return the effective potential and its gradient in terms of coordinates; nothing if it depends on more than
+        these.
+        """
         if self.model.curve.in_space:  # known in doubles only
             return ()
         x, z = self.coordinates
@@ -244,20 +254,20 @@ class _ModelLowering(Lowering):
         return (self.exact_function("effective_potential", doc, outputs, (x, z)),)
 
     def domain(self) -> ExactIR:
-        """The range of the curve's parameter."""
+        """Return the formula for the range of the curve's parameter."""
         curve = self.model.curve
-        doc = "Both ends of the domain, and the period; None where there is none."
+        doc = "Both ends of the domain and the period; None for an open end or without a period."
         return self.constants("exact_domain", doc, (*curve.domain, curve.period))
 
     def inertia(self) -> tuple[ExactIR, ...]:
-        """The factor 1 + beta by which a rolling body is harder to accelerate; nothing where it is 1."""
+        """Return the formula for the factor 1 + beta of the inertia of a rolling body; nothing if it is 1."""
         doc = "1 + beta, so that the kinetic energy is m*(1 + beta)*V**2/2, and the potential energy m*(1 + beta)*U."
         return () if self.model.inertia == 1 else (self.constants("exact_inertia", doc, (self.model.inertia,)),)
 
     def axes(self) -> tuple[ExactIR, ...]:
-        """Places of symmetry, where there are any."""
+        """Return the formula for places of symmetry, if there are any."""
         symmetry = self.model.symmetry
         if symmetry is None:
             return ()
-        doc = "A place about which V**2 and ds are even, and the distance to the next; None where there is none."
+        doc = "A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."
         return (self.constants("exact_axes", doc, (symmetry.place, symmetry.step)),)

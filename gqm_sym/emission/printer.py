@@ -13,10 +13,10 @@ from sympy.printing.str import StrPrinter
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import SPACE_CHARTS, TRAIN_LOADS
 
-# Up to this every integer is a double.
+# Every integer up to this is a double.
 MAX_INTEGER = 2**53
 
-# The standard library's names of SymPy's functions.
+# The names of SymPy's functions in the standard library.
 FUNCTIONS = {
     "sin": "sin",
     "cos": "cos",
@@ -42,14 +42,14 @@ CHARTED = frozenset(
     | set(TRAIN_LOADS)
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
-# In space each coordinate has a chart, whose height is the coordinate; its derivatives are in the places of angle,
-# curvature and x. So have the roll angle and the mean height of a train.
+# In space each coordinate has a chart, whose height is the coordinate and whose rows of angle, curvature and x are its
+# derivatives. The same holds for the roll angle and for the mean height of a train.
 _SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll|h)")
 ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa", "chart_x")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
-    """Refuse a form that holds something the printers below have no text for; the message names it.
+    """Refuse a form that contains an expression which the printers below cannot write; the message names it.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
     names
         The curve's parameter and the run-time parameters.
     where
-        What the form is, for messages.
+        The name of the form, for messages.
     """
     for node in preorder_traversal(expr):
         if isinstance(node, Symbol):
@@ -78,7 +78,7 @@ def _has_text(node: Basic) -> bool:
 
 
 def as_double(number: Rational) -> float:
-    """The double nearest to a rational number; an error if that is beyond their range."""
+    """Return the double nearest to a rational number; raise an error if that is out of range."""
     try:
         value: float = number.p / number.q
     except OverflowError:
@@ -90,12 +90,14 @@ def as_double(number: Rational) -> float:
 
 
 def is_double(number: Rational) -> bool:
-    """Whether numerator and denominator are doubles, and integers that compiled code can hold."""
+    """Return whether numerator and denominator are doubles, and integers that compiled code can represent."""
     return all(abs(part) <= MAX_INTEGER for part in (number.p, number.q))
 
 
 class CodePrinter(StrPrinter):  # type: ignore[misc]
-    """Numba code over floats; ``used`` collects the functions that must be imported, ``charts`` the charts."""
+    """A printer of numba code over floats; ``used`` collects the functions that must be imported, and ``charts`` the
+    charts.
+    """
 
     printmethod = "_emitted"
     prefix = ""
@@ -149,7 +151,7 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         if exponent == -1:
             return f"1/{self.parenthesize(base, PRECEDENCE['Pow'])}"
         if isinstance(exponent, Integer) and exponent < 0:
-            # numba raises for 0.0**(-2), whatever its error model, and leaves the rest of an array undone.
+            # numba raises an error for 0.0**(-2), whatever its error model, and leaves the rest of an array unfilled.
             return f"1/{self.parenthesize(base, PRECEDENCE['Pow'])}**{-exponent.p}"
         return f"{self.parenthesize(base, PRECEDENCE['Pow'])}**{self.parenthesize(exponent, PRECEDENCE['Pow'])}"
 
@@ -167,7 +169,7 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
 
 
 class ExactPrinter(CodePrinter):
-    """Code over a namespace ``op``, in which every rational number stays exact."""
+    """A printer of code over a namespace ``op``, in which every rational number stays exact."""
 
     prefix = "op."
 
@@ -185,7 +187,7 @@ class ExactPrinter(CodePrinter):
 
 
 class IntervalPrinter(CodePrinter):
-    """Code over intervals (lo, hi), as calls of the runtime's interval helpers."""
+    """A printer of code over intervals (lo, hi), as calls of the runtime's interval helpers."""
 
     def _print_Function(self, expr: Expr) -> str:
         name = type(expr).__name__

@@ -1,4 +1,4 @@
-"""Lowered functions as the text of a module, through the templates."""
+"""The text of a module, made from lowered functions by the templates."""
 
 import hashlib
 import re
@@ -20,11 +20,11 @@ from gqm_sym.errors import EmissionError
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
 INTERFACE = 12
 
-# Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
+# Functions that the runtime has in vectorised forms; all others are those of the standard library.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("CompiledFunctions", "CompiledModel", "LaunchRequest")
-# Columns of the emitted import list.
+# The width of the emitted import list.
 _WIDTH = 116
 # The functions of one motion, as the interface orders them.
 _COMPILED_FUNCTIONS = (
@@ -34,7 +34,7 @@ _COMPILED_FUNCTIONS = (
     "potential_divdiff2",
     "bounds",
 )
-# Names that mean something in every emitted module: no run-time parameter may take them.
+# Names that have a meaning in every emitted module, so that no run-time parameter may have them.
 _OWN = frozenset(
     {
         *_RUNTIME,
@@ -59,7 +59,7 @@ class _Functions:
     intervals: set[str] = field(default_factory=set)
 
     def add(self, module: ModuleIR) -> None:
-        """All functions of a module, in the order in which they are printed."""
+        """Add all functions of a module, in the order in which they are printed."""
         chart, separated = module.chart, module.separated
         charts = chart.names if chart else ()
         groups = (
@@ -78,12 +78,12 @@ class _Functions:
 
     @property
     def all(self) -> list[dict[str, Any]]:
-        """Those for one motion, and those for many."""
+        """The functions for one motion and those for many."""
         return [*self.single, *self.batch]
 
 
 def render(module: ModuleIR, *, source: str) -> str:
-    """The text of a module. ``source`` is the canonical text of what it was made from, for its digest."""
+    """Return the text of a module. ``source`` is the canonical text from which it is made, for its digest."""
     functions, chart = _Functions(), module.chart
     functions.add(module)
     runtime = _imported(module, functions)
@@ -118,7 +118,7 @@ def render(module: ModuleIR, *, source: str) -> str:
 
 
 def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
-    """Names of the runtime that a module needs besides the functions that its formulas call."""
+    """Return the names of the runtime that a module needs besides the functions that its formulas call."""
     names = {*_RUNTIME, _pass1(module), *(f["signature"] for f in functions.all)}
     names |= set(module.chart.imports if module.chart else ())
     if _exact_formulas(module):
@@ -135,7 +135,7 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
 
 
 def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
-    """The arguments of ``CompiledModel``, as text; empty ones are left out of the module."""
+    """Return the arguments of ``CompiledModel`` as text; empty ones are omitted from the module."""
     compiled = [name for name in _COMPILED_FUNCTIONS if name in names]
     of_a_motion = 1 if module.dissipation else len(compiled)
     return {
@@ -169,14 +169,14 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
 
 
 def _exact_functions(module: ModuleIR) -> list[ExactIR]:
-    """All formulas of a module over a namespace of operations, in the order in which they are printed."""
+    """Return all formulas of a module over a namespace of operations, in the order in which they are printed."""
     chart, separated = module.chart, module.separated
     of_parts = (separated.factors, *((separated.parts,) if separated.parts else ())) if separated else ()
     return [*module.exact, *(chart.exact if chart else ()), *of_parts]
 
 
 def _separated(terms: SeparatedIR) -> str:
-    """The arguments of ``SeparatedTerms``."""
+    """Return the arguments of ``SeparatedTerms``."""
     held, loads = tuple(index for _, index in terms.function.parameters), len(terms.factors.outputs) - terms.potentials
     counts = f"potentials={terms.potentials}, loads={loads}, held={held!r}"
     counts += f", parts={terms.parts.name}" if terms.parts else ""
@@ -184,26 +184,28 @@ def _separated(terms: SeparatedIR) -> str:
 
 
 def _exact_formulas(module: ModuleIR) -> list[str]:
-    """The formulas over a namespace that a module hands over; empty where there are none."""
+    """Return the formulas over a namespace that a module passes to the runtime; empty if there are none."""
     return [function.name for function in module.exact if function.places]
 
 
 def _pass1(module: ModuleIR) -> str:
-    """The description of a load map for the runtime."""
+    """Return the description of a load map for the runtime."""
     if module.banked:
         return "Pass1OfRider"
     return "Pass1InSpace" if module.in_space else "Pass1"
 
 
 def _exact_class(module: ModuleIR) -> str:
-    """The record that takes them."""
+    """Return the name of the record for these formulas."""
     if module.dissipation:
         return "ExactChartLaw" if module.chart else "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 
 def _batch(module: ModuleIR) -> list[str]:
-    """The functions for many orbits that a module hands over, and how many rows those fill that others read."""
+    """Return the functions for many orbits that a module passes to the runtime, and the numbers of rows that the
+    invariants fill.
+    """
     if module.bounds_batch is None:
         return []
     rows = {f.name: len(f.outputs) for f in (*module.batch, module.bounds_batch) if f.batch}
@@ -215,7 +217,7 @@ def _batch(module: ModuleIR) -> list[str]:
 
 
 def body_digests(text: str) -> tuple[str, str] | None:
-    """The body's digest as the header states it, and as computed; None if the text has no such header."""
+    """Return the body's digest as the header states it, and as computed; None if the text has no such header."""
     first, _, rest = text.partition("\n")
     second, _, body = rest.partition("\n")
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
@@ -224,7 +226,7 @@ def body_digests(text: str) -> tuple[str, str] | None:
 
 
 def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
-    """Names followed by commas, as many on each line as fit."""
+    """Return names followed by commas, as many on each line as fit."""
     lines = [""] if names else []
     for name in names:
         if lines[-1] and len(lines[-1]) + len(name) + 2 > width:
@@ -273,7 +275,7 @@ def _forms(module: ModuleIR) -> list[str]:
 
 
 def _environment() -> jinja2.Environment:
-    """Templates of the installed package, or of the checkout it is run from."""
+    """Return the templates of the installed package, or of the checkout from which it is run."""
     package = Path(__file__).resolve().parent.parent
     folder = next((f for f in (package / "_templates", package.parent / "templates") if f.is_dir()), None)
     if folder is None:
@@ -297,7 +299,7 @@ def _templates_in(folder: Path) -> jinja2.Environment:
 
 @cache
 def _wanted_by(environment: jinja2.Environment, template: str) -> set[str]:
-    """Names of the fields of a template."""
+    """Return the names of the fields of a template."""
     loader = environment.loader
     assert loader is not None
     return meta.find_undeclared_variables(environment.parse(loader.get_source(environment, template)[0]))

@@ -1,4 +1,6 @@
-"""The potential and the load along a charted curve as sums of products: a factor of parameters and a part of places."""
+"""The potential and the load along a charted curve as sums of products of a factor, which depends on parameters, and a
+part, which depends on the place.
+"""
 
 from sympy import Add, Expr, Mul, S, Symbol, ordered
 
@@ -7,15 +9,15 @@ from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, SeparatedIR
 from gqm_sym.emission.subscripts import at
 
-# Terms of the potential and of the load together that are worth a table each.
+# The largest number of terms of the potential and the load for which tables are worth their time.
 MAX_TERMS = 12
 
 
 def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
-    """The parts of a form that depend on the place, each with the factor that does not.
+    """Return the parts of a form that depend on the place, each with the factor that does not.
 
-    A parameter that cannot be brought into a factor is added to ``held``. Sums are multiplied out where that brings a
-    parameter into a factor, but powers are not, for their terms may cancel.
+    A parameter that cannot be moved into a factor is added to ``held``. Sums are multiplied out if that moves a
+    parameter into a factor, but powers are not, because their terms may cancel.
     """
     parts: dict[Expr, Expr] = {}
     waiting = list(Add.make_args(form))
@@ -34,7 +36,9 @@ def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
 
 
 def separated_terms(lowering: Lowering) -> SeparatedIR | None:
-    """Divided differences of the potential's parts, with path and load; None where there is nothing to be gained."""
+    """Return the function for divided differences of the potential's parts, with path and load; None if there is
+    nothing to be gained.
+    """
     model, place = lowering.model, lowering.place
     if not model.curve.charted or model.curve.in_space or model.dissipation is not None:
         return None
@@ -61,7 +65,7 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
     )
     factors = lowering.constants(
         "exact_factors",
-        "What stands before the parts of U, then before those of n0.",
+        "Factors of the parts of U, then of the parts of n0.",
         (*potential.values(), *load.values()),
     )
     return SeparatedIR(
@@ -73,7 +77,7 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
 
 
 def _parts_in_plane(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR | None:
-    """The potential's parts by coordinates; None where they depend on more than those."""
+    """Return the potential's parts in terms of coordinates; None if they depend on more than these."""
     plane = tuple(map(lowering.in_plane, parts))
     if any(lowering.place in part.free_symbols for part in plane):
         return None

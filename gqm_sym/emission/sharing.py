@@ -1,4 +1,6 @@
-"""Expressions of one function as straight-line code: common parts once, constant ones in front of the loop."""
+"""The expressions of one function as straight-line code, with common parts computed once and constant parts before the
+loop.
+"""
 
 from collections.abc import Iterable, Sequence
 
@@ -8,15 +10,16 @@ from sympy import Basic, Expr, Function, Integer, Pow, Rational, Symbol, ordered
 from gqm_sym.emission.ir import Assignment
 from gqm_sym.errors import EmissionError
 
-# The largest number of operations of one function, written out: a long curve has some thousand, and SymPy processes
-# 10**5 in seconds.
+# The largest number of operations of one function when it is expanded: a long curve has some thousands, and SymPy
+# processes 10**5 in seconds.
 MAX_SIZE = 200_000
 
 
 def check_size(outputs: Iterable[Expr], *, where: str) -> None:
     """Refuse expressions that are too large, because SymPy visits all terms at every step.
 
-    Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
+    Divided differences share most of their parts, so that one with a thousand parts may have 10**12 when it is
+    expanded.
     """
     sizes: dict[Basic, int] = {}
 
@@ -36,12 +39,12 @@ def check_size(outputs: Iterable[Expr], *, where: str) -> None:
 def straight_line(
     outputs: Iterable[Expr], inside: Sequence[tuple[Symbol, Expr]]
 ) -> tuple[tuple[Assignment, ...], tuple[Assignment, ...], tuple[Expr, ...]]:
-    """Assignments before a loop and inside it, and what is left of the outputs.
+    """Return the assignments before a loop and inside it, and the outputs in terms of these.
 
     Parameters
     ----------
     inside
-        What the loop begins with: each symbol that depends on the place, and its value.
+        The assignments at the beginning of the loop: each symbol that depends on the place, and its value.
     """
     moving = {symbol for symbol, _ in inside}
     prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
@@ -58,7 +61,7 @@ def straight_line(
     before += [Assignment(name=s.name, value=v) for (s, _), v in zip(fixed, reduced, strict=False)]
     needed = {s.name for e in (*reduced, *(a.value for a in before)) for s in e.free_symbols}
     kept: list[Assignment] = []
-    for a in reversed(loop):  # what only something unused needs is unused too
+    for a in reversed(loop):  # an assignment that is needed only by an unused one is unused too
         if a.name in needed:
             kept.insert(0, a)
             needed |= {s.name for s in a.value.free_symbols}
@@ -66,7 +69,7 @@ def straight_line(
 
 
 def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
-    """Assignments in an order in which each name is given before it is used."""
+    """Return assignments in an order in which each name is assigned before it is used."""
     waiting, out = {a.name: a for a in assignments}, []
     while waiting:
         ready = [a for a in waiting.values() if not any(s.name in waiting for s in a.value.free_symbols)]
@@ -88,7 +91,7 @@ def _half_powers(e: Expr) -> Expr:
 
 
 def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], list[tuple[Symbol, Expr]]]:
-    """Give calls that do not depend on the place a name of their own, so that the loop need not repeat them."""
+    """Give calls that do not depend on the place names of their own, so that they are not repeated in the loop."""
     named: list[tuple[Symbol, Expr]] = []
     outputs = list(outputs)
     while outermost := _fixed_calls(outputs, moving | {symbol for symbol, _ in named}):
@@ -100,7 +103,7 @@ def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], lis
 
 
 def _fixed_calls(outputs: Sequence[Expr], moving: set[Symbol]) -> list[Expr]:
-    """The outermost calls that do not depend on the place."""
+    """Return the outermost calls that do not depend on the place."""
     calls = {
         call
         for e in outputs

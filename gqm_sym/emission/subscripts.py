@@ -4,6 +4,6 @@ from sympy import Expr, Function, Integer, Symbol
 
 
 def at(array: str, row: int | None = None) -> Expr:
-    """The element of an array, or of one of its rows, in the current pass of the loop."""
+    """Return the element of an array, or of one of its rows, in the current pass of the loop."""
     rows = () if row is None else (Integer(row),)
     return Function("at")(Symbol(array, real=True), *rows)

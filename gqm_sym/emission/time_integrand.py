@@ -10,7 +10,9 @@ from gqm_sym.emission.subscripts import at
 
 
 def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """Times of orbits about an axis, by an arithmetic-geometric mean or by an integrand, and their turning points."""
+    """Return the functions for times of orbits about an axis, by an arithmetic-geometric mean or an integrand, and for
+    their turning points.
+    """
     orbits = lowering.model.symmetric_orbits
     if orbits is None:
         return ()
@@ -78,7 +80,7 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr
     invariants = lowering.function(
         "integrand_invariants_batch",
         (halves,),
-        "Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters.",
+        "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters.",
         inside=[(own[HALF], at(halves))],
         outputs=tuple(value for _, value in held),
         batch=True,

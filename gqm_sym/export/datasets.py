@@ -1,4 +1,4 @@
-"""Motions, states and sweeps as pandas tables and xarray datasets, with names, units and what they came from."""
+"""Motions, states and sweeps as pandas tables and xarray datasets, with names, units and provenance."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ VARIABLES = {
     "kappa": ("signed curvature", "1/m"),
     "normal_force": ("contact force along the normal, which points to the left of increasing parameter", "N"),
 }
-# The same of what only states in space have.
+# The same for the fields that only states in space have.
 VARIABLES_IN_SPACE = {
     "y": ("the other horizontal coordinate", "m"),
     **{f"normal_{axis}": (f"contact force along {axis}", "N") for axis in "xyz"},
@@ -42,7 +42,7 @@ VARIABLES_IN_SPACE = {
 
 @require("data")
 def dataset(motion: "Motion", t: Any = None) -> "Dataset":
-    """Sample a motion into an xarray Dataset; `Motion.to_xarray` is the public way to do so.
+    """Sample a motion into an xarray Dataset; the public method is `Motion.to_xarray`.
 
     Parameters
     ----------
@@ -56,11 +56,11 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
     -------
     xarray.Dataset
         The variables of a `State` over the dimension ``t``, and ``lam_error``, the bound of the error of ``lam``. The
-        attributes hold the module, the launch and the parameters as they were given.
+        attributes contain the module, the launch and the parameters as they were given.
     """
     from xarray import Dataset
 
-    times = np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
+    times = _times(motion, t)
     state = motion.state(times)
     if np.ndim(state.t) > 1:
         raise InputError(f"t: must be one time or a row of times, got an array of shape {np.shape(state.t)}")
@@ -87,9 +87,19 @@ def _attributes(long_name: str, units: str | None) -> dict[str, str]:
     return {"long_name": long_name, **({"units": units} if units else {})}
 
 
+def _times(motion: "Motion", t: Any) -> Any:
+    """Return the given times, or else those by which a motion is sampled."""
+    return np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
+
+
+def motion_frame(motion: "Motion", t: Any = None) -> Any:
+    """Sample a motion into a pandas table; `Motion.to_pandas` is the public way to it, with times as in `dataset`."""
+    return state_frame(motion.state(_times(motion, t)))
+
+
 @require("data")
 def state_frame(state: "State") -> Any:
-    """The states at times as a pandas table; `State.to_pandas` is the public way to it."""
+    """Return the states at times as a pandas table; the public method is `State.to_pandas`."""
     from pandas import DataFrame
 
     return DataFrame({name: np.atleast_1d(np.asarray(field)).reshape(-1) for name, field in state._asdict().items()})
@@ -97,7 +107,7 @@ def state_frame(state: "State") -> Any:
 
 @require("data")
 def sweep_frame(sweep: Sweep) -> Any:
-    """The launches of a sweep as a pandas table; `Sweep.to_pandas` is the public way to it."""
+    """Return the launches of a sweep as a pandas table; the public method is `Sweep.to_pandas`."""
     from pandas import DataFrame
 
     table = DataFrame(columns_of(sweep))
@@ -107,7 +117,7 @@ def sweep_frame(sweep: Sweep) -> Any:
 
 @require("data")
 def sweep_dataset(sweep: Sweep) -> "Dataset":
-    """A sweep as an xarray dataset; `Sweep.to_xarray` is the public way to it."""
+    """Return a sweep as an xarray dataset; the public method is `Sweep.to_xarray`."""
     from xarray import Dataset
 
     shape = sweep.status.shape

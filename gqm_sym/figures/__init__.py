@@ -1,7 +1,7 @@
 """Figures of motions and models, drawn with Matplotlib, which is imported when a figure is first drawn.
 
-The colours can be told apart by colour-blind readers and differ in brightness, so that they survive a black-and-white
-print; the kinds of events differ in their markers.
+Colour-blind readers can distinguish the colours, which also differ in brightness, so that they survive a
+black-and-white print; the kinds of events differ in their markers.
 """
 
 from typing import Any
@@ -25,12 +25,12 @@ __all__ = [
     "track",
 ]
 
-# Public names of earlier versions, and what they are called now.
+# Public names of earlier versions, with their present names.
 RENAMED = {"loads": "speed_and_force"}
 
 
 def __getattr__(name: str) -> Any:
-    """Say the new name of a function that was renamed."""
+    """Raise an error that gives the new name of a function that was renamed."""
     if name in RENAMED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; its new name is {RENAMED[name]!r}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

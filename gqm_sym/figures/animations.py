@@ -24,14 +24,15 @@ if TYPE_CHECKING:
 
 @require("plot")
 def animate(motion: "Motion", path: "str | Path", *, duration: float | None = None, rate: int = 25) -> None:
-    """Write an animation of the body on its track; of a space curve in three dimensions, of a train all its cars.
+    """Write an animation of the body, or of all cars of a train, on its track; a space curve is shown in three
+    dimensions.
 
     Parameters
     ----------
     motion : Motion
         The motion to show.
     path : path
-        The file to write. Its extension selects the format: ``.gif``, or ``.mp4`` where ffmpeg is installed.
+        The file to write. Its extension selects the format: ``.gif``, or ``.mp4`` if ffmpeg is installed.
     duration : float, optional
         Length of the animation in seconds of motion, from the launch on. Without it one period is shown, or the whole
         motion if it does not repeat.
@@ -74,7 +75,7 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
 
 
 def _ride(motion: "Motion") -> "Figure":
-    """The track in three dimensions, coloured by the vertical load on riders, or by the contact force."""
+    """Return the track in three dimensions, coloured by the vertical load on riders, or by the contact force."""
     figure, states = new_figure(8, 6), sampled(motion)
     view = figure.add_subplot(projection="3d")
     if motion.problem.formulas.rider_loads is None:

@@ -38,7 +38,7 @@ def _displayable_figure() -> "type[Figure]":
 
 
 def figure_of(axes: "Axes") -> "Figure":
-    """Return the figure that the axes belong to."""
+    """Return the figure to which the axes belong."""
     from matplotlib.figure import Figure
 
     figure = axes.figure

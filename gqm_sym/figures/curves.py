@@ -21,9 +21,9 @@ def drawn(points: Any, title: str, axes: Any = None) -> "Figure":
     points : sequence of array_like
         The coordinates x and z, or x, y and z, in m and in the order of the parameter.
     title : str
-        One line above it.
+        One line of text above it.
     axes : matplotlib Axes, optional
-        Where to draw. Without it a new figure is made.
+        The axes to draw on; by default a new figure is made.
     """
     if len(points) > 2:
         return _in_space(points, title, axes)

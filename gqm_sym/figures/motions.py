@@ -22,13 +22,14 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.runtime.motion.state import State
 
-# Number of states that are drawn, and the least number between two events.
+# The number of states that are drawn, and the smallest number between two events.
 MAX_SAMPLES, MIN_SAMPLES = 801, 33
 
-# How far a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
+# The distance by which a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
 PORTRAIT_MARGIN = 0.4
 
-# Orange where the contact force points along the normal (to the left of increasing parameter), purple where against it.
+# The track is orange where the contact force points along the normal (to the left of increasing parameter), and purple
+# where it points against it.
 FORCE_COLOURS = "PuOr_r"
 LINE_COLOUR = "#333333"
 FORCE_LABEL = "contact force N (N)"
@@ -47,15 +48,15 @@ OTHER_MARKER = ("X", "#666666")
 
 @require("plot")
 def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
-    """Draw the part of the track that the body runs through, coloured by the contact force, with the events.
+    """Draw the part of the track that the body passes, coloured by the contact force, with the events.
 
     Parameters
     ----------
     motion : Motion
         The motion; a periodic one is drawn over one period.
     axes : matplotlib Axes, optional
-        Where to draw; of a space curve the elevation is drawn there. Without it a new figure is made, that of a space
-        curve in three dimensions.
+        The axes to draw on, which show the elevation of a space curve. By default a new figure is made, which shows a
+        space curve in three dimensions.
 
     Returns
     -------
@@ -94,7 +95,7 @@ def _track_in_space(motion: "Motion", path: "State") -> "Figure":
 
 
 def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
-    """Draw the places of states on axes of three dimensions, in the colours of values there, white where these are 0.
+    """Draw the places of states on three-dimensional axes, in colours of the given values, with white for 0.
 
     A colour bar beside the axes shows the values under their ``label``.
     """
@@ -104,7 +105,7 @@ def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
     view.plot(path.x, path.y, path.z, color=LINE_COLOUR, linewidth=5.0)
     view.add_collection3d(line)
     view.set_aspect("equal")
-    # Smaller than its place, for the layout does not know how wide the labels of three dimensions are.
+    # The bar is smaller than its space, because the layout does not know the width of three-dimensional labels.
     view.set_box_aspect([np.ptp(ends()) for ends in (view.get_xlim, view.get_ylim, view.get_zlim)], zoom=0.85)
     view.locator_params(nbins=5)
     view.locator_params(axis="z", nbins=3)
@@ -113,13 +114,13 @@ def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
 
 
 def _segments(*coordinates: Array) -> list[Array]:
-    """The lines between points."""
+    """Return the lines between points."""
     points = np.stack(coordinates, axis=1)
     return list(np.stack([points[:-1], points[1:]], axis=1))
 
 
 def _coloured(values: Array) -> dict[str, Any]:
-    """How lines are drawn in the colours of values at their ends, white where these are 0."""
+    """Return the arguments that draw lines in the colours of values at their ends, with white for 0."""
     from matplotlib.colors import TwoSlopeNorm
 
     largest = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
@@ -132,7 +133,7 @@ def _coloured(values: Array) -> dict[str, Any]:
 
 
 def _marker(kind: str) -> dict[str, Any]:
-    """How an event is drawn."""
+    """Return the arguments that draw the marker of an event."""
     marker, colour = MARKERS.get(kind, OTHER_MARKER)
     return {"marker": marker, "color": colour, "markeredgecolor": "white", "markersize": 9, "linestyle": "none"}
 
@@ -146,7 +147,7 @@ def speed_and_force(motion: "Motion", axes: Any = None) -> "Figure":
     motion : Motion
         The motion; a periodic one is drawn over one period.
     axes : pair of matplotlib Axes, optional
-        Where to draw: the speed on the first, the contact force on the second. Without it a new figure is made.
+        The axes to draw on: the speed on the first, the contact force on the second; by default a new figure is made.
 
     Returns
     -------
@@ -179,7 +180,7 @@ def portrait(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
     motion : Motion
         A motion without friction, drag or resistance.
     axes : matplotlib Axes, optional
-        Where to draw. Without it a new figure is made.
+        The axes to draw on; by default a new figure is made.
 
     Returns
     -------
@@ -233,13 +234,15 @@ def _marks(motion: "Motion") -> list[tuple[str, float, float]]:
 
 
 def _shown_events(motion: "Motion") -> list["Event"]:
-    """The events up to the time up to which the motion is drawn, and what it approaches for ever."""
+    """Return the events up to the end of the drawn part of the motion, and the equilibrium that it approaches for
+    ever.
+    """
     end = horizon(motion)
     return [event for event in motion.events if event.t <= end or event.kind == "asymptote"]
 
 
 def drawing(motion: "Motion", what: str, axes: Any) -> "Figure":
-    """Draw one of the figures of a motion, given by name; `Motion.plot` is the public way to do so."""
+    """Draw one of the figures of a motion, given by name; the public method is `Motion.plot`."""
     figures = {"track": track, "speed_and_force": speed_and_force, "portrait": portrait}
     if what not in figures:
         raise InputError(f"plot: what: must be one of {', '.join(figures)}, got {what!r}")

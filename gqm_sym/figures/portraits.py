@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Grid points across a portrait. Each extremum is located by ZOOMS nested grids of as many points.
+# The number of grid points across a portrait. Each extremum is located by ZOOMS nested grids of as many points.
 GRID_POINTS = 1601
 ZOOMS = 3
 ENERGY_LEVELS = 9
@@ -33,7 +33,7 @@ ORBIT_COLOUR, SEPARATRIX_COLOUR, LAUNCH_COLOUR = "#0072b2", "#d55e00", "#009e73"
 ENERGY_RANGE = 1.5
 PERIODS_DRAWN = 1.5
 
-# Periods whose relative differences are smaller than this are drawn as equal.
+# Periods with smaller relative differences than this are drawn as equal.
 EQUAL_PERIODS = 1e-9
 
 # The largest relative step of the potential that may be rounding, and the largest width of a flat extremum, as a
@@ -74,7 +74,7 @@ def phase_portrait(
     through : pairs of numbers
         Launches ``(lam0, v)`` whose orbits are drawn as well; ``v`` is ds/dt in m/s, with its sign.
     axes : matplotlib Axes, optional
-        Where to draw. Without it a new figure is made.
+        The axes to draw on; by default a new figure is made.
     parameters
         Run-time parameters of the module.
 
@@ -167,10 +167,10 @@ def period_against_amplitude(
     module : module
         A generated module.
     places : sequence of numbers
-        Launch places (values of the curve parameter) in one potential well. A place from which the motion is not a
-        libration is left out.
+        Launch places (values of the curve parameter) in one potential well. Places from which the motion is not a
+        libration are omitted.
     axes : matplotlib Axes, optional
-        Where to draw. Without it a new figure is made.
+        The axes to draw on; by default a new figure is made.
     parameters
         Run-time parameters of the module.
 
@@ -245,7 +245,7 @@ def _extrema(potential: Array) -> Iterator[tuple[int, int]]:
 
 
 def _locate(potential_at: Any, low: float, high: float, sign: int) -> float:
-    """Return where the potential has its minimum (sign -1) or maximum (sign +1) between two places."""
+    """Return the place between two others at which the potential has its minimum (sign -1) or maximum (sign +1)."""
 
     def signed(places: Array) -> Array:
         values: Array = sign * potential_at(places)
@@ -273,7 +273,7 @@ def _reachable(potential: Array, top: int) -> slice:
 
 
 def _draw_orbit(axes: "Axes", lam: Array, w: Array, **style: Any) -> None:
-    """Draw both velocities where V**2 = w is not negative; each branch ends exactly at its turning points."""
+    """Draw both velocities for V**2 = w where w is not negative; each branch ends exactly at its turning points."""
     cuts = np.flatnonzero(np.diff(np.sign(w)) * np.isfinite(np.diff(w)))
     fractions = w[cuts] / (w[cuts] - w[cuts + 1])
     turns = lam[cuts] + fractions * (lam[cuts + 1] - lam[cuts])

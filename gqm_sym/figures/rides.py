@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 COLOURS = {"vertical": "#d55e00", "lateral": "#0072b2", "longitudinal": "#009e73"}
 SEATS = {"first": "#d55e00", "middle": "#333333", "last": "#0072b2"}
-# Times at which the loads in these cars are compared.
+# The number of times at which the loads in these cars are compared.
 SEAT_TIMES = 4001
 LOAD_LABEL = "load (9.80665 m/s²)"
 
@@ -73,7 +73,7 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
 
 @require("plot")
 def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = None) -> "Figure":
-    """Draw what riders feel in the first, the middle and the last car of a train, against the place of their car.
+    """Draw the loads on riders in the first, the middle and the last car of a train, against the place of their car.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
 
 
 def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
-    """Yield the first, the middle and the last car of a train, each with the least and the largest of its loads."""
+    """Yield the first, the middle and the last car of a train, each with the smallest and the largest of its loads."""
     cars = motion.cars(np.linspace(0.0, min(horizon(motion), motion.t_end), SEAT_TIMES))
     loads = [getattr(cars, f"n_{load}") for load in LOADS]
     for seat, car in _seats(cars.lam.shape[0]):
@@ -118,7 +118,7 @@ def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
 
 
 def _seats(count: int) -> list[tuple[str, int]]:
-    """Three cars of a train by name and number."""
+    """Return three cars of a train by name and number."""
     return list(zip(SEATS, (count - 1, count // 2, 0), strict=True))
 
 
@@ -129,7 +129,7 @@ def _limit(axes: Any, levels: Sequence[float], colour: str, label: str) -> None:
 
 
 def _levels(limits: Any) -> dict[str, list[float]]:
-    """The limits of each load, checked."""
+    """Check and return the limits of each load."""
     if not isinstance(limits, Mapping):
         raise InputError(f"limits: must be levels by load, as in {{'vertical': (-1, 5)}}, got {short(limits)}")
     found = {}

@@ -1,4 +1,4 @@
-"""The figure of a surveyed track: its points, what smoothing did to them, and how good its curvature is."""
+"""The figure of a surveyed track: its points, the effect of smoothing on them, and the error of its curvature."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINT, TRACK, BAND = "#d55e00", "#333333", "#0072b2"
-# Points that are drawn, at most.
+# The largest number of points that are drawn.
 MOST = 20_000
-# Standard errors on each side of the band: some 95 of 100 places are inside.
+# The number of standard errors on each side of the band, which contains some 95 of 100 places.
 ERRORS = 2.0
-# How far the largest shift is drawn beside the track, as a share of the track's size.
+# The distance from the track at which the largest shift is drawn, as a share of the track's size.
 FAR = 0.06
 MILLIMETRES = 1e3
 
@@ -91,7 +91,7 @@ def smoothing(curve: Any, axes: Any = None) -> "Figure":
 
 
 def _round(number: float) -> float:
-    """The next smaller of 1, 2, 5, 10, 20 and so on; 1 at least."""
+    """Return the largest of 1, 2, 5, 10, 20 and so on that does not exceed a number; at least 1."""
     if number <= 1.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(number))

@@ -1,1 +1,3 @@
-"""Parameters and launches found from measurements, and how uncertain answers are where these are uncertain."""
+"""Parameters and launches found from measurements, and the uncertainty of results due to that of launches and
+parameters.
+"""

@@ -1,4 +1,4 @@
-"""Measurements of a motion: what was measured, at which times, and how exactly."""
+"""Measurements of a motion: the measured quantities, their times, and their standard deviations."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -10,7 +10,8 @@ from gqm_sym.errors import InputError
 from gqm_sym.literals.numbers import read_numbers
 from gqm_sym.runtime.compiled.types import Array
 
-# What is measured at times, and what each launch has one of, with their units; that of a place is the parameter's own.
+# The quantities that are measured at times, and those that each launch has once, with their units; the unit of a place
+# is that of the parameter.
 AT_TIMES = {"lam": None, "s": "m", "x": "m", "y": "m", "z": "m", "v": "m/s"}
 OF_LAUNCHES = {"period": "s", "half_period": "s"}
 PASSAGES = "passages"
@@ -18,7 +19,7 @@ UNITS = {**AT_TIMES, **OF_LAUNCHES, PASSAGES: "s"}
 
 
 class Measurements(NamedTuple):
-    """What was measured.
+    """Measured quantities.
 
     Attributes
     ----------
@@ -27,9 +28,9 @@ class Measurements(NamedTuple):
     sigma : dict or None
         For each quantity the standard deviations, (n,) arrays; None if none were given.
     t : array or None
-        The times in s of what was measured at times.
+        The times in s of the measurements that were made at given times.
     place : array or None
-        For passages the place of each, as a value of the curve parameter.
+        For passages, the place of each, as a value of the curve parameter.
     columns : dict
         Launch arguments and run-time parameters that differ from one period to the next, (n,) arrays.
     """
@@ -101,7 +102,7 @@ def _column(values: Any, name: str, unit: str | None) -> Array:
     array = np.asarray(plain) if not hasattr(plain, "units") else plain
     if getattr(array, "dtype", None) is not None and array.dtype.kind == "f" and not np.isfinite(array).all():
         where = int(np.flatnonzero(~np.isfinite(np.ravel(array)))[0])
-        raise InputError(f"data: {name}: row {where + 1} is no finite number; leave out what was not measured")
+        raise InputError(f"data: {name}: row {where + 1} is not a finite number; leave out what was not measured")
     numbers, _, shape = read_numbers(plain, where=f"data: {name}", unit=unit)
     if len(shape) > 1:
         raise InputError(f"data: {name}: must be one column, got the shape {shape}")
@@ -109,7 +110,7 @@ def _column(values: Any, name: str, unit: str | None) -> Array:
 
 
 def _check_times(times: Array, name: str) -> None:
-    """Refuse periods that are not positive, and passages that are not one after the other."""
+    """Refuse periods that are not positive, and passages that are not in the order of time."""
     before = np.concatenate([[0.0], times[:-1]]) if name == PASSAGES else np.zeros_like(times)
     wrong = np.flatnonzero(~(times > before))
     if wrong.size:
@@ -126,7 +127,7 @@ def _spread(column: Array, name: str, count: int) -> Array:
 def _deviations(
     sigma: Any, quantities: list[str], units: Mapping[str, str | None], count: int
 ) -> dict[str, Array] | None:
-    """The standard deviations: one number or column for all quantities, or one for each."""
+    """Return the standard deviations, given as one number or column for all quantities, or one for each."""
     if sigma is None:
         return None
     each = sigma if isinstance(sigma, Mapping) else dict.fromkeys(quantities, sigma)

@@ -18,23 +18,23 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.model import CompiledModel
 
-# The step of a difference quotient, of the size of the parameter, where a motion has no gradients.
+# The step of a difference quotient, as a share of the parameter, for motions without gradients.
 STEP = 1e-6
 
-# Directions in which a change of the parameters changes the measurements less than this, relative to the direction in
-# which it changes them most, cannot be determined from the data. The second holds for difference quotients.
+# If a direction in the space of parameters changes the measurements less than this, relative to the direction that
+# changes them most, the data do not determine it. The second number is for difference quotients.
 RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
 
-# A parameter takes part in such a direction if its share of it is more than this.
+# A parameter belongs to such a direction if its share of it is more than this.
 MIN_SHARE = 1e-3
 
-# Motions that lose energy are followed this much further than the last passage that is looked for.
+# Motions that lose energy are followed further than the last measured passage by this factor.
 AMPLE = 1.5
 
-# Steps of the solver; from a guess that is near it takes ten.
+# The largest number of steps of the solver, which takes ten from a good guess.
 MAX_STEPS = 200
 
-# Numbers of a launch that may be free, and those that choose among launches.
+# Arguments of a launch that may be free, and those that select a launch.
 LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
 
 
@@ -61,15 +61,15 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
         the first passage first.
         And ``sigma``, their standard deviation: a number, a column, or a mapping with one for each quantity.
     free : mapping
-        What is to be found, run-time parameters, "lam0" or "v0": a first guess, limits ``(low, high)``, all three
-        ``(low, guess, high)``, or None for the value that is given by keyword or the model's default.
+        The unknowns, which are run-time parameters, "lam0" or "v0", each with a first guess, limits ``(low, high)``,
+        all three ``(low, guess, high)``, or None for the value that is given by keyword or the model's default.
     fixed
-        All else of the launch and the parameters, as for ``module.solve``.
+        All other arguments of the launch and the parameters, as for ``module.solve``.
 
     Returns
     -------
     Fit
-        Estimates, standard deviations, covariance, residuals, and the names that the data cannot tell apart.
+        Estimates, standard deviations, covariance, residuals, and the names that the data cannot distinguish.
 
     Raises
     ------
@@ -80,10 +80,10 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
 
     Notes
     -----
-    Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
-    difference quotients of solved motions where these are not there yet, as with losses along curves without formulas.
-    Without ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals.
-    First guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
+    Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, or
+    difference quotients of solved motions if there are no such derivatives. Without ``sigma`` all measurements have the
+    same unknown standard deviation, which is estimated from the residuals. First guesses for long series of positions
+    must be so near that the fitted motion does not slip by a swing.
     """
     from scipy.optimize import least_squares
 
@@ -103,7 +103,7 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     if size < len(unknown.names):
         raise InputError(f"data: {size} measurements cannot determine {len(unknown.names)} numbers; free fewer of them")
     residuals = Residuals(module, measured, unknown, fixed)
-    residuals.predicted(unknown.start)  # a launch that is refused says why
+    residuals.predicted(unknown.start)  # the error of a refused launch gives the reason
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.isfinite(residuals(unknown.start)).all():
             raise InputError("sigma: is so small that the first guess is infinitely many deviations away")
@@ -122,13 +122,13 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
 
 
 def units_of(model: CompiledModel) -> dict[str, str | None]:
-    """Return the units of all numbers that may be sought or given."""
+    """Return the units of all numbers that may be unknown or given."""
     own = model.units.get(model.parameter)
     return {"lam0": own, "v0": "m/s", **{name: model.units.get(name) for name in model.parameters}}
 
 
 def _free(model: CompiledModel, free: Mapping[str, Any], fixed: Mapping[str, Any]) -> Free:
-    """Names, first guesses and limits of what is to be found."""
+    """Return names, first guesses and limits of the unknowns."""
     if not isinstance(free, Mapping) or not free:
         raise InputError(f"free: must be a mapping from names to first guesses, as {{'L': 1.2}}, got {short(free)}")
     names = (*LAUNCH, *model.parameters)
@@ -165,9 +165,9 @@ class Residuals:
     module : module
         The generated module.
     measured : Measurements
-        What was measured.
+        The measurements.
     free : Free
-        What is to be found.
+        The unknowns.
     fixed : mapping
         All other arguments of ``module.solve``.
     """
@@ -183,11 +183,11 @@ class Residuals:
         self._solved: tuple[Array, Any] | None = None
 
     def arguments(self, x: Array) -> dict[str, Any]:
-        """All arguments of ``module.solve`` for values of what is to be found."""
+        """Return all arguments of ``module.solve`` for values of the unknowns."""
         return {**self.fixed, **dict(zip(self.free.names, x.tolist(), strict=True))}
 
     def motion(self, x: Array) -> Any:
-        """The motion for values of what is to be found; it answers for residuals and for their derivatives."""
+        """Return the motion for values of the unknowns, which serves for residuals and for their derivatives."""
         if self._solved is not None and np.array_equal(self._solved[0], x):
             return self._solved[1]
         arguments = self.arguments(x)
@@ -197,7 +197,7 @@ class Residuals:
         return self._solved[1]
 
     def __call__(self, x: Array) -> Array:
-        """The residuals; NaN where there is no such motion, which the solver steps back from."""
+        """Return the residuals; NaN if there is no such motion, so that the solver takes a shorter step."""
         try:
             residuals: Array = (self.predicted(x) - self.values) / self.sigma
             return residuals
@@ -220,14 +220,14 @@ class Residuals:
         return np.concatenate([np.broadcast_to(self._swept(name, x).values, shape) for name in names])
 
     def _swept(self, name: str, x: Array, **options: Any) -> Any:
-        """A sweep over what differs from one measurement to the next."""
+        """Return a sweep over the arguments that differ from one measurement to the next."""
         swept = self.module.sweep(name, **{"lam0": 0.0, **self.arguments(x), **self.measured.columns}, **options)
         if np.any(swept.status):
             raise SolutionError(f"{name}: {'; '.join(swept.status_counts())}")
         return swept
 
     def jacobian(self, x: Array) -> Array:
-        """The derivatives of the residuals: a column for each number that is to be found."""
+        """Return the derivatives of the residuals, a column for each unknown."""
         found = None
         if self.exact:
             try:
@@ -254,20 +254,20 @@ class Residuals:
         if self.measured.place is not None:
             motion = self.motion(x)
             times = _passages(motion, self.measured.place)
-            # A change that carries the body further along has it pass the place earlier.
+            # A change that moves the body forwards lets it pass the place earlier.
             sooner: Array = motion.place_changes(times, wrt) / _rates(motion, times)
             return -sooner.T
         shape = (*next(iter(self.measured.values.values())).shape, len(wrt))
         return np.concatenate([np.broadcast_to(self._swept(name, x, gradient=wrt).gradient, shape) for name in names])
 
     def _differences(self, x: Array) -> Array:
-        """Difference quotients."""
+        """Return the derivatives by difference quotients."""
         steps = STEP * np.maximum(np.abs(x), 1e-3 * np.maximum(np.abs(self.free.start), 1.0))
         return central_differences(self.predicted, x, steps, self.free.low, self.free.high)
 
 
 def _until_rest(motion: Any, t: Array) -> Array:
-    """Times, of which those after the body has come to rest are that of its rest, where it stays."""
+    """Return times, with those after the body has come to rest replaced by the time of rest, because it stays there."""
     end = motion.t_end if motion.kind == "dissipative" else inf
     return np.minimum(t, end) if isfinite(end) and motion.legs[-1].end == "rest" else t
 
@@ -280,7 +280,7 @@ def _rates(motion: Any, t: Array) -> Array:
 
 
 def _passages(motion: Any, places: Array) -> Array:
-    """The times of consecutive passages through places after the launch, the k-th one through the k-th place."""
+    """Return the times of consecutive passages through places after the launch, the k-th one through the k-th place."""
     repeats = motion.kind in ("libration", "circulation")
     period, lap = (motion.period, motion.problem.period) if repeats else (0.0, 0.0)
     legs = [leg for leg in motion.legs if leg.t_end > leg.t_start]
@@ -299,7 +299,7 @@ def _passages(motion: Any, places: Array) -> Array:
 
 
 def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
-    """The time at which a body is at a place on a leg; its end belongs to the next leg."""
+    """Return the time at which a body is at a place on a leg, the end of which belongs to the next leg."""
     from scipy.optimize import brentq
 
     low, high = sorted((leg.lam_start, leg.lam_end))
@@ -313,7 +313,7 @@ def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
 
 
 def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
-    """The description of a fit."""
+    """Return the description of a fit."""
     names, measured = residuals.free.names, residuals.measured
     if not converged:
         raise SolutionError(

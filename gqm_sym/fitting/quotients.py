@@ -1,4 +1,4 @@
-"""Difference quotients, for what has no derivatives."""
+"""Difference quotients, for functions without derivatives."""
 
 from collections.abc import Callable
 from math import inf
@@ -21,9 +21,9 @@ def central_differences(
     at : (n,) array
         The place at which the quotients are taken.
     steps : (n,) array
-        The steps to both sides, in the units of the arguments.
+        The steps in both directions, in the units of the arguments.
     low, high : float or (n,) array
-        Limits of the arguments, which are not left.
+        Limits of the arguments, which are not exceeded.
 
     Returns
     -------

@@ -62,12 +62,12 @@ class Fit:
         return correlation
 
     def __str__(self) -> str:
-        """The estimates with their standard deviations, and how well they fit."""
+        """Return the estimates with their standard deviations, and the quality of the fit."""
         width = max(map(len, self.names))
         lines = [f"  {name:<{width}}  {self._estimate(name)}" for name in self.names]
         for names in self.unidentified:
             what = " and ".join(names)
-            lines.append(f"  the data do not tell {what}{' apart' if len(names) > 1 else ''}")
+            lines.append(f"  the data do not {f'tell {what} apart' if len(names) > 1 else f'determine {what}'}")
         count = sum(values.size for values in self.residuals.values())
         spread = "" if self.measured.sigma is not None else " (standard deviations from the residuals)"
         return "\n".join(
@@ -127,7 +127,7 @@ class Fit:
 
 
 def with_deviation(value: float, std: float) -> str:
-    """Return a value with its standard deviation as text, with two digits of the latter."""
+    """Return a value with its standard deviation as text, with two digits of the deviation."""
     if not isfinite(std):
         return f"{value:.6g}, not determined"
     if std == 0.0:

@@ -1,4 +1,4 @@
-"""The uncertainty of an answer from that of launch and parameters: by derivatives, and by many exact answers."""
+"""The uncertainty of a result due to that of launch and parameters, by derivatives and by many exact results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
 
-# Answers in a sample if no number is given, and at most.
+# The number of results in a sample if none is given, and the largest number.
 SAMPLES, MAX_SAMPLES = 10_000, 10_000_000
 
 # The step of a difference quotient, as a share of the number or of its standard deviation, whichever is greater.
@@ -68,7 +68,7 @@ class Uncertainty:
     missing: int
 
     def __str__(self) -> str:
-        """Both results, one below the other."""
+        """Return both results, one below the other."""
         lines = [
             f"{self.quantity}",
             f"  linear   {with_deviation(*self.linear)}",
@@ -91,7 +91,7 @@ def uncertainty(
     seed: int = 0,
     **fixed: Any,
 ) -> Uncertainty:
-    """Return how uncertain a quantity of a motion is where its launch and parameters are uncertain.
+    """Return the uncertainty of a quantity of a motion due to that of its launch and parameters.
 
     Parameters
     ----------
@@ -101,18 +101,18 @@ def uncertainty(
         A quantity of ``module.sweep`` that is one number: "period", "v_max", "time_at", ...
     uncertain : mapping or Fit
         Run-time parameters, "lam0" or "v0", each with its value and its standard deviation: ``{"L": (1.0, 1e-3)}``.
-        They are independent and normally distributed. Or the result of `fit`, with its covariance.
+        These numbers are independent and normally distributed. Alternatively the result of `fit`, with its covariance.
     samples : int
         The number of values that are drawn.
     seed : int
         The seed of the random numbers; the same seed gives the same samples.
     fixed
-        All else of the launch and the parameters, as for ``module.sweep``.
+        All other arguments of the launch and the parameters, as for ``module.sweep``.
 
     Returns
     -------
     Uncertainty
-        ``.linear``, by the derivatives of the quantity, and ``.sampled``, by a sweep. Where they differ, the quantity
+        ``.linear``, from the derivatives of the quantity, and ``.sampled``, from a sweep. If they differ, the quantity
         is not linear within the standard deviations, and the sample is right.
 
     Raises
@@ -124,7 +124,7 @@ def uncertainty(
 
     Notes
     -----
-    Derivatives are those of ``motion.gradient``, exact to rounding, or difference quotients where there are none.
+    Derivatives are those of ``motion.gradient``, exact to rounding, or difference quotients if there are none.
     """
     model: CompiledModel = compiled_model(module, where="uncertainty")
     asked = one_of(quantity, tuple(QUANTITIES), where="uncertainty: quantity")
@@ -173,7 +173,9 @@ def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tup
     """Return the uncertain numbers by their names, and their covariance."""
     if isinstance(uncertain, Fit):
         if uncertain.unidentified:
-            raise InputError(f"uncertainty: the data of the fit do not tell {' and '.join(uncertain.unidentified[0])}")
+            raise InputError(
+                f"uncertainty: the data of the fit do not determine {' and '.join(uncertain.unidentified[0])}"
+            )
         return uncertain.estimates, uncertain.covariance
     if not isinstance(uncertain, Mapping) or not uncertain:
         raise InputError(
@@ -208,7 +210,7 @@ def _draws(covariance: Array, samples: int, seed: int) -> Array:
 
 
 def _gradient(module: ModuleType, quantity: str, values: dict[str, float], fixed: Mapping[str, Any]) -> Array | None:
-    """Return the derivatives of a quantity; None where there are none."""
+    """Return the derivatives of a quantity; None if there are none."""
     launch = {name: value for name, value in fixed.items() if name != "lam"}
     motion = module.solve(**{"lam0": 0.0, **launch, **values})
     try:

@@ -1,4 +1,4 @@
-"""The force law as data: the slots of one linear equation for W = V**2, added slot by slot.
+"""The force law as data: the terms of one linear equation for W = V**2, which are added term by term.
 
 With v the sign of ds/dt, F the applied force per unit mass, n0 = -F.n and N/m = kappa*W + n0 (section 2 of the notes
 on the mathematics)::
@@ -43,7 +43,7 @@ from gqm_sym.parameters import (
 
 X = sp.Symbol("x", real=True)
 Z = sp.Symbol("z", real=True)
-"""The coordinates of the plane, in which potentials are written."""
+"""The coordinates of the plane, as used in potentials."""
 Y = sp.Symbol("ŷ", real=True)
 """The third coordinate, on space curves; in the plane it is 0, and a parameter may be called y there."""
 W = sp.Symbol("W", real=True)
@@ -54,7 +54,7 @@ CONTACT_SIGN = sp.Symbol("contact_sign", real=True)
 """The sign of the contact force."""
 MASS = sp.Symbol("m", real=True)
 KAPPA = sp.Symbol("κ", real=True)
-"""Signed curvature, in a resistance; no parameter is called so, for those have ASCII names."""
+"""Signed curvature in a resistance. No parameter has this name, because parameters have ASCII names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,7 +216,7 @@ class Kernel:
         return Kernel(
             terms=self.terms + other.terms,
             potential=self.potential + other.potential,
-            # 1 + beta of one kernel and 1 of another: the excesses add.
+            # If one kernel has 1 + beta and another has 1, the terms beyond 1 add up.
             inertia=self.inertia + other.inertia - 1,
             resistance=self.resistance + other.resistance,
             drag=self.drag + other.drag,
@@ -247,7 +247,7 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
             raise DeclarationError(f"kernel: {name} is given twice; give it once")
         if {name, *names} >= _EXCLUSIVE and name in _EXCLUSIVE:
             raise DeclarationError(
-                "kernel: rolling and coulomb exclude each other: what rolls without slipping does not slide; "
+                "kernel: rolling and coulomb exclude each other: a body that rolls without slipping does not slide; "
                 "leave one of them out (rolling has mu_static, the friction that it needs)"
             )
     values = dict(first.defaults)
@@ -263,12 +263,12 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
             )
 
 
-# Forces that act on a body as a whole: a second one is a mistake, not a sum.
+# These forces act on a body as a whole, so that a second one is a mistake and not a sum.
 _ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame", "train"})
 _EXCLUSIVE = frozenset({"rolling", "coulomb"})
 
 
-# What the parameters of the kernels are measured in, by their usual names.
+# The dimensions of the parameters of the kernels, by their usual names.
 UNITS = {
     "g": "m/s**2",
     "Omega": "rad/s",
@@ -287,7 +287,7 @@ UNITS = {
 def kernel_formulas(kernel: Kernel) -> Formulas:
     """Return the formulas of a force law with their dimensions.
 
-    Those of a resistance are left out: the printed form of surface tension takes its numbers in SI.
+    Those of a resistance are omitted, because the printed form of surface tension takes its numbers in SI units.
     """
     fields = (
         (kernel.potential, SPEED_SQUARED),
@@ -316,7 +316,7 @@ def units_by_role(kernel: Kernel) -> dict[str, str]:
 def parameter(given: Given | None, name: str, *, where: str) -> tuple[sp.Symbol, tuple[str, Value | None]]:
     """Read a kernel's argument: another name for its parameter, a value for it, or nothing.
 
-    Returns the symbol to write the law with and the pair of name and default.
+    The function returns the symbol for the law, and the pair of name and default.
     """
     called, default = read_argument(given, name, where=where)
     return sp.Symbol(called, real=True), (called, default)

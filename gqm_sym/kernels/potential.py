@@ -1,4 +1,4 @@
-"""A potential of the user's own."""
+"""A user's own potential."""
 
 from collections.abc import Iterable, Mapping
 

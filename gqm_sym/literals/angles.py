@@ -6,7 +6,7 @@ from fractions import Fraction
 from gqm_sym.errors import ExpressionError
 from gqm_sym.literals.trees import evaluate
 
-# The first 100 decimals of pi.
+# The first 100 decimal digits of pi.
 _DIGITS = int("31415926535897932384626433832795028841971693993751058209749445923078164062862089986280348253421170679")
 _PI = (Fraction(_DIGITS, 10**100), Fraction(_DIGITS + 1, 10**100))
 Pair = tuple[Fraction, Fraction]
@@ -23,7 +23,9 @@ def enclose_angle(tree: ast.expr, *, where: str) -> Pair | None:
 
 
 class _Angles:
-    """The algebra of pairs (p, q). An operation that leads out of it is refused, for the caller to use `enclose`."""
+    """The algebra of pairs (p, q). An operation whose result is not such a pair is refused, and the caller then uses
+    `enclose`.
+    """
 
     def number(self, value: Fraction) -> Pair:
         return value, Fraction(0)

@@ -73,7 +73,7 @@ def enclose(
     bits
         The required relative precision, in bits.
     where
-        What the tree is, for messages of errors.
+        The name of the tree in messages of errors.
     values
         Values of the names in the tree, as trees without names. They are used as intervals, so that no exact number
         becomes long.
@@ -125,7 +125,7 @@ class _Enclosures:
     last
         Whether this is the highest precision, at which every question is decided.
     names
-        Whether unknown names are allowed; the value of what depends on them is None.
+        Whether unknown names are allowed; values that depend on them are None.
     values
         Values of known names.
     """
@@ -277,7 +277,7 @@ class _Enclosures:
     def checked(self, value: Interval, scale: int = 0) -> Fraction | Interval:
         """Check the size of a value; at the last precision a value that may be zero is zero.
 
-        ``scale`` is the binary exponent of the terms that the value is the sum of.
+        ``scale`` is the binary exponent of the terms whose sum the value is.
         """
         low, high = value
         if max(abs(_scale(low)), abs(_scale(high))) > MAX_SCALE:

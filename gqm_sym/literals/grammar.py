@@ -10,7 +10,7 @@
 
 A tree consists of Python's ``ast`` nodes (BinOp, UnaryOp, Call, Name, Constant), so that ``ast.walk`` works on it.
 Python's own parser is not used: it accepts far more than arithmetic, reads ``9.81`` as a double, and can be overrun by
-deep nesting. Constants hold Fractions. Text is never executed.
+deep nesting. Constants contain Fractions. Text is never executed.
 """
 
 import ast
@@ -34,10 +34,12 @@ FUNCTIONS = (
 CONSTANTS = ("pi", "e")
 MAX_LENGTH = 4000
 
-# Deeper than anyone writes. SymPy differentiates by recursion and survives 30 levels on an empty stack.
+# The largest depth, which no practical text reaches. SymPy differentiates by recursion and survives 30 levels on an
+# empty stack.
 MAX_DEPTH = 25
 
-# More than any measurement has, so that what ``period_to`` prints can be read back.
+# The largest number of digits, which exceeds that of any measurement, so that the output of ``period_to`` can be read
+# back.
 MAX_DIGITS = 400
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _TOKEN = re.compile(
@@ -82,7 +84,7 @@ def parse(text: str, *, where: str) -> ast.expr:
     text
         At most 4000 ASCII characters.
     where
-        What the text is, for messages of errors: ``curve.graph.z``.
+        The name of the text in messages of errors, such as ``curve.graph.z``.
 
     Returns
     -------
@@ -136,7 +138,7 @@ def _tokens(text: str, where: str) -> list[_Token]:
 
 
 def _unexpected(character: str) -> str:
-    """Return the message about a character that is not in the grammar, with what to write instead."""
+    """Return the message about a character that is not in the grammar, with a remedy."""
     if character.isascii():
         return f"unexpected {character!r}; {_HINTS.get(character, _ALLOWED)}"
     name = unicodedata.name(character, "")

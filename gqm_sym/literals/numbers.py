@@ -1,4 +1,4 @@
-"""Numbers whose value is exactly what was written, read without SymPy.
+"""Numbers whose value is exactly the one that was written, read without SymPy.
 
 A float stands for its binary value. An int, text such as ``"9.81"`` or ``"-pi/2 + 6/5"``, a Decimal, a Fraction and a
 SymPy number stand for exactly the number written. mpmath is imported only for irrational numbers and for ``Number.at``.
@@ -24,16 +24,16 @@ from gqm_sym.literals.units import Unit, is_quantity, scale_of, split_unit, unit
 if TYPE_CHECKING:
     from decimal import Decimal
 
-# Precision at which both parts of a double-double are correctly rounded, except with a probability of 2**-80.
+# The precision at which both parts of a double-double are correctly rounded, except with a probability of 2**-80.
 _PAIR_BITS = 192
 
-# Precision to which a number next to the midpoint of two doubles is rounded first, so that a tie is recognised.
+# The precision to which a number next to the midpoint of two doubles is rounded first, so that a tie is recognised.
 _TIE_BITS = 700
 
-# pi with the digits of extended doubles, where the machine has them.
+# pi with the digits of extended doubles, if the machine has them.
 _PI = np.longdouble("3.14159265358979323846264338327950288")
 
-# Below this integers are doubles; the number of bytes that a double takes.
+# The limit below which all integers are doubles, and the number of bytes of a double.
 _EXACT_BELOW, _DOUBLE_SIZE = 2.0**53, 8
 
 # Extra bits beyond the precision that ``at`` returns, so that its result is rounded only once.
@@ -42,7 +42,7 @@ _GUARD_BITS = 16
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Number:
-    """A finite real number that is known exactly. Made by ``read_number``.
+    """A finite real number that is known exactly; ``read_number`` makes it.
 
     Attributes
     ----------
@@ -133,10 +133,10 @@ def read_number(value: Source, *, where: str, unit: str | None = None) -> Number
     value
         A float, int, text, quantity, Decimal, Fraction, NumPy scalar, mpmath float, SymPy number or Number.
     where
-        What the number is, for messages of errors: ``lam0``.
+        The name of the number in messages of errors, such as ``lam0``.
     unit
-        The SI unit of what it is, "1" of a plain number or an angle: quantities of pint, and text such as "30 deg", are
-        converted. None if it is not known: then they are refused.
+        The SI unit of the number, "1" for a plain number or an angle; quantities of pint, and text such as "30 deg",
+        are converted to it. None if it is not known; they are then refused.
 
     Returns
     -------
@@ -177,16 +177,17 @@ def read_number(value: Source, *, where: str, unit: str | None = None) -> Number
 
 
 def flat_doubles(array: Doubles) -> Doubles:
-    """The elements of an array of doubles as compiled code takes them: in one aligned piece that can be written.
+    """Return the elements of an array of doubles in the form that compiled code requires: contiguous, aligned and
+    writable.
 
-    Columns of a DataFrame and arrays made by broadcasting often cannot be written.
+    Columns of a DataFrame and arrays made by broadcasting are often not writable.
     """
     flat = np.ascontiguousarray(array).reshape(-1)
     return flat if flat.flags.writeable and flat.flags.aligned else flat.copy()
 
 
 def doubles_at_once(values: Any) -> Doubles | None:
-    """Numbers that doubles hold exactly, as an array of their shape; None of others, which are read one by one.
+    """Return numbers that are exactly doubles as an array of their shape; None for others, which are read one by one.
 
     Parameters
     ----------
@@ -247,13 +248,13 @@ def _read_text(text: str, where: str, unit: str | None) -> Number:
 
 
 def _of_quantity(value: Any, where: str, unit: str | None) -> Number:
-    """The number of SI units that a quantity is."""
+    """Return a quantity as a number of SI units."""
     scale = scale_of(unit_of_quantity(value), unit, where=where)
     return _scaled(read_number(value.magnitude, where=where), scale, where)
 
 
 def _scaled(number: Number, scale: Unit, where: str) -> Number:
-    """The number of SI units that a number of other units is; its text is what a person would write."""
+    """Convert a number of other units to a number of SI units, with a text as a person would write it."""
     if scale.is_si:
         return number
     power = {0: "", 1: "*pi"}.get(scale.turns, f"*pi**({scale.turns})")
@@ -271,7 +272,7 @@ def _scaled(number: Number, scale: Unit, where: str) -> Number:
 
 
 def _of_quantities(values: Any, where: str, unit: str | None) -> tuple[Doubles, Doubles, tuple[int, ...]]:
-    """The numbers of SI units in an array of quantities; doubles are converted all at once."""
+    """Return an array of quantities as numbers of SI units; doubles are converted all at once."""
     scale = scale_of(unit_of_quantity(values), unit, where=where)
     magnitude = np.asarray(values.magnitude)
     if scale.is_si:
@@ -287,7 +288,7 @@ def _of_quantities(values: Any, where: str, unit: str | None) -> tuple[Doubles, 
 
 
 def without_unit(value: Any, *, where: str, unit: str | None) -> Any:
-    """Convert quantities, or texts with units, and return anything else as it is.
+    """Convert quantities, or texts with units, and return anything else unchanged.
 
     The arguments are those of `read_number`.
     """
@@ -306,7 +307,7 @@ def without_unit(value: Any, *, where: str, unit: str | None) -> Any:
 
 
 def _plain(values: Any, where: str, unit: str | None) -> Any:
-    """The same with quantities in it read: NumPy would strip their units."""
+    """Convert the quantities among values, because NumPy would remove their units."""
     if is_quantity(values):
         return read_number(values, where=where, unit=unit)
     if isinstance(values, list | tuple):
@@ -341,7 +342,9 @@ def _number(pair: tuple[float, float], source: Fraction | ast.expr, text: str) -
 
 
 def _split(exact: Fraction, where: str) -> tuple[float, float]:
-    """Return the nearest double and that of the remainder. Python divides integers with correct rounding."""
+    """Return the nearest double and the double nearest to the remainder. Python divides integers with correct
+    rounding.
+    """
     try:
         value = exact.numerator / exact.denominator
     except OverflowError:

@@ -84,7 +84,7 @@ def from_mpf(value: Any) -> Fraction:
 
 
 def is_numpy_span(value: object) -> bool:
-    """Whether a value is a span of time of NumPy's, which counts it among the integers."""
+    """Return whether a value is a time span of NumPy, which counts these among the integers."""
     return type(value).__name__ == "timedelta64"
 
 
@@ -96,7 +96,7 @@ def read_exact(value: object, *, where: str) -> Fraction | None:
     value
         An int, float, Fraction, Decimal, NumPy scalar, or mpmath or SymPy float; anything else gives None.
     where
-        What the value is, for messages of errors.
+        The name of the value in messages of errors.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def _is_numpy_float(value: object) -> bool:
 
 
 def _is_special(value: Any) -> bool:
-    """Whether a value is NaN or infinite; comparing a signalling NaN raises an error."""
+    """Return whether a value is NaN or infinite; comparing a signalling NaN raises an error."""
     try:
         return not -math.inf < value < math.inf
     except (ArithmeticError, TypeError, ValueError):

@@ -28,7 +28,7 @@ _NOT_REAL = {
 
 
 def is_sympy(value: object) -> bool:
-    """Whether ``value`` is a SymPy object."""
+    """Return whether ``value`` is a SymPy object."""
     return any((base.__module__ or "").partition(".")[0] == "sympy" for base in type(value).__mro__)
 
 

@@ -1,6 +1,6 @@
 """Trees of arithmetic, and their evaluation in any algebra.
 
-A tree consists of ``ast`` nodes: BinOp, UnaryOp, Call with one argument, Name, and Constant holding a Fraction.
+A tree consists of ``ast`` nodes: BinOp, UnaryOp, Call with one argument, Name, and Constant with a Fraction.
 """
 
 import ast
@@ -19,8 +19,8 @@ N = TypeVar("N", bound=ast.expr)
 class Algebra(Protocol[T]):
     """The operations that `evaluate` needs.
 
-    A method raises ``ValueError`` or ``ArithmeticError`` for what it cannot compute; ``evaluate`` adds the place. Sums
-    and products are passed as a whole, since adding term by term takes quadratic time in some algebras.
+    A method raises ``ValueError`` or ``ArithmeticError`` for operations that it cannot compute; ``evaluate`` adds the
+    place. Sums and products are passed as a whole, since adding term by term takes quadratic time in some algebras.
     """
 
     def number(self, value: Fraction, /) -> T:
@@ -108,7 +108,7 @@ def constant(value: Fraction, column: int | None = None) -> ast.Constant:
 
 
 def at_column(node: N, column: int) -> N:
-    """Return the same node, with its column, counted from 0."""
+    """Return the same node with its column, counted from 0."""
     node.lineno, node.col_offset = 1, column
     return node
 

@@ -1,4 +1,4 @@
-"""Units of measurement: read as exact multiples of SI units, as text or as the units of quantities of pint.
+"""Units of measurement, given as text or by quantities of pint, and read as exact multiples of SI units.
 
 Units are written in the grammar of expressions, ``km/h`` or ``m/s**2``; their names are pint's, which is imported only
 for a name that is not in `_SI`. Nothing is rounded: a foot is 381/1250 m, and a degree is pi/180. A quantity is
@@ -19,7 +19,9 @@ from gqm_sym.literals.trees import evaluate
 
 
 class Unit(NamedTuple):
-    """``factor * pi**turns * m**metre * kg**kilogram * s**second * rad**radian``, everything exact."""
+    """The unit ``factor * pi**turns * m**metre * kg**kilogram * s**second * rad**radian``, in which everything is
+    exact.
+    """
 
     factor: Fraction = Fraction(1)
     turns: int = 0
@@ -44,7 +46,7 @@ class Unit(NamedTuple):
 
     @property
     def is_si(self) -> bool:
-        """Whether values in it are values in SI."""
+        """Whether values in this unit are values in SI units."""
         return self.factor == 1 and self.turns == 0
 
 
@@ -61,7 +63,7 @@ _SI = {
 _GAP = re.compile(
     r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])|(?<=[\d.)])(?=[A-Za-z\u00b0\u00b5])(?![eE][+-]?\d)"
 )
-# Signs for which the grammar has no word.
+# Signs that the grammar does not have.
 _SIGNS = {"\u00b0": "deg", "\u00b5": "micro", "%": "percent"}
 
 
@@ -71,16 +73,16 @@ def read_unit(text: str, *, where: str) -> Unit:
     Raises
     ------
     ExpressionError
-        If it is none, with the column of what is wrong.
+        If the text is not a unit; the message gives the column of the mistake.
     """
     unit = evaluate(parse(text, where=where), _Units(), where=where)
     if not unit.factor:
-        raise InputError(f"{where}: {text} is nothing; a unit is more than that")
+        raise InputError(f"{where}: {text} is zero, which is not a unit")
     return unit
 
 
 def check_unit(text: str, wanted: str | None) -> None:
-    """Refuse a unit of another dimension than that of ``wanted``; None: any will do.
+    """Refuse a unit whose dimension is not that of ``wanted``; if that is None, any unit is accepted.
 
     Raises
     ------
@@ -93,19 +95,19 @@ def check_unit(text: str, wanted: str | None) -> None:
 
 
 def is_quantity(value: object) -> bool:
-    """Whether a value has a magnitude and units, as a quantity of pint has."""
+    """Return whether a value has a magnitude and units, as a quantity of pint does."""
     return hasattr(value, "magnitude") and hasattr(value, "units")
 
 
 def unit_of_quantity(value: Any) -> str:
-    """The units of a quantity as text that `read_unit` reads."""
+    """Return the units of a quantity as text that `read_unit` reads."""
     text = f"{value.units:D}"
     return "1" if text in ("", "dimensionless") else text
 
 
 @lru_cache(maxsize=256)
 def split_unit(text: str) -> tuple[str, expr, str] | None:
-    """Split a text such as "30 deg" into a number, its tree, and a unit; None if it is no such text."""
+    """Split a text such as "30 deg" into a number, its tree, and a unit; return None if it is not such a text."""
     for gap in _GAP.finditer(text):
         number, unit = text[: gap.start()], text[gap.end() :]
         for sign, name in _SIGNS.items():
@@ -127,7 +129,7 @@ def scale_of(unit: str, wanted: str | None, *, where: str) -> Unit:
     unit
         The unit that was given.
     wanted
-        The SI unit of what it was given for, "1" for a plain number or an angle; None if that is not known.
+        The SI unit of the value for which it was given, "1" for a plain number or an angle; None if that is not known.
 
     Raises
     ------
@@ -151,7 +153,7 @@ def _power(symbol: str, power: int) -> str:
 
 @lru_cache(maxsize=1)
 def _registry() -> Any:
-    with outside_budgets():  # loading takes longer than a file may, once a process
+    with outside_budgets():  # loading takes longer than a file may, but happens once in a process
         from pint import UnitRegistry
 
         return UnitRegistry(non_int_type=Fraction)
@@ -160,7 +162,7 @@ def _registry() -> Any:
 def _named(name: str) -> Unit:
     """Return a unit of pint by its name."""
     registry = _registry()
-    from pint import PintError  # only now: the registry imports pint apart from what reading may take
+    from pint import PintError  # imported after the registry, whose import is not counted in the time for reading
 
     try:
         one = registry.Quantity(Fraction(1), name).to_root_units()
@@ -169,9 +171,10 @@ def _named(name: str) -> Unit:
     powers = {str(base): power for base, power in one._units.items()}
     known = {"meter", "gram", "second", "radian"}
     if not powers.keys() <= known or any(power.denominator != 1 for power in powers.values()):
-        raise ValueError(f"{name!r} is no unit of mechanics, made of lengths, masses, times and angles")
+        raise ValueError(f"{name!r} is not a unit of mechanics, which is made of lengths, masses, times and angles")
     length, mass, time, angle = (int(powers.get(base, 0)) for base in ("meter", "gram", "second", "radian"))
-    # pint measures mass in grams, and writes pi with 50 digits: whichever power of it leaves a short number is right.
+    # pint measures mass in grams, and writes pi with 50 digits; the right power of pi is the one that leaves a short
+    # number.
     factor = Fraction(one.magnitude) / 1000**mass
     pi = Fraction(registry.get_root_units("pi")[0])
     turns = min((0, 1, -1, 2, -2), key=lambda k: (factor / pi**k).numerator * (factor / pi**k).denominator)
@@ -179,7 +182,7 @@ def _named(name: str) -> Unit:
 
 
 class _Units:
-    """The algebra of units: products, quotients and whole powers."""
+    """The algebra of units: products, quotients and integer powers."""
 
     def number(self, value: Fraction) -> Unit:
         return Unit(value)
@@ -209,4 +212,4 @@ class _Units:
         return Unit(rationals.power(base.factor, int(n)), *(power * int(n) for power in base[1:]))
 
     def call(self, function: str, argument: Unit) -> Unit:
-        raise ValueError(f"{function} is no part of a unit")
+        raise ValueError(f"{function} cannot be part of a unit")

@@ -14,7 +14,7 @@ function               arguments                      rows of ``out``
 path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
                                                       force N = m*(kappa*v2 + n0) [N]
 path_in_space          n, lam, v2, v, p, out          y [m], and the contact force along x, y and z [N]; v = sgn(ds/dt)
-rider_loads            n, lam, v2, v, nu, p, out      what a rider feels upwards, to the left and ahead, in units of
+rider_loads            n, lam, v2, v, nu, p, out      loads on a rider upwards, to the left and ahead, in units of
                                                       9.80665 m/s2; the rates of these [1/s]; cosine and sine of the
                                                       roll angle, times a positive number; x, y and z of the track [m];
                                                       (dx/ds)**2 + (dy/ds)**2 where the roll angle is from the level

@@ -296,7 +296,7 @@ class CompiledModel(Formulas):
             from gqm_sym.runtime.sweep.gradients import sweep_with_gradient
 
             if client is not None:
-                raise InputError("gradient: a sweep on a cluster (client) does not have it yet; leave one of them out")
+                raise InputError("gradient: is not available in a sweep on a cluster (client); leave one of them out")
             swept = sweep_with_gradient(self, quantity, launches, parameters, lam, self.solve, gradient)
             return told(swept, quantity, arguments)
         if client is not None:

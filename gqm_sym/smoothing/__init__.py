@@ -1,4 +1,4 @@
-"""Surveyed points, which have noise, to smooth tracks whose loads are good within an error that is known."""
+"""Conversion of surveyed points, which have noise, to smooth tracks whose loads have known errors."""
 
 from gqm_sym.smoothing.report import Smoothing
 from gqm_sym.smoothing.tracks import smooth

@@ -1,8 +1,8 @@
-"""The selection of smoothing: the weight of roughness, and the distance of the knots that it needs.
+"""The selection of the smoothing: the weight of roughness, and the distance between the knots that it requires.
 
 A weight is described by its width w: the spline keeps waves longer than about 2 pi w and removes shorter ones. Widths
 are tried on knots that are close enough for them and not much closer, from coarse to fine: knots at every one of a
-million points would cost time and digits, and say nothing that a few hundred do not.
+million points would cost time and digits, and would not give more information than a few hundred.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,40 +14,40 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.splines import ORDER, Array, Basis, Fit, Smoother
 
-# Pieces of the coarsest grid of knots, and how many times as many the next one has.
+# The number of pieces of the coarsest grid of knots, and the factor by which it grows from one grid to the next.
 COARSEST = 8
 FINER = 4
-# A grid is for widths from this many of its pieces on; the next coarser one for those beyond FINER times as many.
+# A grid is used for widths of at least this many of its pieces, and the next coarser one from FINER times as many on.
 PIECES = 2.0
-# Between one width that is tried and the next. The criteria are so flat that nothing between them is better by much.
+# The ratio of one tried width to the next. The criteria are so flat that no width in between is much better.
 RATIO = 1.12
-# The least width that is tried, in typical distances of points: the spline interpolates them.
+# The smallest width that is tried, in typical distances of points, for which the spline interpolates them.
 LEAST = 0.003
-# Knots at the points are at least this share of their usual distance apart.
+# The smallest distance between knots at the points, as a share of the usual distance between points.
 APART = 0.05
-# How much a fitted number is charged. 1 would be fair for the places of points. Curvature asks for somewhat more
-# smoothing, and cross-validation that charges 1 now and then takes noise for bends (Kim and Gu 2004: 1.4).
+# The cost of a fitted number in the criteria. For the places of points it would be 1. Curvature requires somewhat more
+# smoothing, and cross-validation with 1 sometimes takes noise for bends (Kim and Gu 2004: 1.4).
 CHARGE = 1.4
 # Grids finer than this many pieces are tried as long as they find better widths.
 ENOUGH = 2000
-# Cross-validation of points that are met exactly.
+# The value of cross-validation for points that are met exactly.
 TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """A smoothing spline, and what it was chosen by.
+    """A smoothing spline, and the criterion by which it was chosen.
 
     Attributes
     ----------
     smoother, fit
-        What makes the spline, and the spline.
+        The maker of the spline, and the spline.
     weight, width : float
-        Of its roughness, and the width that this means.
+        The weight of roughness, and the corresponding width.
     score : float
-        The criterion, least of all that were tried.
+        The value of the criterion, the smallest of all that were tried.
     places : array or None
-        The places that its knots are at, where these are the points' own.
+        The places of its knots, if these are at points.
     """
 
     smoother: Smoother
@@ -62,14 +62,15 @@ class Choice:
 class Criterion:
     """The function to be minimised.
 
-    For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: up to a constant an unbiased
-    estimate of the distance of the spline from the true places of the points. (To ask for a residual of n s**2, the
-    discrepancy principle, fails where there are many points, as s is never known well enough for it.) Without one it is
-    generalised cross-validation: how far splines through all points but one are from that one. The largest likelihood
-    was tried as well; it lets so much noise through that loads are two to four times as wrong.
+    With a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom, which is up to a constant
+    an unbiased estimate of the distance of the spline from the true places of the points. (The discrepancy principle,
+    which requires a residual of n s**2, fails for many points, because s is never known accurately enough.) Without s
+    it is generalised cross-validation: the distance of each point from the spline through all other points. Maximum
+    likelihood was tried as well; it lets so much noise through that the errors of loads are two to four times as large.
 
-    Of noise only the part across the track is left in the residual, as the places along it are those nearest to the
-    points: a point brings one number, and not two, or in space two, and not three. So many ``across`` the track are.
+    Only the component of the noise across the track remains in the residual, because the places along it are those
+    nearest to the points. A point therefore contributes one number and not two, or in space two and not three; this
+    number is ``across``.
     """
 
     count: int
@@ -77,7 +78,7 @@ class Criterion:
     across: int
 
     def __call__(self, fit: Fit) -> float:
-        """The logarithm of what is least for the best spline."""
+        """Return the logarithm of the function that is smallest for the best spline."""
         if self.deviation is not None:
             total = fit.residual + 2.0 * CHARGE * self.across * self.deviation**2 * fit.freedom
             return float(np.log(max(total / self.count, TINY)))
@@ -86,17 +87,18 @@ class Criterion:
 
 
 def choose(u: Array, points: Array, period: float | None, deviations: Sequence[float | None]) -> Choice:
-    """The best smoothing spline through points at places; of several criteria' best ones the smoothest.
+    """Return the best smoothing spline through points at places; with several criteria, the smoothest of their best
+    splines.
 
     Parameters
     ----------
     u : (n,) array
-        Within one period, if there is one.
+        The places of the points, within one period if there is one.
     points : (n, d) array
     period : float or None
-        Of a closed track.
+        The period of a closed track; None for an open one.
     deviations : floats or None
-        Standard deviations of the points; None: by cross-validation.
+        Standard deviations of the points; None to use cross-validation.
     """
     low = float(u.min())
     high = float(u.max()) if period is None else low + period
@@ -112,7 +114,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
         try:
             smoother = Smoother(u, points, basis, float(weights[-1]))
             fits = [smoother.fit(float(weight)) for weight in weights]
-        except np.linalg.LinAlgError:  # knots closer than doubles resolve
+        except np.linalg.LinAlgError:  # the knots would be closer than doubles resolve
             break
         better = False
         for deviation in deviations:
@@ -140,7 +142,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
 
 
 def _grids(u: Array, low: float, high: float, closed: bool) -> Iterator[tuple[Array, float, Array | None]]:
-    """Knots, the least width that they are for, and the places of points where these are the knots."""
+    """Yield knots, the smallest width for which they are used, and the places of points if these are the knots."""
     length = high - low
     usual = max(float(np.median(np.diff(np.sort(u)))), length / (4.0 * len(u)))
     pieces = COARSEST
@@ -148,13 +150,13 @@ def _grids(u: Array, low: float, high: float, closed: bool) -> Iterator[tuple[Ar
         yield np.linspace(low, high, pieces + 1), PIECES * length / pieces, None
         pieces *= FINER
     places = _apart(u, APART * usual, high if closed else None)
-    # The knots of an interpolating spline, which leaves out two at each end.
+    # These are the knots of an interpolating spline, which omits two places at each end.
     sites = np.append(places, high) if closed else np.concatenate([places[:1], places[ORDER:-ORDER], places[-1:]])
     yield sites, LEAST * usual, places
 
 
 def _apart(u: Array, least: float, high: float | None) -> Array:
-    """Places in order without those that are too near to the one before, or to the end of the round."""
+    """Return places in order, without those that are too near to the one before or to the end of the lap."""
     places = np.unique(u)
     kept = [float(places[0])]
     for place in places[1:].tolist():

@@ -1,14 +1,15 @@
-"""Smoothing splines of degree 5: the curve near the points that minimises a cost with its third derivative.
+"""Smoothing splines of degree 5, which minimise the sum of squared distances from points and a cost of the third
+derivative.
 
-The spline f has the least ``sum |p_i - f(u_i)|**2 + weight * integral |D^3 f|**2``. A cubic one, whose cost is that of
-the second derivative, would have kinks in its curvature and so in every load. Beyond the outermost points only the cost
-is left, so that the third derivative vanishes at open ends, and the curvature continues linearly there.
+The spline f minimises ``sum |p_i - f(u_i)|**2 + weight * integral |D^3 f|**2``. A cubic spline, with a cost of the
+second derivative, would have kinks in its curvature and therefore in all loads. Beyond the outermost points only the
+cost remains, so that the third derivative vanishes at open ends, and the curvature continues linearly there.
 
-SciPy's own smoothing spline is cubic, and FITPACK's (``splprep``), which may have degree 5, sets a few knots where they
-fit the noise of these very points. With 1 cm of noise its loads are about as good, but the worst of them twice as
-wrong; with 10 cm they are two to forty times as wrong, as its target is chosen; and it tells neither how many numbers
-it fitted nor how good they are. Here the matrices are banded, and one Cholesky factorisation for each weight gives
-both.
+SciPy's own smoothing spline is cubic, and that of FITPACK (``splprep``), which may have degree 5, places a few knots
+where they fit the noise of the given points. With 1 cm of noise its loads are about as accurate, but the largest errors
+are twice as large; with 10 cm they are two to forty times as large, depending on its target; and it reports neither the
+effective number of fitted numbers nor their errors. Here the matrices are banded, and one Cholesky factorisation for
+each weight gives both.
 """
 
 from dataclasses import dataclass
@@ -20,11 +21,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DEGREE = 5
-# The derivative whose square is what roughness costs.
+# The order of the derivative whose square measures roughness.
 ORDER = 3
 # A step in the logarithm of the weight, for a derivative by central differences: errors of 1e-7 and of rounding/1e-3.
 STEP = 1e-3
-# Numbers of dense matrices that are held at a time.
+# The largest number of elements of dense matrices that are stored at a time.
 AT_ONCE = 4_000_000
 
 
@@ -35,11 +36,11 @@ class Basis:
     Attributes
     ----------
     knots : array
-        With those beyond the ends: repeated ends of an open track, or the next rounds of a closed one.
+        The knots, including those beyond the ends: repeated ends of an open track, or the next laps of a closed one.
     size : int
         The number of functions.
     closed : bool
-        Whether they are periodic.
+        Whether the functions are periodic.
     """
 
     knots: Array
@@ -48,7 +49,9 @@ class Basis:
 
     @classmethod
     def between(cls, sites: Array, *, closed: bool) -> "Basis":
-        """Functions whose pieces meet at sites: the first and the last are the ends, one round apart if closed."""
+        """Return functions whose pieces meet at sites, of which the first and the last are the ends, one lap apart if
+        closed.
+        """
         low, high = sites[0], sites[-1]
         if not closed:
             knots = np.concatenate([[low] * DEGREE, sites, [high] * DEGREE])
@@ -67,7 +70,7 @@ class Basis:
         return float(self.knots[-DEGREE - 1])
 
     def rows(self, u: Array, derivative: int = 0) -> Any:
-        """The functions' values, or those of a derivative, as a sparse matrix with a row for each place."""
+        """Return the functions' values, or those of a derivative, as a sparse matrix with a row for each place."""
         from scipy import sparse
         from scipy.interpolate import BSpline
 
@@ -77,7 +80,7 @@ class Basis:
         slopes = sparse.eye_array(every, format="csr")
         for _ in range(derivative):
             spans = knots[degree + 1 : -1] - knots[1 : -degree - 1]
-            # Functions that begin and end at a repeated end do not count.
+            # Functions that begin and end at a repeated end are omitted.
             rates = np.divide(degree, spans, out=np.zeros_like(spans), where=spans > 0.0)
             slopes = sparse.diags_array(rates) @ (slopes[1:] - slopes[:-1])
             knots, degree = knots[1:-1], degree - 1
@@ -100,7 +103,7 @@ class Basis:
         )
 
     def roughness(self) -> Any:
-        """The integrals of products of third derivatives, exact by three nodes a piece."""
+        """Return the integrals of products of third derivatives, which three nodes in each piece give exactly."""
         sites = np.unique(self.knots[DEGREE : len(self.knots) - DEGREE])
         nodes, weights = np.polynomial.legendre.leggauss(ORDER)
         half = 0.5 * np.diff(sites)
@@ -113,18 +116,18 @@ class Basis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """A smoothing spline of one weight.
+    """A smoothing spline for one weight.
 
     Attributes
     ----------
     coefficients : (K, d) array
-        Of its basis.
+        The coefficients of its basis functions.
     factor : array
         The Cholesky factor of its matrix, in bands.
     residual : float
         The sum of the squared distances of points from it.
     freedom : float
-        The number of numbers it fitted: the trace of the matrix that leads from points to their places on it.
+        The effective number of fitted numbers: the trace of the matrix that maps points to their places on the spline.
     """
 
     coefficients: Array
@@ -134,7 +137,7 @@ class Fit:
 
 
 class Smoother:
-    """Smoothing splines through the same points at the same places, by weight.
+    """Smoothing splines through the same points at the same places, for different weights.
 
     Parameters
     ----------
@@ -143,7 +146,7 @@ class Smoother:
     points : (n, d) array
     basis : Basis
     least : float
-        The least weight that will be used.
+        The smallest weight that will be used.
     """
 
     def __init__(self, u: Array, points: Array, basis: Basis, least: float) -> None:
@@ -151,21 +154,21 @@ class Smoother:
         rows = basis.rows(u)
         self._sums = rows.T @ points
         gram, rough = (rows.T @ rows).tocoo(), basis.roughness().tocoo()
-        # Folded in the middle, a ring of bands is a row of bands of twice the width.
+        # A cyclic band matrix that is folded in the middle is a band matrix of twice the width.
         order = np.arange(basis.size)
         if basis.closed:
             order = np.where(2 * order < basis.size, 2 * order, 2 * (basis.size - 1 - order) + 1)
         self._order = order
         self._width = int(max(np.abs(order[part.row] - order[part.col]).max() for part in (gram, rough)))
         self._gram, self._rough = self._banded(gram), self._banded(rough)
-        # Residuals of other splines follow from those of this one without the points, and without cancellation.
+        # Residuals of other splines follow from those of this one, without the points and without cancellation.
         self._product = rows.T @ rows
         self._reference = self._solved(self._factor(least), self._sums)
         left = points - rows @ self._reference
         self._left, self._residual = rows.T @ left, float(np.square(left).sum())
 
     def _banded(self, matrix: Any) -> Array:
-        """The upper bands of a symmetric matrix, as SciPy has them."""
+        """Return the upper bands of a symmetric matrix in SciPy's form."""
         row, column = self._order[matrix.row], self._order[matrix.col]
         upper = row <= column
         bands: Array = np.zeros((self._width + 1, self.basis.size))
@@ -179,10 +182,11 @@ class Smoother:
         return factor
 
     def fit(self, weight: float) -> Fit:
-        """The spline of a weight."""
+        """Return the spline for a weight."""
         factor = self._factor(weight)
         coefficients = self._solved(factor, self._sums)
-        # The matrix's derivative in log(weight) is the part that is not fitted, and its trace that of log(det).
+        # The derivative of the matrix by log(weight) is its roughness part, and the trace of its solution is the
+        # derivative of log(det).
         more, less = (np.log(self._factor(weight * np.exp(step))[-1]).sum() for step in (STEP, -STEP))
         change = coefficients - self._reference
         gained = float((change * (self._product @ change - 2.0 * self._left)).sum())
@@ -194,7 +198,7 @@ class Smoother:
         )
 
     def _solved(self, factor: Array, right: Array) -> Array:
-        """The solution with a matrix of which the factor is known."""
+        """Return the solution with a matrix whose factor is given."""
         from scipy.linalg import cho_solve_banded
 
         turned = np.empty_like(right)
@@ -203,10 +207,11 @@ class Smoother:
         return solution
 
     def spread(self, fit: Fit, u: Array, derivative: int) -> Array:
-        """The standard deviation of a derivative of the spline at places, for points with one of 1.
+        """Return the standard deviation of a derivative of the spline at places, for points with a standard deviation
+        of 1.
 
-        It is that of all curves that go with the points, where curves of small third derivative are likelier to begin
-        with (Wahba 1983), and so holds what smoothing takes from the curve as well as what noise adds to it.
+        It is that of all curves that are compatible with the points, if curves with small third derivatives have a
+        higher prior probability (Wahba 1983). So it contains the bias of smoothing as well as the noise.
         """
         rows = self.basis.rows(u, derivative)
         spread: Array = np.empty(len(u))

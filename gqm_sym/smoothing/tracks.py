@@ -1,9 +1,10 @@
-"""Surveyed points to a smooth track: where along it each point belongs, the spline, and what is known of its errors.
+"""Conversion of surveyed points to a smooth track: the place of each point along it, the spline, and its errors.
 
-Where along the track the points belong is unknown as well. Chord lengths from point to point are a beginning, but noise
-lengthens them; so the track is fitted again a few times, each time at the arc lengths of its places nearest to the
-points. What is taken for bends of the track once would be followed ever after. So the first rounds, in which noise
-along the track is in the residual too, take the smoother one of what cross-validation says and what is given.
+The places of the points along the track are unknown as well. Chord lengths from point to point are a first
+approximation, but noise lengthens them; so the track is fitted again a few times, each time at the arc lengths of its
+places nearest to the points. Noise that is once taken for bends of the track would remain in all further fits.
+Therefore the first fits, in which noise along the track is in the residual too, use the smoother of the splines by
+cross-validation and by the given standard deviation.
 """
 
 from collections.abc import Sequence
@@ -20,27 +21,28 @@ from gqm_sym.smoothing.report import Smoothing
 from gqm_sym.smoothing.selection import APART, Choice, choose
 from gqm_sym.smoothing.splines import Array, Smoother
 
-# The coordinates of a track that is not in space.
+# The number of coordinates of a track that is not in space.
 PLANE = 2
-# Rounds of fitting; from the second on little changes.
+# The number of fits; after the second little changes.
 ROUNDS = 4
 LAST = 2
-# How far from an end its third derivative is looked for, in widths.
+# The distance from an end within which the largest third derivative is found, in widths.
 REACH = 6.0
-# Newton steps to the place nearest to a point.
+# The number of Newton steps to the place nearest to a point.
 STEPS = 4
-# The least share of its value on a straight track that the derivative of a distance is taken to have.
+# The smallest value used for the derivative of a distance, as a share of its value on a straight track.
 STEEP = 0.3
-# Nodes for the length of half a piece of spline.
+# The number of nodes for the length of half a piece of the spline.
 NODES = 6
-# Points of the smoothed track in a width: the interpolant through them has its curvature to some 1e-4.
+# The number of points of the smoothed track in a width, for which the interpolant has the curvature to some 1e-4.
 A_WIDTH = 4.0
-# The least number of points of a smoothed track, and of places at which its errors are stated.
+# The smallest number of points of a smoothed track, and of places at which its errors are stated.
 FEWEST = 16
-# A point this many times as far from the track as usual, and by this share of the usual chord, is stray.
+# A point is an outlier if its distance from the track is this many times the usual one, and this share of the usual
+# chord.
 STRAY = 10.0
 OFF = 0.1
-# A normal deviate's standard deviation, in medians of its size.
+# The standard deviation of a normal variable, in medians of its absolute value.
 MEDIAN = 1.4826
 # A track that turns by more than this within its width, or from point to point, is out of order.
 SHARPEST = 0.5 * pi
@@ -50,7 +52,7 @@ WORK = 100_000_000
 
 
 class _Track(NamedTuple):
-    """A spline through points, where along it they belong, and its period if it has one."""
+    """A spline through points, their places along it, and its period if it has one."""
 
     choice: Choice
     spline: Any
@@ -58,14 +60,14 @@ class _Track(NamedTuple):
     period: float | None
 
     def at(self, u: Array) -> Array:
-        """Points of the track; beyond open ends it is straight."""
+        """Return points of the track, which is straight beyond open ends."""
         basis = self.choice.smoother.basis
         inside = u if basis.closed else np.clip(u, basis.low, basis.high)
         points: Array = self.spline(inside) + self.spline(inside, 1) * (u - inside)[:, None]
         return points
 
     def heading(self, u: Array) -> Array:
-        """Its tangents, of length 1."""
+        """Return the unit tangents of the track."""
         basis = self.choice.smoother.basis
         first = self.spline(u if basis.closed else np.clip(u, basis.low, basis.high), 1)
         tangents: Array = first / _length(first)[:, None]
@@ -87,30 +89,30 @@ def smooth(
     given : (n, d) array
         Points; a closed track does not repeat its first one.
     rows : (n,) ints
-        What messages call the points.
+        The numbers of the points in messages.
     closed : bool
-        Whether the track goes on from the last point to the first.
+        Whether the track continues from the last point to the first.
     deviation : float or None
-        The standard deviation of the points in each coordinate; None: by cross-validation.
+        The standard deviation of the points in each coordinate; None to find it by cross-validation.
     angles : n floats, optional
-        The roll angle at each point. It is smoothed as much as the coordinates are.
+        The roll angle at each point, which is smoothed as much as the coordinates.
 
     Returns
     -------
     places : (m, d) array
-        Points of the smooth track, as many as the interpolating spline needs to be it; with angles these are one
-        column more.
+        Points of the smooth track, as many as an interpolating spline needs to represent it; with angles there is one
+        more column.
     report : Smoothing
-        What smoothing changed, and how good the track is.
+        The changes that smoothing made, and the accuracy of the track.
 
     Raises
     ------
     DeclarationError
-        If a point is far away from the track through the others, or the track turns too sharply to be one.
+        If a point is far away from the track through the others, or the track turns too sharply.
     """
     points: Array = np.asarray(given, dtype=np.float64)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    centred = points - middle  # all digits are for the shape
+    centred = points - middle  # the shape then keeps all digits
     track = _fitted(centred, closed, deviation)
     nearest = track.at(track.u)
     off, along = centred - nearest, track.heading(track.u)
@@ -126,13 +128,13 @@ def smooth(
 
 
 def _length(vectors: Array) -> Array:
-    """The lengths of vectors in rows."""
+    """Return the lengths of vectors in rows."""
     length: Array = reduce(np.hypot, vectors.T)
     return length
 
 
 def _across(along: Array, off: Array) -> Array:
-    """How far vectors lead off from directions: in a plane to the left of them, in space without a sign."""
+    """Return the distances of vectors from directions: in a plane positive to the left, in space without a sign."""
     if off.shape[1] == PLANE:
         left: Array = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
         return left
@@ -140,11 +142,11 @@ def _across(along: Array, off: Array) -> Array:
 
 
 def _roll_angles(track: _Track, angles: Array, places: Array) -> Array:
-    """Roll angles at places of a track, which were measured at its points."""
+    """Return roll angles at places of a track, from those measured at its points."""
     choice, u, rate = track.choice, track.u, 0.0
     basis = choice.smoother.basis
     angles = np.unwrap(np.append(angles, angles[0]))
-    if basis.closed:  # what a lap adds is linear, and the rest is periodic
+    if basis.closed:  # the increase over a lap is taken as linear, and the rest is periodic
         rate = (angles[-1] - angles[0]) / (basis.high - basis.low)
     smoother = Smoother(u, (angles[:-1] - rate * u)[:, None], basis, choice.weight)
     found: Array = basis.spline(smoother.fit(choice.weight).coefficients)(places)[:, 0] + rate * places
@@ -152,7 +154,7 @@ def _roll_angles(track: _Track, angles: Array, places: Array) -> Array:
 
 
 def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
-    """The smooth track, in its own arc length from the place of the first point."""
+    """Return the smooth track, in its own arc length from the place of the first point."""
     around = np.concatenate([points, points[:1]]) if closed else points
     lengths = np.concatenate([[0.0], np.cumsum(_length(np.diff(around, axis=0)))])
     dimension = points.shape[1]
@@ -170,7 +172,7 @@ def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
 
 
 def _nearest(track: _Track, points: Array) -> Array:
-    """The places of a track that are nearest to points, by Newton's method from where they were."""
+    """Return the places of a track that are nearest to points, by Newton's method from the previous places."""
     basis, u = track.choice.smoother.basis, track.u
     for _ in range(STEPS):
         spend()
@@ -184,7 +186,9 @@ def _nearest(track: _Track, points: Array) -> Array:
 
 
 def _measured(track: _Track, u: Array) -> tuple[Array, float | None]:
-    """Arc length at places of a track from that of the first point, within one round, and that of the round."""
+    """Return the arc length from the place of the first point to places of a track, within one lap, and the length of
+    the lap.
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     basis, spline = track.choice.smoother.basis, track.spline
@@ -212,7 +216,9 @@ def _speed(spline: Any, u: Array) -> Array:
 
 
 def _places(track: _Track, closed: bool) -> Array:
-    """The places at which the track is sampled from its spline: at the points, or as often as its width requires."""
+    """Return the places at which the track is sampled from its spline: those of the points, or as many as its width
+    requires.
+    """
     choice, basis = track.choice, track.choice.smoother.basis
     low, high = track.u[0], track.u[-1]
     if closed:
@@ -231,7 +237,7 @@ def _places(track: _Track, closed: bool) -> Array:
 
 
 def _report(track: _Track, places: Array, deviation: float | None, shifts: Array) -> Smoothing:
-    """What is known of a smooth track; its points are put in by whom they are known to."""
+    """Return the report on a smooth track, to which the caller adds the points."""
     choice = track.choice
     fit = choice.fit
     across = track.spline.c.shape[1] - 1
@@ -261,11 +267,13 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
 
 
 def _end_errors(track: _Track, u: Array) -> Array:
-    """What the condition at open ends, that the third derivative vanishes, takes from the second derivative near them.
+    """Return the error of the second derivative near open ends that is due to the condition of a vanishing third
+    derivative there.
 
-    Where the true one is b, it is 2 b times the width at the end, and dies away within some widths: the solution of
-    ``d = width**6 D^6 d`` that has ``D^3 d = -b`` and no higher derivatives there. As b the largest third derivative
-    nearby is taken. (To draw the spline's ends to a third derivative from inside was tried: it is wrong as often.)
+    If the true third derivative is b, the error is 2 b times the width at the end, and decays within some widths: it is
+    the solution of ``d = width**6 D^6 d`` that has ``D^3 d = -b`` and no higher derivatives there. The largest third
+    derivative nearby is used for b. (It was tried to prescribe the third derivative at the ends from values inside, but
+    that is wrong as often.)
     """
     choice, basis = track.choice, track.choice.smoother.basis
     errors: Array = np.zeros(len(u))

@@ -1,4 +1,4 @@
-"""A YAML file -> curve, kernel, parameters and launch, with every mistake at its line."""
+"""Reading of YAML files: curve, kernel, parameters and launch, with all mistakes reported by line."""
 
 from gqm_sym.specfile.reader import read_spec
 from gqm_sym.specfile.schema import json_schema

@@ -1,4 +1,4 @@
-"""Files that a YAML file names: bounded, inside its folder, and never from anywhere else."""
+"""Files that a YAML file names, which are limited in size and must be inside its folder."""
 
 import os
 import re
@@ -15,21 +15,21 @@ _BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
 
 
 def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
-    """The path of a file in a folder, or in one inside it.
+    """Return the path of a file in a folder or in one of its subfolders.
 
     Parameters
     ----------
     name
-        As the YAML file has it: from its folder on.
+        The path in the YAML file, relative to its folder.
     folder
-        Of the YAML file.
+        The folder of the YAML file.
     wanted
-        What the file should be, for messages.
+        A description of the required file, for messages.
 
     Raises
     ------
     InputError
-        If it leads anywhere else, or there is none.
+        If the path leads anywhere else, or there is no such file.
     """
     pure = PurePath(name)
     if pure.is_absolute() or ".." in pure.parts or "\\" in name or ":" in name or "\0" in name:
@@ -43,19 +43,21 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     if not path.is_relative_to(folder.resolve()):
         raise InputError(f"{name!r}: leads out of the YAML file's folder by a link; put the file itself there")
     if not path.is_file():
-        raise InputError(f"{name!r}: is no plain file; give {wanted}")
+        raise InputError(f"{name!r}: is not a plain file; give {wanted}")
     return path
 
 
 def read_beside(name: str, folder: Path, *, wanted: str) -> str:
-    """The text of a plain file in a folder; of at most 32 MiB, in UTF-8. Parameters as of `path_beside`."""
+    """Return the text of a plain file in a folder, at most 32 MiB in UTF-8. The parameters are those of
+    `path_beside`.
+    """
     path = path_beside(name, folder, wanted=wanted)
     try:
-        # Not to wait for a pipe, and to read what was looked at.
+        # The file is opened before it is examined, without waiting for a pipe, so that the examined file is read.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
         with os.fdopen(descriptor, "rb") as file:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise InputError(f"{name!r}: is no plain file; give {wanted}")
+                raise InputError(f"{name!r}: is not a plain file; give {wanted}")
             data = file.read(SIZE_LIMIT + 1)
     except OSError as error:
         raise _unreadable(name, error, wanted) from None
@@ -69,9 +71,11 @@ def read_beside(name: str, folder: Path, *, wanted: str) -> str:
 
 
 def read_rows(name: str, text: str) -> tuple[list[str], list[list[str]]]:
-    """The fields of the first line of a table where they are names, else none, and those of each line of values."""
+    """Return the fields of the first line of a table if they are names, else none, and the fields of each line of
+    values.
+    """
     text = text.rstrip()
-    if (total := text.count("\n") + 1) > ROW_LIMIT:  # before they are parted, which takes much more memory
+    if (total := text.count("\n") + 1) > ROW_LIMIT:  # before the fields are separated, which takes much more memory
         raise InputError(f"{name!r}: has {total} rows; {ROW_LIMIT} is the most")
     lines = text.split("\n")
     rows = []

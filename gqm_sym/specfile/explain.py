@@ -1,4 +1,4 @@
-"""Mistakes in the structure of a file, in words that its author understands."""
+"""Messages about mistakes in the structure of a file, in terms that its author understands."""
 
 from collections.abc import Callable, Collection
 from typing import Any, TypeAlias
@@ -27,7 +27,7 @@ ModelAt: TypeAlias = Callable[[tuple[str, ...]], Any]
 def explain(
     detail: Any, tree: MapNode, mistakes: Mistakes, model_at: ModelAt, *, spoilt: Collection[Mark] = ()
 ) -> None:
-    """Note what pydantic found, in words of ours.
+    """Record a mistake that pydantic found, with our message.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ def explain(
     tree
         The file.
     mistakes
-        Takes what is noted.
+        The record of the file's mistakes.
     model_at
-        Gives the model of the mapping at a place of the file.
+        A function that returns the model of the mapping at a place of the file.
     spoilt
-        Places where something could not be read: what follows from that was said with it.
+        Places at which something could not be read; consequences of that are not reported.
     """
     loc = tuple(detail["loc"])
     kind = detail["type"]
@@ -49,7 +49,7 @@ def explain(
     mark = steps[-1][1] if steps else tree.mark
     node = steps[-1][2] if steps else tree
     label = f"{path}: " if path else ""
-    # An empty value has its place on some later line: blame its key.
+    # The place of an empty value is on some later line, so its key is reported.
     value_mark = mark if isinstance(node, Scalar) and not node.text else node.mark
     if {mark, node.mark} & set(spoilt):
         return
@@ -66,10 +66,13 @@ def explain(
         mistakes.add(mark, what, f"add {loc[-1]}: {_example(field)}")
     elif kind in ("union_tag_not_found", "union_tag_invalid"):
         place = place_of(tree, (*loc, "name"))
-        what = "name is missing"
+        what, near = "name is missing", None
         if kind == "union_tag_invalid":
-            what = f"unknown family {shown(str(detail['ctx']['tag']))}"
-        mistakes.add(place, f"{label}{what}", f"known are {', '.join(FAMILY_MODELS)}")
+            name = str(detail["ctx"]["tag"])
+            what, near = f"unknown family {shown(name)}", nearest(name, list(FAMILY_MODELS))
+        mistakes.add(
+            place, f"{label}{what}", f"did you mean {near}?" if near else f"known are {', '.join(FAMILY_MODELS)}"
+        )
     elif kind == "literal_error":
         what = f"{label}must be {detail['ctx']['expected']}"
         mistakes.add(value_mark, f"{what}, got {_given(node)}")
@@ -97,7 +100,7 @@ def _explain_unknown(
 
 
 def _sample(loc: tuple[Any, ...], model_at: ModelAt) -> str:
-    """A mapping that is allowed at a place of the file."""
+    """Return a mapping that is allowed at a place of the file."""
     if loc[-1] in _SAMPLES:
         return _SAMPLES[loc[-1]]
     field = getattr(model_at(_path(loc[:-1])), "model_fields", {}).get(loc[-1])

@@ -1,4 +1,4 @@
-"""Single values of a curve file: which are allowed, and the messages for others.
+"""The checks of single values in a curve file, with their messages.
 
 Every scalar arrives as text and stays text, so that ``9.81`` keeps meaning 981/100.
 """
@@ -19,10 +19,10 @@ from gqm_sym.parameters import check_parameter, exact_value, in_si, read_value
 from gqm_sym.specfile.nodes import shown
 
 LINE_LIMIT = 200
-# A count with more digits is refused as what it is given as.
+# A count with more digits is refused before it is converted.
 MAX_DIGITS = 9
 
-# The default of what may be left out. Not "model | None = None": null in the file is a mistake.
+# The default of optional entries. It is not "model | None = None", because null in the file is a mistake.
 ABSENT: Any = None
 
 # The spellings of YAML and Python for values that are not finite numbers.
@@ -37,7 +37,7 @@ class Section(BaseModel):
 
 
 def wrapped(key: str, kind: type) -> BeforeValidator:
-    """Take a value of a kind for the mapping that has it under a key."""
+    """Accept a value of a kind in place of the mapping that has it under a key."""
     return BeforeValidator(lambda value: {key: value} if isinstance(value, kind) else value)
 
 
@@ -46,13 +46,15 @@ def _mistake(what: str, column: int = 0) -> PydanticCustomError:
 
 
 def column_of(message: str) -> tuple[str, int]:
-    """Split the column off a message about a text: ``column 4: unexpected '^'``; 0 without one."""
+    """Separate the column from a message about a text, such as ``column 4: unexpected '^'``; it is 0 if there is
+    none.
+    """
     found = _COLUMN.match(message)
     return (message[found.end() :], int(found[1])) if found else (message, 0)
 
 
 def _checked(check: Callable[[str], object]) -> AfterValidator:
-    """Make a validator of a check that raises an error of ours; the text itself is kept."""
+    """Return a validator made of a check that raises one of our errors; the text itself is kept."""
 
     def validate(text: str) -> str:
         try:
@@ -78,7 +80,7 @@ def _check_curve_parameter(text: str) -> object:
 
 
 def split_value(value: object) -> object:
-    """Wrap a bare value into the long form, ``{value, unit}`` where it is a text such as "50 cm"."""
+    """Convert a bare value to the long form, which is ``{value, unit}`` if it is a text such as "50 cm"."""
     measured = split_unit(value) if isinstance(value, str) else None
     if measured is not None:
         return {"value": measured[0], "unit": measured[2]}

@@ -1,11 +1,11 @@
-"""The position of an entry in a file, from a path of keys or from the words of a message."""
+"""The position of an entry in a file, found from a path of keys or from the words of a message."""
 
 import re
 from collections.abc import Iterator, Sequence
 
 from gqm_sym.specfile.nodes import ListNode, MapNode, Mark, Node, Scalar, scalars
 
-# "graph", "graph curve", "families.ellipse": what a message says of its origin.
+# The beginnings of messages that name their origin, such as "graph", "graph curve" or "families.ellipse".
 _ORIGIN = re.compile(r"[\w.]+( [\w.]+)?")
 _COLUMN = re.compile(r"column (\d+)")
 _QUOTED_NAME = re.compile(r"'([A-Za-z]\w*)'")
@@ -14,7 +14,7 @@ _QUOTED_NAME = re.compile(r"'([A-Za-z]\w*)'")
 def descend(tree: Node, path: Sequence[str | int]) -> Iterator[tuple[str, Mark, Node]]:
     """Yield step, place and node along a path, as far as it exists in the tree.
 
-    Steps that are not there (the tag of a union, a missing key) are passed over.
+    Steps that do not exist (the tag of a union, a missing key) are skipped.
     """
     node = tree
     for step in path:
@@ -29,12 +29,12 @@ def descend(tree: Node, path: Sequence[str | int]) -> Iterator[tuple[str, Mark, 
 
 
 def place_of(tree: Node, path: Sequence[str | int]) -> Mark:
-    """Return the place of the key at the end of a path, or of the last one that is there."""
+    """Return the place of the key at the end of a path, or of the last key on it that exists."""
     return [tree.mark, *(mark for _, mark, _ in descend(tree, path))][-1]
 
 
 def node_at(tree: Node, path: Sequence[str | int]) -> Node:
-    """Return the value at the end of a path, or the last one that is there."""
+    """Return the value at the end of a path, or the last value on it that exists."""
     return [tree, *(node for _, _, node in descend(tree, path))][-1]
 
 
@@ -48,10 +48,10 @@ def mention(tree: Node, name: str) -> Mark | None:
 
 
 def locate(tree: Node, message: str, base: tuple[str, ...] = ()) -> tuple[Mark, str]:
-    """Return the place that a message speaks of, and the message with that place's path.
+    """Return the place to which a message refers, and the message with the path of that place.
 
-    Messages begin with where they arose, ``graph: domain: must have ...`` or
-    ``graph: z: column 3: ...``, and quote the names they are about.
+    Messages begin with their origin, as in ``graph: domain: must have ...`` or ``graph: z: column 3: ...``, and quote
+    the names to which they refer.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def locate(tree: Node, message: str, base: tuple[str, ...] = ()) -> tuple[Mark, 
     message
         The message of an error raised while something in the file was declared.
     base
-        Path of what was being declared.
+        The path of the entry that was being declared.
     """
     node, mark = node_at(tree, base), place_of(tree, base)
     path, words, column = list(base), message.split(": "), 0
@@ -86,7 +86,7 @@ def locate(tree: Node, message: str, base: tuple[str, ...] = ()) -> tuple[Mark, 
 
 
 def _place_of_name(tree: Node, name: str) -> Mark | None:
-    """Return where a name is a key at the top, or is mentioned, or is a key further down."""
+    """Return the place at which a name is a key at the top, or is mentioned, or is a key further down."""
     if not isinstance(tree, MapNode):
         return None
     if name in tree.keys:

@@ -14,7 +14,7 @@ _NULLS = frozenset({"", "~", "null", "Null", "NULL"})
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A place in the file, counted from 1 as editors do."""
+    """A place in the file, with line and column counted from 1 as in editors."""
 
     line: int
     column: int
@@ -27,16 +27,16 @@ class Scalar:
     mark: Mark
     text: str
     plain: bool = True
-    inside: Mark | None = None  # of the first character, where columns in the text are columns here
+    inside: Mark | None = None  # the mark of the first character, if columns in the text are columns in the file
     kind: ClassVar[str] = "a single value"
 
     @property
     def is_null(self) -> bool:
-        """Whether YAML takes it for nothing."""
+        """Whether YAML reads it as null."""
         return self.plain and self.text in _NULLS
 
     def at(self, column: int) -> Mark:
-        """Place of a column (counted from 1) of the text, as near as it is known."""
+        """Return the place of a column (counted from 1) of the text, as accurately as it is known."""
         if self.inside is None:
             return self.mark
         return Mark(self.inside.line, self.inside.column + column - 1)
@@ -53,7 +53,7 @@ class ListNode:
 
 @dataclass(slots=True, kw_only=True)
 class MapNode:
-    """Named nodes, in the file's order; of a duplicate the first is kept."""
+    """Named nodes in the order of the file; the first of duplicates is kept."""
 
     mark: Mark
     items: "dict[str, Node]" = field(default_factory=dict)
@@ -65,7 +65,7 @@ Node = Scalar | ListNode | MapNode
 
 
 def plain(node: Node) -> Any:
-    """Strings, None, lists and dicts, as a validator wants them."""
+    """Return strings, None, lists and dicts, as a validator takes them."""
     if isinstance(node, Scalar):
         return None if node.is_null else node.text
     if isinstance(node, ListNode):
@@ -74,7 +74,7 @@ def plain(node: Node) -> Any:
 
 
 def scalars(node: Node) -> Iterator[Scalar]:
-    """Every value in the tree, in the file's order."""
+    """Yield every value in the tree, in the order of the file."""
     if isinstance(node, Scalar):
         yield node
     else:
@@ -83,7 +83,7 @@ def scalars(node: Node) -> Iterator[Scalar]:
 
 
 def shown(text: str) -> str:
-    """Text from a file as a message shows it: quoted, on one line, not too long."""
+    """Return text from a file as it is shown in a message: quoted, on one line, and not too long."""
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
 
@@ -98,18 +98,18 @@ class Mistakes:
         return bool(self._found)
 
     def add(self, mark: Mark, what: str, remedy: str = "") -> None:
-        """Note one mistake."""
+        """Record a mistake."""
         self._found[mark, f"{what}; {remedy}" if remedy else what] = None
 
     def places(self) -> frozenset[Mark]:
-        """Return where something was found wrong so far."""
+        """Return the places of the mistakes so far."""
         return frozenset(mark for mark, _ in self._found)
 
     def error(self) -> SpecFileError:
-        """All of them, in the file's order."""
+        """Return the error with all mistakes, in the order of the file."""
         found = sorted(self._found, key=lambda item: (item[0].line, item[0].column))
         lines = [
-            # One line each, whatever a message quotes.
+            # Each mistake takes one line, whatever its message quotes.
             " ".join(f"{self.path}:{mark.line}:{mark.column}: {message}".split())
             for mark, message in found[:MISTAKES_SHOWN]
         ]

@@ -58,7 +58,7 @@ STANDARD = {
 
 
 class RailSchema(NamedTuple):
-    """The mapping of a rail, that of one of its pieces, and the pieces' own."""
+    """The models of the mapping of a rail, of one of its pieces, and of the contents of the pieces."""
 
     rail: Any
     piece: type[Section]
@@ -123,7 +123,7 @@ class RailSchema(NamedTuple):
             raise DeclarationError(f"piece {count}, {error}") from None
 
     def model_at(self, steps: Sequence[str]) -> Any:
-        """The model of the mapping at a place inside; None if there is none there."""
+        """Return the model of the mapping at a place inside; None if there is none there."""
         match steps:
             case []:
                 return self.rail.__origin__

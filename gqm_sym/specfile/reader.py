@@ -1,4 +1,4 @@
-"""Read a curve file: text -> tree -> checked sections -> what they declare.
+"""Reading of a curve file, from text to a tree, to checked sections, and to declarations.
 
 Every stage records its mistakes and continues, so that all mistakes of a file are reported together. Consequences of an
 earlier mistake are not reported.
@@ -40,7 +40,7 @@ from gqm_sym.specfile.yamltext import read_text, read_tree
 Parameters: TypeAlias = Mapping[str, Parameter | None]
 T = TypeVar("T", bound=BaseModel)
 
-# A file of the size that people write takes a hundredth of it.
+# The limit of processor time; a file of usual size takes a hundredth of it.
 SECONDS = 0.5
 
 _NO_NUMBERS = (sp.nan, sp.zoo, sp.oo, -sp.oo)
@@ -82,7 +82,7 @@ def read_spec(path: Path | str) -> Spec:
 
 
 class _Reader:
-    """Goes through one file's tree, section by section."""
+    """A reader of one file's tree, section by section."""
 
     def __init__(self, tree: MapNode, mistakes: Mistakes) -> None:
         self.tree = tree
@@ -127,7 +127,7 @@ class _Reader:
         )
 
     def _section(self, model: type[T], *path: str) -> T | None:
-        """Return a section of the file as its model; None if it is not there, or is wrong."""
+        """Return a section of the file as its model; None if it is missing or wrong."""
         value = self.data
         for step in path:
             if not isinstance(value, dict) or step not in value:
@@ -179,7 +179,7 @@ class _Reader:
         return total
 
     def _check_names(self, curve: Curve, kernel: Kernel, declared: Parameters) -> None:
-        """Note names that have no value, and values that have no use."""
+        """Record names that have no value, and values that have no use."""
         defaults = {**dict(kernel.along(curve.parameter, in_space=curve.in_space).defaults), **dict(curve.defaults)}
         right = [name for name, entry in declared.items() if entry is not None]
         unused = [name for name in right if name not in defaults and name != "m"]
@@ -198,7 +198,7 @@ class _Reader:
             self.mistakes.add(place_of(self.tree, ("parameters", name)), what, remedy)
 
     def _check_ranges(self, kernel: Kernel, declared: Parameters) -> None:
-        """Note a value that a force does not allow."""
+        """Record a value that a force does not allow."""
         values = dict(kernel.defaults) | {name: _value(entry) for name, entry in declared.items() if entry is not None}
         try:
             refuse_out_of_range(values, kernel.positive, kernel.at_least, where="parameters")
@@ -206,7 +206,7 @@ class _Reader:
             self.mistakes.add(*locate(self.tree, str(error), ()))
 
     def _origin(self, name: str) -> Mark:
-        """Return the place where a parameter comes from."""
+        """Return the place in the file from which a parameter comes."""
         for path in (("curve",), ("kernel",)):
             if found := mention(node_at(self.tree, path), name):
                 return found
@@ -216,7 +216,7 @@ class _Reader:
         return place_of(self.tree, ("curve", "family"))
 
     def _check_place(self, given: set[str], curve: Curve | None) -> None:
-        """Note a launch that does not say where, or in a way that the curve does not have."""
+        """Record a launch without a place, or with a place in a form that the curve does not have."""
         mark = place_of(self.tree, ("launch",))
         if "point" in given and curve is not None and not curve.charted:
             what = "launch: point is for implicit curves, tracks and rails"
@@ -230,7 +230,7 @@ class _Reader:
     def _check_units(
         self, declared: Parameters, launch: Launch | None, curve: Curve | None, kernel: Kernel | None
     ) -> None:
-        """Note units of another dimension than what they are given for has, whatever else is wrong."""
+        """Record units whose dimension is not that of their values, whatever else is wrong."""
         written = {name: entry.unit for name, entry in declared.items() if entry is not None and entry.unit}
         if kernel is not None and curve is not None:
             kernel = kernel.along(curve.parameter, in_space=curve.in_space)
@@ -246,7 +246,7 @@ class _Reader:
                     self.mistakes.add(mark, f"{'.'.join(path)}.unit: {error}")
 
     def _check_launch(self, launch: Mapping[str, Any], curve: Curve | None, declared: Parameters) -> None:
-        """Note a launch that cannot be."""
+        """Record a launch that is not possible."""
 
         def note(key: str, what: str, remedy: str) -> None:
             mark = node_at(self.tree, ("launch", key, "value")).mark
@@ -281,7 +281,7 @@ def _is_true(relation: Any) -> bool:
 
 
 def _value(entry: Quantity) -> str | None:
-    """The exact text of a number, in SI."""
+    """Return the exact text of a number in SI units."""
     return None if entry.value is None else in_si(entry.value, entry.unit)
 
 
@@ -294,6 +294,6 @@ def _note(entry: Parameter) -> Note:
 
 
 def _arguments(section: BaseModel) -> dict[str, Any]:
-    """Keyword arguments: what the file gives, and nothing else; quantities as numbers in SI."""
+    """Return the keyword arguments that the file gives, with quantities as numbers in SI units."""
     given = section.model_dump(exclude_unset=True, exclude_none=True)
     return {key: _value(entry) if isinstance(entry := getattr(section, key), Quantity) else given[key] for key in given}

@@ -1,8 +1,8 @@
 """The shape of a curve file: one small pydantic model for each mapping in it.
 
-They check structure and single values, and are what ``gqm schema`` prints. What concerns several
-values at once (an undefined symbol, a launch outside the domain) is checked in ``reader``. A curve
-kind, a family or a kernel is one entry of a table; its model is made from the entry.
+They check structure and single values, and ``gqm schema`` prints them. Conditions on several values at once (an
+undefined symbol, a launch outside the domain) are checked in ``reader``. A kind of curve, a family or a kernel is one
+entry of a table, from which its model is made.
 """
 
 from collections.abc import Callable
@@ -164,7 +164,7 @@ class CurveRow(NamedTuple):
     model: Any
     declare: Callable[..., Curve]
     summary: str
-    reads_files: bool = False  # then it is declared from the YAML file's folder too
+    reads_files: bool = False  # if true, the folder of the YAML file is needed for the declaration
 
 
 def _declare_graph(given: dict[str, Any]) -> Curve:

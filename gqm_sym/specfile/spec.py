@@ -21,7 +21,7 @@ class Note:
 
     unit: str = ""
     description: str = ""
-    given: str = ""  # value and unit as the file has them, where that is not SI
+    given: str = ""  # value and unit as in the file, if the unit is not SI
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,17 +31,17 @@ class Spec:
     Attributes
     ----------
     path
-        As it was given.
+        The path as it was given.
     name, title
-        Of the module that will be generated; the title may be empty.
+        The name and the title of the module that will be generated; the title may be empty.
     curve, kernel
         The declarations.
     parameters
-        Names with the exact text of their defaults; None: to be given at run time.
+        Names with the exact text of their defaults; None for values that are given at run time.
     notes
         Unit and description of the parameters that have any.
     launch
-        Keyword arguments for ``solve``, numbers as the texts they are; None without a launch.
+        Keyword arguments for ``solve``, with numbers as their texts; None without a launch.
     tree
         The file's nodes with their positions.
     """
@@ -62,7 +62,7 @@ class Spec:
         Raises
         ------
         SpecFileError
-            If curve, kernel and parameters do not go together.
+            If curve, kernel and parameters are not consistent.
         DerivationError
             If a closed form is not real and finite.
         """
@@ -83,13 +83,13 @@ class Spec:
         if self.launch is None:
             mistakes.add(
                 self.tree.mark,
-                "launch is missing, which is needed to solve",
+                "launch is missing; solving needs it",
                 "add it, as in launch: {lam0: 0.5, v0: 0}",
             )
         for name, value in model.defaults:
             if value is None:
                 mark = place_of(self.tree, ("parameters", name))
-                what = f"parameters.{name}: null, and to solve needs a value"
+                what = f"parameters.{name}: is null; solving needs a value"
                 mistakes.add(mark, what, f"write one, as in {name}: 1")
         lam0 = None if self.launch is None or model.curve.charted else str(self.launch["lam0"])
         if lam0 is not None and not mistakes and (fault := _fault(model, lam0)):
@@ -100,14 +100,14 @@ class Spec:
             raise mistakes.error()
 
     def mistake(self, message: str, *base: str) -> SpecFileError:
-        """Return a message as a mistake of this file, at the place it speaks of.
+        """Return a message as a mistake of this file, at the place to which it refers.
 
         Parameters
         ----------
         message
             The message of an error that was caused by something in the file.
         base
-            Keys on the way to the section it is about, as far as that is known.
+            The keys of the section to which it refers, as far as that is known.
         """
         mistakes = Mistakes(self.path)
         mistakes.add(*locate(self.tree, message, base))
@@ -115,7 +115,7 @@ class Spec:
 
 
 def _fault(model: Model, lam0: str) -> str:
-    """Say why a motion cannot begin at a place; empty if it can."""
+    """Return the reason why a motion cannot begin at a place; an empty text if it can."""
     values = {sp.Symbol(n, real=True): exact_value(v) for n, v in model.defaults if v is not None}
     values[model.parameter] = exact_value(lam0)
     forms = (("x", model.x), ("z", model.z), ("ds", model.ds), ("the potential", model.potential))

@@ -1,4 +1,6 @@
-"""Surveyed tracks as files have them: tables of coordinates (CSV), and places on the Earth (GPX) in local metres."""
+"""Surveyed tracks from files: tables of coordinates (CSV), and places on the Earth (GPX), which become metres in a
+local frame.
+"""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -13,28 +15,29 @@ from gqm_sym.errors import InputError
 from gqm_sym.specfile.beside import ROW_LIMIT, read_beside, read_rows
 
 WANTED = "a CSV file with columns x, z, or x, y, z, perhaps with roll, or a GPX file"
-"""What a file of points should be, for messages."""
-# The columns of a table without their names, by their number.
+"""A description of files of points, for messages."""
+# The columns of a table without names, by the number of columns.
 _UNNAMED = {2: ("x", "z"), 3: ("x", "y", "z"), 4: ("x", "y", "z", "roll")}
-# The elements of GPX whose points are a track.
+# The elements of GPX whose points form a track.
 _PLACES = ("trkpt", "rtept")
 # The ellipsoid of the World Geodetic System 1984: half its longer axis in m, and its flattening.
 EQUATOR, FLATTENING = 6378137.0, 1.0 / 298.257223563
-# How far from its first point a track may go, in m: the Earth's curvature displaces a place by some d**3/(6 R**2).
+# The largest distance of a track from its first point in m; the Earth's curvature displaces a place by some d**3/(6
+# R**2).
 FARTHEST = 50_000.0
 
 
 class Survey(NamedTuple):
-    """Points as a file has them.
+    """The points in a file.
 
     Attributes
     ----------
     rows
         The coordinates of each point, x and z, or x, y and z: numbers or decimal text.
     roll
-        The roll angle at each point; None where the file has none.
+        The roll angle at each point; None if the file has none.
     first_line
-        The line of the first point, which messages count from; of GPX, which has no lines, 1.
+        The line of the first point, from which messages count; 1 for GPX, which has no lines.
     """
 
     rows: Sequence[Sequence[Any]]
@@ -48,10 +51,11 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
     Parameters
     ----------
     path
-        Of a CSV file with columns x and z, or x, y and z in metres, in the order that its first line names, perhaps
-        with the roll angle in radians as a column roll; or of a GPX file, whose latitudes, longitudes and heights
-        become metres to the east (x), to the north (y) and upwards (z). x and y are then those in the plane that
-        touches the ellipsoid of WGS 84 at the first point, and z is the height as the file has it. At most 32 MiB.
+        The path of a CSV file with columns x and z, or x, y and z in metres, in the order of the names in its first
+        line, possibly with the roll angle in radians as a column roll; or of a GPX file, whose latitudes, longitudes
+        and heights become metres to the east (x), to the north (y) and upwards (z). x and y are then coordinates in the
+        plane that touches the ellipsoid of WGS 84 at the first point, and z is the height in the file. The file may
+        have at most 32 MiB.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
     Raises
     ------
     InputError
-        If there is no such file, or it is anything but a table of points; the message names file and row.
+        If there is no such file, or it is not a table of points; the message names file and row.
     """
     file = file_path(path, where="read_track: path")
     try:
@@ -87,12 +91,12 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
 
 
 def surveyed(name: str, folder: Path) -> Survey:
-    """Read the points of a file in a folder, which is named by its extension or else a CSV file.
+    """Read the points of a file in a folder; it is a CSV file unless its extension says otherwise.
 
     Raises
     ------
     InputError
-        If it is anything but points.
+        If the file does not contain points.
     """
     text = read_beside(name, folder, wanted=WANTED)
     if name.lower().endswith(".gpx"):
@@ -136,12 +140,13 @@ def _number(value: Any, where: str) -> float:
     if isinstance(value, str) and not (value.isascii() and "_" not in value):
         number = float("nan")
     if not isfinite(number):
-        raise InputError(f"{where}: {str(value)[:40]!r} is no finite decimal number; leave the row out or mend it")
+        raise InputError(f"{where}: {str(value)[:40]!r} is not a finite decimal number; leave the row out or mend it")
     return number
 
 
 class _Reader:
-    """Collects latitude, longitude and height, as texts, of the points of the first track or route of a GPX file.
+    """A reader that collects latitude, longitude and height, as texts, of the points of the first track or route of a
+    GPX file.
 
     Declarations of document types are refused, and entities with them: nothing is expanded or fetched.
     """
@@ -207,12 +212,14 @@ class _Reader:
 
 
 def _local(name: str, places: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Metres to the east and to the north of the first place, in the plane that touches the ellipsoid, and height."""
+    """Return metres to the east and to the north of the first place, in the plane that touches the ellipsoid, and the
+    height.
+    """
     square = FLATTENING * (2.0 - FLATTENING)
     north, start = radians(places[0][0]), radians(places[0][1])
 
     def in_meridian(latitude: float, height: float) -> tuple[float, float]:
-        """The distance from the axis, and that along it from the equator's plane."""
+        """Return the distance from the Earth's axis, and the distance from the plane of the equator."""
         radius = EQUATOR / sqrt(1.0 - square * sin(latitude) ** 2)
         return (radius + height) * cos(latitude), (radius * (1.0 - square) + height) * sin(latitude)
 

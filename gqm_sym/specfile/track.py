@@ -80,15 +80,15 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
     Parameters
     ----------
     given
-        ``file``, and what else is given of the section's keys.
+        ``file``, and the other keys of the section that are given.
     folder
         The folder of the YAML file; the points are in it, or in a folder below it.
 
     Raises
     ------
     DeclarationError
-        If there is no such file, or it is anything but a table of points; the message names file and row, which is
-        the line of the file.
+        If there is no such file, or it is not a table of points; the message names file and row, which is the line of
+        the file.
     """
     name = given.pop("file")
     found = surveyed(name, folder)

@@ -1,4 +1,4 @@
-"""Units in curve files: which ones fit where."""
+"""The units that are allowed for each number of a curve file."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from gqm_sym.kernels import KERNELS, Kernel
 from gqm_sym.kernels.base import UNITS, kernel_formulas
 from gqm_sym.literals.units import read_unit
 
-# Units: of the parameters of force laws by their arguments, and of the numbers of a launch.
+# The units of the parameters of force laws, by their arguments, and of the numbers of a launch.
 KERNEL_UNITS = UNITS
 LAUNCH_UNITS = {"v0": "m/s", "t_max": "s"}
 
@@ -23,16 +23,17 @@ def expected_units(
     kernel: Kernel | None,
     given: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, str]:
-    """The units of the run-time parameters of a curve file, by their roles and by the formulas that contain them.
+    """Return the units of the run-time parameters of a curve file, from their roles and the formulas that contain them.
 
     Parameters
     ----------
     data
         The valid part of the file.
     curve, kernel
-        What it declares, None where that is wrong.
+        The declarations in the file, None for each that is wrong.
     given
-        Units of parameters, in order: where formulas leave several free, the first tell what the next must be.
+        The units of parameters, in order; if the formulas leave several undetermined, the first ones determine the
+        others.
     """
     units = _by_role(data)
     formulas = Formulas() if curve is None else curve_formulas(curve)
@@ -52,7 +53,7 @@ def expected_units(
 
 
 def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
-    """Units of what the kernels are given, as far as they are mappings of names and values."""
+    """Return the units of the kernels' arguments, as far as these are mappings of names and values."""
     terms = data.get("kernel")
     units: dict[str, str] = {}
     for key, term in terms.items() if isinstance(terms, Mapping) else ():
@@ -68,7 +69,7 @@ def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
 def launch_units(curve: Curve | None) -> dict[str, str]:
     """Return the units of a launch; that of the curve's parameter only if the kind of curve determines it."""
     own = None if curve is None else parameter_dimension(curve)
-    # A parametric curve's parameter may be anything; that of its waves is an angle.
+    # The parameter of a parametric curve may have any dimension; as the argument of sines and cosines it is an angle.
     lam0 = {} if own is None else {"lam0": "rad" if own == NUMBER else "m"}
     return {**LAUNCH_UNITS, **lam0}
 

@@ -1,10 +1,9 @@
-"""YAML text -> a tree of nodes with their line and column.
+"""Conversion of YAML text to a tree of nodes with their line and column.
 
-Only what such a file needs of YAML 1.2 is read: mappings with text keys, sequences and scalars,
-one document a file. Scalars stay text, because ``9.81`` means 981/100 and not the double nearest to
-it. Tags, anchors and aliases are refused: a file without them says everything in one place and
-cannot grow when it is read. The tree is built from the stream of events with a stack of our own, so
-that no nesting can exhaust Python's.
+Only a part of YAML 1.2 is read: mappings with text keys, sequences and scalars, with one document in a file. Scalars
+stay text, because ``9.81`` means 981/100 and not the double nearest to it. Tags, anchors and aliases are refused:
+without them a file states everything in one place and cannot grow when it is read. The tree is built from the stream of
+events with a stack of our own, so that no nesting can exhaust Python's.
 """
 
 import re
@@ -24,7 +23,7 @@ NODE_LIMIT = 1000
 
 _NOT_YAML = re.compile(r"[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
-# What the scanner says, and what to do about it.
+# The messages of the scanner, with remedies.
 _REMEDIES = (
     (
         "mapping values are not allowed",
@@ -42,7 +41,7 @@ _REMEDIES = (
 
 
 class _Stop(Exception):
-    """Reading further makes no sense; the reason is already noted."""
+    """An exception that ends reading; the reason is already recorded."""
 
 
 def read_text(path: Path, mistakes: Mistakes) -> str:
@@ -51,10 +50,10 @@ def read_text(path: Path, mistakes: Mistakes) -> str:
     Raises
     ------
     SpecFileError
-        With the one reason why there is nothing to read.
+        If there is nothing to read; the message gives the reason.
     """
     try:
-        # A bounded read instead of a question for the size: devices and pipes have none.
+        # The read is bounded instead of the size being checked, because devices and pipes have no size.
         with path.open("rb") as file:
             data = file.read(SIZE_LIMIT + 1)
     except IsADirectoryError:
@@ -102,14 +101,14 @@ def _check_text(text: str, mistakes: Mistakes) -> None:
 
 
 def read_tree(text: str, mistakes: Mistakes, *, needed: str = "name, curve and kernel") -> Node | None:
-    """Read the one document of a text; None where there is nothing that can be looked at further.
+    """Read the one document of a text; return None if there is nothing that can be checked further.
 
     Parameters
     ----------
     text
         The file's text.
     mistakes
-        Takes everything that is wrong.
+        The record of the file's mistakes.
     needed
         The keys that an empty file lacks.
     """
@@ -136,19 +135,19 @@ def _report(error: YAMLError, mistakes: Mistakes) -> None:
 
 
 class _Builder:
-    """Turns the events of one stream into a tree, bounded in depth and in size."""
+    """A builder that converts the events of one stream to a tree of bounded depth and size."""
 
     def __init__(self, text: str, mistakes: Mistakes) -> None:
         self.text = text
         self.mistakes = mistakes
         self.root: Node | None = None
         self.open: list[ListNode | MapNode] = []
-        self.key: list[Scalar | None] = []  # of each open mapping, the key that waits for its value
+        self.key: list[Scalar | None] = []  # for each open mapping, the key that waits for its value
         self.count = 0
         self.documents = 0
 
     def build(self, needed: str) -> Node | None:
-        # "safe" and pure: no round-trip comments to collect, no C extension needed.
+        # The "safe" pure loader collects no comments for round trips and needs no C extension.
         for event in YAML(typ="safe", pure=True).parse(self.text):
             self._take(event)
         if self.root is None:

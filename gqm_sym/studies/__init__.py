@@ -1,4 +1,4 @@
-"""Study files: one question to many launches, stored as it is answered, and fits to measurements."""
+"""Study files: sweeps over many launches, which are stored part by part, and fits to measurements."""
 
 from gqm_sym.studies.fits import FitPlan, fit_schema, read_fit
 from gqm_sym.studies.plan import Plan

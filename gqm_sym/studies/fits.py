@@ -30,12 +30,12 @@ from gqm_sym.studies.plan import Array
 from gqm_sym.studies.reader import StudyReader, read_study
 from gqm_sym.studies.schema import Name, Table
 
-# What a column of standard deviations is called: of the only quantity, or of the one that follows.
+# The names of a column of standard deviations: for the only quantity, or for the one that follows in the name.
 SIGMA = "sigma"
 
 
 def _split_unknown(value: object) -> object:
-    """Take a guess, two limits or all three for the mapping that says which is which."""
+    """Convert a guess, two limits or all three to the mapping that names them."""
     if value is None:
         return {}
     if isinstance(value, str):
@@ -110,20 +110,20 @@ def model_at(path: tuple[str, ...]) -> Any:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitPlan:
-    """A fit: what was measured, what is to be found, and the module of the motion.
+    """A fit: the measurements, the unknowns, and the module of the motion.
 
     Attributes
     ----------
     title : str
         One line of text for readers.
     data : dict
-        The measurements, as `gqm_sym.fit` takes them, in SI.
+        The measurements in SI units, as `gqm_sym.fit` takes them.
     free, fixed : dict
-        What is to be found, and what is known; numbers as exact texts in SI.
+        The unknown and the known numbers, as exact texts in SI units.
     units : mapping
         SI units of names, as far as they are known.
     name, module : str
-        The generated module: its name and its text.
+        The name and the text of the generated module.
     """
 
     title: str
@@ -135,7 +135,7 @@ class FitPlan:
     module: str
 
     def fit(self, module: ModuleType) -> Fit:
-        """Return the fit, by the generated module as it was imported."""
+        """Return the fit, with the generated module as it was imported."""
         return fit(module, self.data, self.free, **self.fixed)
 
     def as_json(self, found: Fit) -> str:
@@ -170,12 +170,12 @@ def read_fit(path: Path | str) -> FitPlan:
     Parameters
     ----------
     path
-        Of a YAML file, at most 64 KiB.
+        The path of a YAML file of at most 64 KiB.
 
     Raises
     ------
     SpecFileError
-        With every mistake, one line each: ``file:line:column: what; what would be right``.
+        If the file has mistakes, with a line ``file:line:column: ...`` for each of them.
     """
     return read_study(path, _FitReader, needed="curve, data and free")
 
@@ -186,7 +186,7 @@ def fit_schema() -> dict[str, Any]:
 
 
 class _FitReader(StudyReader[FitPlan]):
-    """Reads a fit file."""
+    """A reader of a fit file."""
 
     def read(self) -> FitPlan | None:
         """Return the plan of the fit."""
@@ -220,7 +220,7 @@ class _FitReader(StudyReader[FitPlan]):
         )
 
     def _data(self, file: FitFile, columns: Mapping[str, Array]) -> dict[str, Any]:
-        """The measurements in the shape that a fit takes them."""
+        """Return the measurements in the form that a fit takes."""
         data: dict[str, Any] = {name: column for name, column in columns.items() if not name.startswith(SIGMA)}
         quantities = [name for name in UNITS if name in columns]
         sigma: dict[str, Any] = {
@@ -278,7 +278,7 @@ class _FitReader(StudyReader[FitPlan]):
         return known
 
     def _check(self, data: dict[str, Any], model: Model) -> None:
-        """Note data that a fit would refuse."""
+        """Record data that a fit would refuse."""
         parameters = {name: None for name, _ in model.defaults}
         try:
             read_measurements(data, {**dict.fromkeys(LAUNCH), **parameters}, None)

@@ -18,14 +18,14 @@ from gqm_sym.runtime.compiled.jit import STAMP
 
 Array = NDArray[np.float64]
 
-# The number of points of a part, about a second of work: where compiled loops answer most points, and where each point
-# is solved by itself.
+# The number of points of a part, which take about a second: if compiled loops compute most points, and if each point is
+# solved separately.
 POINTS_IN_LOOPS, POINTS_SOLVED = 2**15, 2**7
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Axis:
-    """One thing that varies: its name, its values in SI, and their unit."""
+    """An argument that varies: its name, its values in SI units, and their unit."""
 
     name: str
     values: Array
@@ -129,7 +129,7 @@ class Plan:
 
 
 def evenly(start: str, stop: str, count: int) -> Array:
-    """Doubles nearest to evenly spaced exact numbers, both ends included."""
+    """Return the doubles nearest to evenly spaced exact numbers, including both ends."""
     first, last = (_fraction(text) for text in (start, stop))
     step = (last - first) / (count - 1)
     whole = lcm(first.denominator, step.denominator)
@@ -139,7 +139,7 @@ def evenly(start: str, stop: str, count: int) -> Array:
 
 
 def in_doubles(cells: Iterable[str], unit: Unit) -> Array:
-    """Doubles nearest to decimal numbers given in a unit, in SI."""
+    """Return the doubles in SI units nearest to decimal numbers given in a unit."""
     if unit.is_si:
         return np.array([float(cell) for cell in cells])
     scale = unit.factor * _fraction("pi") ** unit.turns
@@ -148,5 +148,5 @@ def in_doubles(cells: Iterable[str], unit: Unit) -> Array:
 
 def _fraction(text: str) -> Fraction:
     number = read_number(text, where="a value")
-    # An irrational number by its first 32 digits.
+    # An irrational number is represented by its first 32 digits.
     return Fraction(number.value) + Fraction(number.low) if number.fraction is None else number.fraction

@@ -1,4 +1,4 @@
-"""Read a sweep file: every mistake at its line, as of a curve file."""
+"""Reading of a sweep file, with all mistakes reported by line, as for a curve file."""
 
 import re
 from abc import ABC, abstractmethod
@@ -34,7 +34,7 @@ SECONDS = 0.5
 P = TypeVar("P")
 S = TypeVar("S", bound=BaseModel)
 
-# An exponent of more digits would make exact numbers that fill the memory.
+# The largest number of digits of an exponent; with more, exact numbers would fill the memory.
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _LAUNCH = ("lam0", "v0", "direction", "lam")
 
@@ -79,7 +79,7 @@ def read_study(path: Path | str, reader: "type[StudyReader[P]]", *, needed: str)
 
 
 class StudyReader(ABC, Generic[P]):
-    """Reads the tree of one file, and records all mistakes."""
+    """A reader of one file's tree that records all mistakes."""
 
     known: tuple[str, ...]
     units: dict[str, str]
@@ -91,10 +91,10 @@ class StudyReader(ABC, Generic[P]):
 
     @abstractmethod
     def read(self) -> P | None:
-        """Return the content of the file; None if it cannot be told."""
+        """Return the content of the file; None if it cannot be determined."""
 
     def validated(self, schema: type[S], model_at: Callable[[tuple[str, ...]], Any]) -> S | None:
-        """Return the file in the shape of its schema."""
+        """Return the file as an instance of its schema."""
         try:
             return schema.model_validate(plain(self.tree))
         except ValidationError as error:
@@ -104,7 +104,7 @@ class StudyReader(ABC, Generic[P]):
             return None
 
     def curve(self, name: str) -> tuple[Spec, Model] | None:
-        """Return the curve file, and what is derived from it; its own mistakes are its own."""
+        """Return the curve file and its model; mistakes in the curve file are reported as its own."""
         try:
             path = path_beside(name, self.folder, wanted="a curve file")
         except InputError as error:
@@ -120,7 +120,7 @@ class StudyReader(ABC, Generic[P]):
         return spec, model
 
     def table(self, table: Table, key: str) -> Iterator[tuple[str, Array]]:
-        """Yield the columns of a table, in SI."""
+        """Yield the columns of a table in SI units."""
         name, units = table.file, table.units
         try:
             text = read_beside(name, self.folder, wanted="a CSV file whose first line names its columns")
@@ -141,7 +141,7 @@ class StudyReader(ABC, Generic[P]):
             yield column, in_doubles(cells, read_unit(units.get(column) or "1", where="unit"))
 
     def fixed(self, file: Any, spec: Spec) -> dict[str, str]:
-        """Return what is the same everywhere: of the curve file's launch, and of this file."""
+        """Return the fixed arguments: those of the curve file's launch and those of this file."""
         launch = {key: str(value) for key, value in (spec.launch or {}).items() if key != "point"}
         given = {}
         for name, entry in file.fixed.items():
@@ -154,7 +154,7 @@ class StudyReader(ABC, Generic[P]):
         return launch | given
 
     def check_unit(self, name: str, unit: str, *path: str) -> None:
-        """Note a unit of another dimension than what it is the unit of."""
+        """Record a unit whose dimension is not that of its value."""
         if unit:
             try:
                 check_unit(unit, self.units.get(name))
@@ -162,7 +162,7 @@ class StudyReader(ABC, Generic[P]):
                 self.mistakes.add(node_at(self.tree, path).mark, f"{'.'.join(path)}: {error}")
 
     def check_known(self, path: tuple[str, ...], spec: Spec, known: Sequence[str]) -> bool:
-        """Note a name, the last of its path, that nothing is called by."""
+        """Record a name, the last one of its path, that does not exist."""
         name = path[-1]
         if name in known:
             return True
@@ -173,7 +173,7 @@ class StudyReader(ABC, Generic[P]):
 
 
 def _columns(name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
-    """The cells of a table by its columns, each a finite decimal number."""
+    """Return the cells of a table by its columns, each of which must be a finite decimal number."""
     if not header or not rows:
         raise InputError(f"{name!r}, row 1: must name the columns, as in lam0,v0, with values in the rows below")
     if len(set(header)) < len(header):
@@ -183,12 +183,12 @@ def _columns(name: str, header: list[str], rows: list[list[str]]) -> dict[str, l
             raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
         for cell in row:
             if not _is_decimal(cell):
-                raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
+                raise InputError(f"{name!r}, row {number}: {cell!r:.60} is not a finite decimal number")
     return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
 
 
 class _SweepReader(StudyReader[Plan]):
-    """Reads a sweep file."""
+    """A reader of a sweep file."""
 
     def read(self) -> Plan | None:
         """Return the plan of the sweep."""
@@ -287,7 +287,7 @@ class _SweepReader(StudyReader[Plan]):
             self.mistakes.add(place_of(self.tree, ("quantities",)), what, "add it" if asks else "ask it, or remove lam")
 
     def _check_values(self, axes: list[Axis], fixed: Mapping[str, str], model: Model) -> None:
-        """Note values that no motion can have, wherever they are given."""
+        """Record values that no motion can have, wherever they are given."""
         columns = [(axis.name, axis.values, True) for axis in axes]
         columns += [
             (name, np.array([read_number(v, where=name).value]), False)
@@ -310,7 +310,7 @@ class _SweepReader(StudyReader[Plan]):
 
 
 def _si(unit: str) -> str:
-    """The SI unit of what is measured in a unit; none for a number."""
+    """Return the SI unit of the dimension of a unit; none for a number."""
     return read_unit(unit, where="unit").name if unit != "1" else ""
 
 

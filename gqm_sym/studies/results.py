@@ -38,21 +38,21 @@ def check_format(target: Path) -> None:
 
 @require("data")
 def dataset(plan: Plan, swept: Mapping[str, Sweep], refusals: Mapping[str, str]) -> "Dataset":
-    """All quantities of a sweep over its axes, with names, units, statuses, and a record of what they were made from.
+    """Return all quantities of a sweep over its axes, with names, units, statuses and provenance.
 
     Parameters
     ----------
     plan : Plan
-        What was computed.
+        The plan that was computed.
     swept : mapping
         The result for each quantity.
     refusals : mapping
-        For each quantity, why the first refused launch is refused; empty where none is.
+        For each quantity, the reason why the first refused launch is refused; an empty text if none is.
 
     Returns
     -------
     xarray.Dataset
-        A variable for each column, and beside it ``<quantity>_status``: 0 where there is a value.
+        A variable for each column, and a variable ``<quantity>_status``, which is 0 where there is a value.
     """
     from xarray import Dataset
 
@@ -87,7 +87,7 @@ def _attributes(plan: Plan, name: str) -> dict[str, str]:
 
 
 def _status_attributes(name: str, refusal: str) -> dict[str, Any]:
-    """Attributes of a variable of status codes, in the convention for flags (CF 3.5)."""
+    """Return the attributes of a variable of status codes, in the convention for flags (CF 3.5)."""
     meanings = ["answered", *(re.sub(r"\W+", "_", text) for text in STATUS_SENTENCES[1:])]
     return {
         "long_name": f"status of {name}: why there is no value",
@@ -99,7 +99,7 @@ def _status_attributes(name: str, refusal: str) -> dict[str, Any]:
 
 @require("data")
 def write(data: "Dataset", target: Path) -> None:
-    """Write a complete dataset or nothing at all; the same dataset gives the same bytes."""
+    """Write a dataset completely or not at all; the same dataset gives the same bytes."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
         written = Path(folder) / target.name
@@ -121,7 +121,7 @@ def remove(target: Path) -> None:
 
 @require("data")
 def stored(target: Path, plan: Plan) -> "Dataset | None":
-    """The results of a plan from their file; None if the file holds anything else."""
+    """Return the results of a plan from their file; None if the file contains anything else."""
     from xarray import open_dataset
 
     try:

@@ -23,27 +23,27 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-# A function that is called with the number of points done and that of all points.
+# The type of a function that is called with the number of finished points and the number of all points.
 Progress = Callable[[int, int], None]
 
 
 def run(
     plan: Plan, target: Path | str, *, client: Any = None, force: bool = False, progress: Progress | None = None
 ) -> "Dataset":
-    """Compute a plan into a file; parts that an interrupted run has stored are not computed again.
+    """Compute a plan and store the results in a file; parts that an interrupted run has stored are not computed again.
 
     Parameters
     ----------
     plan : Plan
-        What to compute.
+        The plan to compute.
     target : path
-        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, its parts lie beside it in ``FILE.parts``.
+        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, its parts are stored beside it in ``FILE.parts``.
     client : distributed.Client, optional
-        A Dask cluster to do the work, with the same numbers.
+        A Dask cluster to do the work, which gives the same numbers.
     force : bool
-        Begin anew and overwrite what is there.
+        Whether to begin again and overwrite existing results.
     progress : callable, optional
-        Called with the number of points done and that of all points.
+        Called with the number of finished points and the number of all points.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def run(
     Raises
     ------
     InputError
-        If other results are there.
+        If the file contains other results.
     """
     target = Path(target)
     check_format(target)
@@ -93,7 +93,7 @@ def _here(jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, dict[str, Swee
 def answer_all(
     stamp: str, source: str, text: str, name: str, quantities: tuple[str, ...], arguments: Mapping[str, Any]
 ) -> dict[str, Sweep]:
-    """Answer one part, here or on a worker: every quantity at each of its points.
+    """Compute one part, here or on a worker: every quantity at each of its points.
 
     The parameters are those of `cluster.answer`.
     """
@@ -105,7 +105,7 @@ def answer_all(
 
 
 def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
-    """The answer at all points; points that are refused are found by halving, and do not stop the others."""
+    """Return the results at all points; points that are refused are found by bisection, and do not stop the others."""
     try:
         return ask(arguments)
     except InputError:
@@ -120,7 +120,7 @@ def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, argument
 
 
 def _refusal(plan: Plan, source: Path, swept: Sweep) -> str:
-    """Why the first refused launch is refused, in words; empty where none is."""
+    """Return the reason why the first refused launch is refused; an empty text if none is."""
     refused = np.flatnonzero(swept.status == REFUSED)
     if not refused.size:
         return ""

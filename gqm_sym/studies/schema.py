@@ -1,4 +1,4 @@
-"""The shape of a sweep file, as `specfile.schema` has that of a curve file."""
+"""The schema of a sweep file, as `specfile.schema` is that of a curve file."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 

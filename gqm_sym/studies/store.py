@@ -18,19 +18,19 @@ _PLAN = "plan.json"
 
 
 class Store:
-    """The folder ``FILE.parts`` beside the file that the results will be written to.
+    """The folder ``FILE.parts`` beside the file to which the results will be written.
 
     Parameters
     ----------
     target
-        That file.
+        The file for the results.
     plan
-        What is computed.
+        The plan that is computed.
 
     Raises
     ------
     InputError
-        If parts of another plan are there.
+        If the folder contains parts of another plan.
     """
 
     def __init__(self, target: Path, plan: Plan) -> None:
@@ -47,11 +47,11 @@ class Store:
 
     @staticmethod
     def folder_of(target: Path) -> Path:
-        """The folder of the parts of a file."""
+        """Return the folder of the parts of a file."""
         return target.with_name(f"{target.name}.parts")
 
     def length(self, number: int) -> int:
-        """The number of points of a part."""
+        """Return the number of points of a part."""
         extent = self._plan.extent(number)
         return int(extent.stop - extent.start)
 
@@ -72,7 +72,7 @@ class Store:
         write_bytes(stream.getvalue(), self._path(number))
 
     def get(self, number: int) -> dict[str, Sweep] | None:
-        """A stored part; None if it is absent or damaged."""
+        """Return a stored part; None if it is absent or damaged."""
         try:
             with self._path(number).open("rb") as file, np.load(file, allow_pickle=False) as found:
                 swept = {
@@ -85,11 +85,11 @@ class Store:
         return swept if complete else None
 
     def missing(self) -> list[int]:
-        """The parts that are not stored."""
+        """Return the parts that are not stored."""
         return [number for number in range(self._plan.parts) if self.get(number) is None]
 
     def joined(self) -> dict[str, Sweep]:
-        """All parts together, in the plan's shape."""
+        """Return all parts together, in the plan's shape."""
         parts = [self.get(number) or {} for number in range(self._plan.parts)]
         shape, out = self._plan.shape, {}
         for name in self._plan.quantities:

@@ -54,7 +54,7 @@ LAYERS = (
 # A motion is drawn and converted by what lies above it, as pandas and xarray do it: these imports alone go upwards.
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
-    ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_xarray
+    ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
     ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_, Motion.__str__
     ("declare/curve.py", "gqm_sym.building"),  # Curve.plot
     ("derivation/model.py", "gqm_sym.building"),  # Model.equilibria
@@ -278,7 +278,7 @@ def _targets(node: ast.stmt) -> Iterator[str]:
 
 
 def _waits(node: ast.AST) -> bool:
-    """Whether what stands inside does not run when the file is imported."""
+    """Return whether the statements inside do not run when the file is imported."""
     if isinstance(node, ast.If):
         return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
     return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
@@ -391,7 +391,7 @@ def test_each_room_says_what_it_is_for() -> None:
 
 
 def test_the_front_loads_nothing_heavy() -> None:
-    """What ``import gqm_sym`` runs at once is the errors alone."""
+    """Of the package, ``import gqm_sym`` loads only the errors at once."""
     loaded = {row.target for row in _imports() if not row.unit and not row.waits}
     outside = {target for target in loaded if target.split(".")[0] not in sys.stdlib_module_names}
     assert outside <= {"gqm_sym.errors"}

@@ -80,7 +80,7 @@ def wells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
 def test_places_lie_within_their_bounds(
     name: str, lam0: str, v0: str, direction: int, wells: dict[str, ModuleType]
 ) -> None:
-    """From the launch to the turning point, and there; and the bound is no larger than it must be."""
+    """Places up to the turning point lie within their bounds, and the bounds are no larger than necessary."""
     _, _, potential, ds, _ = WELLS[name]
     motion = wells[name].solve(lam0, v0, direction)
     assert motion.kind == "libration"

@@ -68,7 +68,7 @@ def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 def measured(page: Path, text: str) -> tuple[dict[str, Any], str]:
-    """What a browser makes of a page's text, and what it says meanwhile."""
+    """Return how a browser displays a page's text, and its messages meanwhile."""
     copy = page.with_name("copy.html")
     copy.write_text(text.replace("</body>", MEASURE), encoding="utf-8")
     ran = browse(copy, "--dump-dom", "--enable-logging=stderr")

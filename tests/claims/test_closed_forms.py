@@ -250,7 +250,7 @@ def test_closed_form_is_the_integral(row: Row) -> None:
     ],
 )
 def test_elsewhere_it_is_an_integral(curve: Callable[[], gqm.Curve], force: Callable[[], gqm.Kernel]) -> None:
-    """Which the model says, and which can be read."""
+    """Elsewhere the closed form is an integral; the model says so, and its text can be read."""
     model = gqm.derive(curve(), gqm.Gravity() + force())
     assert model.speed_squared_form == "quadrature"
     assert model.speed_squared.has(sp.Integral)
@@ -274,7 +274,7 @@ def test_the_integral_is_the_paper_s_second_example() -> None:
 
 
 def test_a_law_that_is_not_linear_is_an_equation() -> None:
-    """V² is named, not given; A holds it as W."""
+    """Under a law that is not linear, V² has a name but no form, and A contains it as W."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity() + gqm.CoulombFriction() + gqm.RotatingFrame())
     assert model.speed_squared_form == "equation"
     assert "not linear" in model.notes[-1]
@@ -284,7 +284,7 @@ def test_a_law_that_is_not_linear_is_an_equation() -> None:
 
 
 def test_conservative_forms_stay_as_they_are() -> None:
-    """No signs, no notes, and the launch speed that just lifts off is 5 g L for a loop."""
+    """Conservative forms have no signs and no notes; V**2 of a launch that just loses contact in a loop is 5 g L."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity())
     assert (model.speed_squared_form, model.notes, model.dissipation) == ("closed", (), None)
     length, g = sp.Symbol("L", real=True), sp.Symbol("g", real=True)

@@ -258,7 +258,7 @@ def test_a_harmonic_well_is_isochronous(lam0: str, v0: str, module_named: Module
 
 
 def test_a_harmonic_well_at_its_bottom_is_rest(module_named: ModuleNamed) -> None:
-    """Where the line is nearest to the centre."""
+    """A body rests where the line is nearest to the centre."""
     assert module_named("harmonic_line").solve("-24/25", w="1.3").kind == "rest"
 
 

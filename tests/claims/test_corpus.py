@@ -185,7 +185,7 @@ def famous_motion(famous_module: ModuleOf) -> MotionOf:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """What "of its scale" refers to."""
+    """The scales that "of its scale" refers to."""
 
     lam: float
     place: float
@@ -236,7 +236,7 @@ def test_all_explicit_curves_are_here() -> None:
 
 @pytest.mark.parametrize("famous", **of_kind("libration"))
 def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
-    """Between two turning points, met in order, half a period apart."""
+    """A libration goes between two turning points, met in order, half a period apart."""
     motion, expect, of = famous_motion(famous), famous.expect, scale(famous)
     assert motion.kind == "libration"
     met = list(zip(expect["turning_points"], expect["turning_points_xz"], strict=True))
@@ -255,7 +255,7 @@ def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module:
 
 @pytest.mark.parametrize("famous", **of_kind("circulation"))
 def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """Round and round, each time in the loop time."""
+    """A circulation goes round again and again, each time in the loop time."""
     motion = famous_motion(famous)
     assert motion.kind == "circulation"
     assert len(motion.turning_points) == 0
@@ -314,7 +314,7 @@ def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf
 
 @EVERY_MOTION
 def test_the_error_bound_is_useful(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """It says at most a hundred times what is lost. Worst measured: 31."""
+    """The error bound is at most a hundred times what is lost. The worst ratio measured is 31."""
     rows = [(row["t"], row["lam"]) for row in famous.expect["positions"]]
     assert overstatement(famous_motion(famous), rows, scale(famous).lam) <= USEFUL
 

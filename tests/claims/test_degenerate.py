@@ -58,7 +58,7 @@ class Edge:
 
     @property
     def lam_scale(self) -> float:
-        """Of the parameter: the largest of the orbit, or its range."""
+        """Return the scale of the parameter: its largest value on the orbit, or its range."""
         expected = self.expected
         if expected["kind"] == "libration":
             low, high = (float(text) for text in expected["turning_points"])
@@ -164,7 +164,7 @@ def test_the_error_bound_is_honest(edge: Edge, edge_motion: MotionOf) -> None:
 
 @EVERY_EDGE
 def test_the_error_bound_is_useful(edge: Edge, edge_motion: MotionOf) -> None:
-    """It says at most a hundred times what is lost. Worst measured: 63."""
+    """The error bound is at most a hundred times what is lost. The worst ratio measured is 63."""
     rows = [(row["t"], row["lam"]) for row in edge.expected["positions"]]
     assert overstatement(edge_motion(edge), rows, edge.lam_scale) <= USEFUL
 
@@ -230,7 +230,7 @@ def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], Module
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("exponent", [15, 17, 20, 30])
 def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str], ModuleType]) -> None:
-    """On whichever side of the top the nearest double lies; from the other one the body was not followed."""
+    """A launch next to the top is right on either side, wherever the nearest double lies (on one side it failed)."""
     near = f"1/10**{exponent}"
     motion, other = (module_of("circle").solve(f"{side}*(pi {sign} {near})", L=1) for sign in "-+")
     with mp.workdps(100):

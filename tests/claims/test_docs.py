@@ -1,4 +1,4 @@
-"""What the documentation shows runs, and prints what it says."""
+"""The examples of the documentation run, and print what the documentation shows."""
 
 import doctest
 import importlib

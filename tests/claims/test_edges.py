@@ -80,7 +80,7 @@ def test_from_lip_to_lip_of_planes(lam0: Any, build: Build) -> None:
     ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
 )
 def test_losses_keep_a_body_from_the_other_lip(name: str, force: Any, build: Build) -> None:
-    """With losses it turns before, from either lip at mirrored places."""
+    """With losses the body turns before the other lip, at mirrored places from either side."""
     module = build(name, HALF_PIPE, gqm.Gravity() + force)
     left, right = (module.solve(lam0).turning_points[:2] for lam0 in (0, "pi + 1"))
     assert left[1] < math.pi + 1.0
@@ -88,7 +88,7 @@ def test_losses_keep_a_body_from_the_other_lip(name: str, force: Any, build: Bui
 
 
 def test_a_faster_body_leaves_over_the_lip(build: Build) -> None:
-    """With some speed at the lip it does not turn there; with what is just enough to come there it does."""
+    """A body with some speed at the lip does not turn there; one that just reaches it does."""
     module = build("half_pipe", HALF_PIPE, gqm.Gravity())
     assert module.solve(0, "1/1000").events[-1].kind == "domain-end"
     bowl = build("bowl", gqm.Curve.graph("x**2", parameter="x", domain=(-1, 1)), gqm.Gravity())
@@ -132,7 +132,7 @@ def test_the_time_at_a_turning_point_given_exactly(build: Build) -> None:
 
 
 def test_a_body_that_slips_at_launch_begins_to_slip_once(build: Build) -> None:
-    """After a period it slips on; that it begins to slip on the way is told in each of them."""
+    """The event at launch occurs once; later ones follow after every half period."""
     circle = gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi")
     force = gqm.Gravity() + gqm.Rolling(beta="2/5", mu_static="1/10")
     motion = build("slipping", circle, force).solve("3/2")
@@ -205,7 +205,7 @@ def calls(module: ModuleType, odd: Any) -> Iterator[tuple[str, Callable[[], Any]
 
 @pytest.mark.parametrize("name", ["circle", "circle_coulomb", "track"])
 def test_odd_numbers_are_answered_or_refused(name: str) -> None:
-    """Whatever is given for a number, the answer is one, or an error of this package, or names the argument."""
+    """Odd values for a number give an answer, or an error of this package that names the argument."""
     module = __import__(f"generated.{name}", fromlist=[name])
     for odd in ODD:
         for argument, call in calls(module, odd):
@@ -235,7 +235,7 @@ def test_one_element_is_an_array_and_none_is_a_number() -> None:
 
 
 def test_an_interval_of_too_many_events_is_refused() -> None:
-    """Rather than listed for hours."""
+    """An interval of too many events is refused rather than listed for hours."""
     from generated import circle
 
     with pytest.raises(InputError, match=r"events_between: .* ask for a shorter interval"):
@@ -336,7 +336,7 @@ def test_a_single_sine_of_a_parameter(tilt: Any, build: Build) -> None:
 
 @pytest.mark.parametrize("alpha", ANGLES)
 def test_an_inclination_means_the_same_to_friction(alpha: Any, build: Build) -> None:
-    """On a level line friction alone stops a body, and the way up an incline has a closed form."""
+    """On a level line only friction stops a body, and the way up an incline has a closed form."""
     module = build("rough_slope", SLOPE, gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))
     with mp.workdps(50):
         angle = read_number(alpha, where="alpha").at(mp)

@@ -10,7 +10,7 @@ TRIED = ("dask", "data", "notebook", "plot", "test")
 
 
 def release(version: str) -> tuple[int, ...]:
-    """Its numbers, of which last zeros mean nothing."""
+    """Return the numbers of a version, without trailing zeros, which mean nothing."""
     numbers = [int(n) for n in version.split(".")]
     while numbers and numbers[-1] == 0:
         numbers.pop()

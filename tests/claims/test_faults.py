@@ -176,7 +176,9 @@ def test_two_at_once_keep_their_own_code(
 
 
 def test_inner_functions_know_the_stamp_too() -> None:
-    """What compiled code calls is kept under the same key: else an edit of what that calls would not be seen."""
+    """Functions that compiled code calls are kept under the same key; otherwise an edit of their callees would not be
+    seen.
+    """
     from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 
     assert isinstance(two_sum.dispatcher._cache, KeyedCache)
@@ -197,7 +199,7 @@ def test_a_cache_that_cannot_be_written(
 
 
 def test_no_folder_for_a_cache(monkeypatch: pytest.MonkeyPatch, function: Callable[[float], Any]) -> None:
-    """Where nothing can be written at all, everything works, compiled anew in every process."""
+    """If nothing can be written at all, everything works, but is compiled anew in every process."""
     monkeypatch.setattr(KeyedCache._impl_class, "_locator_classes", [])
     assert jit.COMPILER.cache_of(function(2.0)) is None
     assert function(2.0)(1.0) == 3.0
@@ -284,7 +286,7 @@ def test_killed_while_writing(yaml: Path, text: str) -> None:
 
 
 def test_interrupted_while_writing(yaml: Path) -> None:
-    """Ctrl-C ends with 130 and one line, and no file is there, whole or partial."""
+    """After Ctrl-C a command ends with exit code 130 and one line, and leaves no file, whole or partial."""
     out = yaml.parent / "out"
     done = python(KILLED, "SIGINT", "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
@@ -314,7 +316,7 @@ sys.exit(main(["-q", *sys.argv[1:]]))
 
 
 def test_interrupted_while_deriving(yaml: Path) -> None:
-    """So it does in the middle of a derivation."""
+    """Ctrl-C in the middle of a derivation also ends with exit code 130 and one line."""
     out = yaml.parent / "out"
     done = python(INTERRUPTED, "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
@@ -349,7 +351,7 @@ sys.exit(main(sys.argv[1:]))
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_interrupted_at_work(stage: str, tmp_path: Path) -> None:
-    """So it does while a chart is made, and while a figure or a page is written."""
+    """The same holds while a chart is made, and while a figure or a page is written."""
     (tmp_path / "ring.yaml").write_text(RING + "launch: {lam0: 0, v0: 1}\n", encoding="utf-8")
     place, call, arguments = STAGES[stage]
     done = python(INTERRUPTED_AT, place, str(call), tmp_path, *arguments)

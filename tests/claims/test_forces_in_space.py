@@ -106,7 +106,7 @@ def test_a_frame_that_turns(mu: float, build: Build) -> None:
 
 
 def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> None:
-    """No state is beyond them, and sweeps have the same numbers."""
+    """No state exceeds the extremes of the contact force, and sweeps return the same numbers."""
     module = build("turning", VIVIANI, gqm.Gravity() + gqm.RotatingFrame(Omega="3/2"))
     motion = module.solve(-2, 4)
     force = motion.state(np.linspace(0.0, motion.period, 2001)).normal_force
@@ -116,7 +116,7 @@ def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> N
     assert module.sweep("normal_force_max", lam0=-2, v0=4.0).values == motion.normal_force_max.value
     with pytest.raises(SolutionError, match=r"none of normal_force_max, .* in a rotating frame"):
         motion.gradient("normal_force_max")
-    with pytest.raises(LaunchError, match="is not known in a frame that turns"):
+    with pytest.raises(LaunchError, match="is not defined in a frame that turns"):
         module.solve(-2, 4, contact="above")
 
 

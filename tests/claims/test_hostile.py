@@ -135,7 +135,7 @@ ATTACKS = {**CODE, **GIANTS, **LOOKS}
 def test_no_expression_does_harm(
     attack: str, key: str, yaml: Callable[[str | bytes], Path], witness: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In every place for an expression an attack is read as arithmetic or refused at once; the command ends with 2."""
+    """Wherever an expression can stand, an attack is read as arithmetic or refused at once; the command ends with 2."""
     path = yaml(file(**{key: ATTACKS[attack]}))
     refused = ""
     with confined():
@@ -250,7 +250,7 @@ NOT_NAMES = (
 
 @pytest.mark.parametrize("name", NOT_NAMES)
 def test_names_are_identifiers(name: str, yaml: Callable[[str | bytes], Path]) -> None:
-    """What is no name is refused wherever a name can stand, so that nothing else gets into emitted code."""
+    """Text that is not a name is refused wherever a name can stand, so that nothing else gets into emitted code."""
     key = quoted(name)
     for text in (
         file().replace("h: {", f"{key}: 1, h: {{"),
@@ -299,7 +299,7 @@ def test_text_for_people_stays_text(
 @settings(max_examples=25)
 @given(title=st.text(max_size=60))
 def test_any_title_is_text(title: str) -> None:
-    """Whatever the title, the module's syntax is that of the same module with another."""
+    """A module has the same syntax tree under any title."""
     model = declared("k*u**2")
     tree, plain = (audit(gqm.emit(replace(model, title=t), name="hostile")) for t in (title, "plain"))
     assert [ast.dump(node) for node in tree.body[1:]] == [ast.dump(node) for node in plain.body[1:]]
@@ -359,7 +359,7 @@ def test_no_expression_takes_long(text: str) -> None:
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=fragments, start=st.integers(0, 200), cut=st.integers(0, 60))
 def test_no_file_takes_long(text: str, start: int, cut: int, yaml: Callable[[str | bytes], Path]) -> None:
-    """Whatever is put into a file in place of whatever, it is read within a second and 200 MB, or refused."""
+    """A file in which any part is replaced by anything is read within a second and 200 MB, or refused."""
     plain = FILE.format(**PLAIN)
     path = yaml((plain[:start] + text + plain[start + cut :]).encode("utf-8", "surrogatepass"))
     with confined(), contextlib.suppress(GQMError):
@@ -393,7 +393,7 @@ def test_no_name_leaves_its_folder(name: str, yaml: Callable[[str | bytes], Path
 
 
 def test_links_in_the_output_folder(yaml: Callable[[str | bytes], Path], tmp_path: Path) -> None:
-    """What a link points to is neither read into the output nor written, by force neither."""
+    """The target of a link is neither read into the output nor written, not even with force."""
     precious, out = tmp_path / "precious", tmp_path / "out"
     precious.write_text("precious\n", encoding="utf-8")
     out.mkdir()
@@ -411,7 +411,7 @@ def test_links_in_the_output_folder(yaml: Callable[[str | bytes], Path], tmp_pat
 
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/full", "/dev/null", "/dev", "/proc/self/mem", "a\0b"])
 def test_devices_are_no_curve_files(device: str) -> None:
-    """What has no end, or is no file, is refused after a bounded read."""
+    """An endless file, or a device that is not a file, is refused after a bounded read."""
     with confined(), pytest.raises(SpecFileError):
         gqm.read_spec(device)
     with confined():
@@ -455,5 +455,5 @@ def test_a_write_to_a_folder_fails(tmp_path: Path) -> None:
 
 
 def test_the_recursion_limit_is_left_alone() -> None:
-    """Nothing above raises the limit that keeps Python's stack whole."""
+    """None of the tests above raises the limit that protects Python's stack."""
     assert sys.getrecursionlimit() <= 10_000

@@ -63,7 +63,7 @@ TABLES = {
 
 @pytest.mark.parametrize("attack", TABLES)
 def test_no_table_does_harm(attack: str, read: Callable[[], object], tmp_path: Path) -> None:
-    """What is no table of decimal numbers is refused in the time and memory of reading it, in printable text."""
+    """Anything but a table of decimal numbers is refused within bounded time and memory, in printable text."""
     (tmp_path / "track.csv").write_bytes(TABLES[attack])
     with confined(megabytes=300), pytest.raises(SpecFileError, match=r"'track\.csv'") as refused:
         read()
@@ -90,7 +90,7 @@ def test_a_table_without_end(read: Callable[[], object], tmp_path: Path) -> None
 
 
 def test_links_that_lead_out_and_back(read: Callable[[], object], tmp_path: Path) -> None:
-    """Neither a link to itself, nor a folder that is a link out, nor a hard name of a pipe is followed."""
+    """A link to itself, a folder that is a link to the outside, and a hard link to a pipe are not followed."""
     table = tmp_path / "track.csv"
     table.symlink_to(table)
     with confined(), pytest.raises(SpecFileError, match=r"'track\.csv': cannot be read"):

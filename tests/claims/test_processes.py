@@ -1,4 +1,4 @@
-"""What holds across processes: light imports, the compiled cache, and the same bytes anywhere."""
+"""Properties across processes: light imports, the compiled cache, and the same bytes anywhere."""
 
 import json
 import os

@@ -125,7 +125,7 @@ class System:
         return n0 + kappa * v * v
 
     def follow(self, lam: float, v: float, until: float) -> tuple[float, float, float]:
-        """Where the body is after a time, how fast, and by how much it ever missed an event it might have met."""
+        """Return the body's place and speed after a time, and the least margin by which it missed an event."""
         t, margin = 0.0, np.inf
         way, nu = np.sign(v), np.sign(self.pressure(lam, v))
         for _ in range(200):

@@ -73,13 +73,13 @@ def described(text: str) -> set[str]:
 
 @pytest.mark.parametrize("name", EXPORTED)
 def test_everything_is_on_the_page(name: str) -> None:
-    """By its full name, as Sphinx finds it."""
+    """Everything public is on the page by its full name, as Sphinx finds it."""
     assert re.search(rf"{re.escape(name)}\b", PAGE)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_argument_is_described(name: str) -> None:
-    """By a section of the docstring, which has a first line; ``**more`` stands for arguments that are described."""
+    """Every argument is described in a section of the docstring; ``**more`` stands for arguments that are described."""
     text = inspect.getdoc(FUNCTIONS[name]) or ""
     assert text
     missing = set(inspect.signature(FUNCTIONS[name]).parameters) - {"self", "cls", "more"} - described(text)

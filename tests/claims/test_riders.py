@@ -1,4 +1,4 @@
-"""What riders of banked tracks feel, against Newton's law in 40 digits and closed forms."""
+"""Loads on riders of banked tracks, against Newton's law in 40 digits and closed forms."""
 
 import pickle
 from collections.abc import Callable
@@ -24,7 +24,7 @@ ROLLS: dict[str, Any] = {"angle": "u/3 - 1/4", "coordinated": "coordinated", "de
 
 
 def place(u: Any) -> Any:
-    """Where that track is."""
+    """Return the place of that track."""
     return mp.matrix([3 * mp.sin(u), 4 * mp.cos(u) + u, u**2 / 8 + mp.sin(2 * u) / 3])
 
 
@@ -127,7 +127,9 @@ def loop(build: Callable[..., ModuleType]) -> ModuleType:
 
 
 def test_states_of_a_rough_track(rough: ModuleType) -> None:
-    """In doubles they are Newton's loads, in both directions; the track lies below the rider."""
+    """States of a rough track are Newton's loads to the accuracy of doubles, in both directions; the track lies below
+    the rider.
+    """
     motion = rough.solve(-4, 2, t_max=12)
     state = motion.state(np.array([0.2, 1.9, 4.7, 7.5, 9.5]))
     assert (state.v < 0.0).any()
@@ -158,7 +160,7 @@ def test_states_of_a_rough_track(rough: ModuleType) -> None:
 
 
 def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
-    """Where the body stays, friction holds it: the loads are those of gravity alone, and nothing changes."""
+    """Friction holds the body where it stays: the loads are those of gravity alone, and their rates are zero."""
     motion = rough.solve("5/2", 1, mu="3/5")
     assert motion.legs[-1].end == "rest"
     state = motion.state(motion.t_end)
@@ -194,7 +196,7 @@ def test_a_vertical_loop(loop: ModuleType) -> None:
 
 
 def test_levels_along_legs(rough: ModuleType) -> None:
-    """With losses too, the load equals a level wherever it passes it; what is above and below makes the whole time."""
+    """At every crossing the load equals the level, with losses too; the times above and below add up to the whole."""
     motion = rough.solve(-4, 2, t_max=12)
     times = np.linspace(0.0, 12.0, 20001)
     for load, level in (("vertical", 1.05), ("lateral", 0.1), ("longitudinal", -0.05)):

@@ -33,7 +33,7 @@ def bowl(generated_folder: Path) -> ModuleType:
 
 @pytest.mark.parametrize(("rho", "path"), [("1/4", "1"), ("-3/4", "2"), ("0", "5/4")])
 def test_in_a_round_track_it_is_a_pendulum(bowl: ModuleType, rho: str, path: str) -> None:
-    """Of length L - rho, g over 1 + β, on either side of the track."""
+    """The body moves as a pendulum of length L - rho with gravity g/(1 + β), on either side of the track."""
     motion = bowl.solve("6/5", L="5/4", rho=rho, beta="2/5", g="9.81")
     with mp.workdps(DIGITS):
         length = sp.Rational(path)
@@ -69,7 +69,7 @@ def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: Modu
 @pytest.mark.parametrize("rho", ["1/4", "-1/4", "-100", "0", "99/80"])
 @pytest.mark.parametrize("angle", ["1/1000", "2", "29/10", "157/50"])
 def test_times_and_turning_points_hold_their_bounds(angle: str, rho: str, loop: ModuleType) -> None:
-    """Of swings on either side of a track, beside the top and with a body that all but fills the track."""
+    """Swings on either side of a track, beside the top and of a body that almost fills the track hold their bounds."""
     motion = loop.solve(sp.Rational(angle) * sp.Rational("5/4"), rho=rho, g="9.81")
     with mp.workdps(DIGITS):
         exact_angle, radius = (mpf(q.p) / q.q for q in map(sp.Rational, (angle, rho)))
@@ -81,7 +81,7 @@ def test_times_and_turning_points_hold_their_bounds(angle: str, rho: str, loop: 
 
 
 def test_in_extended_precision_beside_a_track(loop: ModuleType) -> None:
-    """Where double-double arithmetic does not suffice, and for more digits than it has."""
+    """Extended precision is used where double-double arithmetic does not suffice, and for more digits than it has."""
     for angle, rho in (("1/1000000000", "-1/4"), ("1/1000", "1249999/1000000")):
         motion = loop.solve(sp.Rational(angle) * sp.Rational("5/4"), rho=rho, g="9.81")
         assert motion._orbit is None
@@ -106,7 +106,7 @@ def test_rounds_inside_and_outside_a_loop(loop: ModuleType) -> None:
 
 
 def test_on_a_parabola_by_its_equation(generated_folder: Path) -> None:
-    """To the last place as on the parabola with formulas, from the same points, and in sweeps."""
+    """Answers equal those on the parabola with formulas to the last place, from the same points, and in sweeps."""
     curve = gqm.Curve.implicit("a*x**2 - z", start=(0, 0), domain=(-2, 2), parameters={"a": "3/4"})
     force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="beta")
     module = gqm.build(gqm.derive(curve, force), name="ball_by_equation", folder=generated_folder)
@@ -125,7 +125,7 @@ def test_on_a_parabola_by_its_equation(generated_folder: Path) -> None:
 
 
 def test_on_a_flat_bottom(generated_folder: Path) -> None:
-    """On x**4 + z**4 = 1, by the integral of the time along the path of the centre."""
+    """On x**4 + z**4 = 1 the time is the integral along the path of the centre."""
     curve = gqm.Curve.implicit("x**4 + z**4 - 1", start=(0, -1))
     force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="2/5")
     module = gqm.build(gqm.derive(curve, force), name="ball_on_a_flat_bottom", folder=generated_folder)
@@ -203,7 +203,7 @@ def test_the_centre_moves_beside_the_track() -> None:
 
 
 def test_the_closed_forms_are_the_centre_s() -> None:
-    """In a circle: a circle of radius L - rho."""
+    """The closed forms in a circle are those of a circle of radius L - rho."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity() + gqm.Rolling(radius="rho"))
     length, rho, theta = (sp.Symbol(name, real=True) for name in ("L", "rho", "theta"))
     assert sp.simplify(model.x - (length - rho) * sp.sin(theta)) == 0
@@ -213,7 +213,9 @@ def test_the_closed_forms_are_the_centre_s() -> None:
 
 
 def test_a_body_that_does_not_fit_is_an_error(bowl: ModuleType) -> None:
-    """At launch, or where it comes to such a place; not if the motion ends before."""
+    """A body that does not fit is refused at launch, or when it comes to such a place, but not if the motion ends
+    before.
+    """
     with pytest.raises(LaunchError, match=r"this rho a body does not fit .* theta = 0\.5; launch elsewhere"):
         bowl.solve(0.5, L=1, rho=1, beta=0)
     # kappa*rho = 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
@@ -226,7 +228,7 @@ def test_a_body_that_does_not_fit_is_an_error(bowl: ModuleType) -> None:
 
 
 def test_without_a_radius_the_curve_is_the_centre_s_path() -> None:
-    """As it always was."""
+    """Without a radius the curve is still the path of the centre."""
     bare = gqm.derive(gqm.families.parabola(), gqm.Gravity() + gqm.Rolling())
     sliding = gqm.derive(gqm.families.parabola(), gqm.Gravity())
     assert (bare.x, bare.z, bare.ds, bare.kappa) == (sliding.x, sliding.z, sliding.ds, sliding.kappa)
@@ -263,5 +265,5 @@ def test_slip_is_told_where_it_begins(slippery: ModuleType) -> None:
 
 
 def test_without_a_coefficient_nothing_slips(bowl: ModuleType) -> None:
-    """Nothing is said of friction, so nothing is told."""
+    """Without a coefficient of friction there are no events of slipping."""
     assert [event.kind for event in bowl.solve(3, L=1, rho="1/4", beta=1).events].count("slip") == 0

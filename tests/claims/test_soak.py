@@ -103,7 +103,7 @@ def test_a_broken_law_is_reported(law: str, well: ModuleType) -> None:
 
 @pytest.mark.parametrize("closely", [True, False])
 def test_charts_are_held_to_their_heights(closely: bool, generated_folder: Path) -> None:
-    """A circle known as F = 0, through all of which V**2 follows the height."""
+    """On a circle declared as F = 0, V**2 follows the height everywhere."""
     import gqm_sym as gqm
 
     ring = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
@@ -113,7 +113,7 @@ def test_charts_are_held_to_their_heights(closely: bool, generated_folder: Path)
 
 
 def test_a_body_at_rest_stays(well: ModuleType) -> None:
-    """At the bottom, without speed; and one that moves there is reported."""
+    """A body without speed at the bottom stays there, and one that moves is reported."""
     call = SLOW | {"v0": 0.0}
     assert soak.faults(well, call, random.Random(0), closely=True) == []
     motion = well.solve(**call)
@@ -123,7 +123,7 @@ def test_a_body_at_rest_stays(well: ModuleType) -> None:
 
 
 def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:
-    """By more than four units in the last place."""
+    """A sweep that differs by more than four units in the last place is reported."""
     call = SLOW | {"v0": 0.5}
     period = well.solve(**call).period
     assert soak.swept(well, call, period) == []
@@ -261,7 +261,7 @@ def test_springs_with_viscous_damping(case: str, kinds: dict[str, ModuleType]) -
 
 
 def test_no_speed_is_negative(kinds: dict[str, ModuleType]) -> None:
-    """At a turn, where rounding left -1.8e-16 of it."""
+    """The speed at a turn is not negative, although rounding left -1.8e-16 there."""
     launch = {"lam0": -1.1087799233866897, "v0": 0.05760950449765136, "direction": 1, "t": -0.25721177667548717}
     assert kinds["wells"].solve(**launch).v_min.value == 0.0
 
@@ -274,7 +274,7 @@ def test_small_swings_across_the_seam_of_a_ring(seed: int, kinds: dict[str, Modu
 
 
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
-    """On slopes, springs, circles, rims and coils closed forms, sweeps and threads agree; what does not is told."""
+    """On slopes, springs, circles, rims and coils closed forms, sweeps and threads agree; differences are reported."""
     modules = kinds
     tally, failed, _ = soak_kinds.soak(110, 20, modules)
     assert failed == []

@@ -338,9 +338,9 @@ REFUSED = (
 FORCES = (
     (
         gqm.SurfaceTension(form="printed"),
-        "surface_tension: form: the printed form's sign is known for planar curves only",
+        "surface_tension: form: the printed form's sign is so far known for planar curves only",
     ),
-    (gqm.Rolling(radius="1/10"), "the path of the centre of a rolling body is known for planar curves only yet"),
+    (gqm.Rolling(radius="1/10"), "the path of the centre of a rolling body is so far known for planar curves only"),
     (gqm.Potential("k*y", parameters={"y": 1, "k": 1}), "'y' is a coordinate on a space curve"),
 )
 
@@ -360,14 +360,14 @@ def test_forces_that_are_not_there_yet_are_refused(force: gqm.Kernel, message: s
 
 
 def test_corners_of_space_curves_are_refused() -> None:
-    """Also where only the third coordinate has them."""
+    """A corner is refused also if only the third coordinate has it."""
     for y, message in (("abs(u)", "the tangent turns by"), ("u*abs(u)", "the curvature jumps")):
         with pytest.raises(DeclarationError, match=message):
             gqm.derive(gqm.Curve.space(x="u", y=y, z="u**2", parameter="u"), gqm.Gravity())
 
 
 def test_a_contact_force_without_a_sign_is_told() -> None:
-    """What asks for its sign is refused; derivatives are there."""
+    """Questions that need the sign of the contact force are refused; derivatives of the half period are known."""
     with pytest.raises(InputError, match="contact: 'above' needs to know which side"):
         generated.viviani.solve("3/10", contact="above")
     with pytest.raises(InputError, match="contact: 'below' needs to know which side"):

@@ -1,4 +1,4 @@
-"""What riders feel on tracks through measured points in space, against Newton's law and the curves of the points."""
+"""Loads on riders of tracks through measured points in space, against Newton's law and the curves of the points."""
 
 from itertools import pairwise
 from types import ModuleType
@@ -81,7 +81,7 @@ def newton(rows: Any, w: Any) -> tuple[list[Any], Any]:
 
 
 def test_loads_are_those_of_newton(banked: ModuleType) -> None:
-    """In states and in the load map, with their rates and the track below the rider, to rounding."""
+    """Loads of states and of the load map, their rates and the track below the rider are right to rounding."""
     motion = banked.solve(0.0, 14.0)
     assert motion.kind == "circulation"
     state = motion.state(np.linspace(0.05, 1.7 * motion.period, 9))
@@ -134,7 +134,7 @@ def test_loads_and_levels_of_the_circle(banked: ModuleType) -> None:
 
 
 def test_formulas_along_points() -> None:
-    """A roll angle may be a formula of arc length, with parameters, or such that there is no lateral force."""
+    """A roll angle may be a formula in arc length, with parameters, or chosen so that there is no lateral force."""
     points = ring(48)[:, :3]
     leaning = gqm.derive(gqm.Curve.sampled(points, closed=True, roll="psi*s/5"), gqm.Gravity())
     assert leaning.units["psi"] == "1/m"
@@ -174,6 +174,6 @@ def test_rolls_that_are_none(options: dict[str, Any], message: str) -> None:
 
 @pytest.mark.parametrize("roll", ["coordinated", [0.1] * 48])
 def test_planar_tracks_are_not_banked(roll: Any) -> None:
-    """What riders feel across a track is for tracks in space."""
+    """Lateral loads on riders are known for tracks in space only."""
     with pytest.raises(DeclarationError, match=r"^sampled: roll: is for tracks in space; give rows of x, y and z"):
         gqm.Curve.sampled(ring(48)[:, [0, 2]], roll=roll)

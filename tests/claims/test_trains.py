@@ -147,7 +147,7 @@ def test_parabola(build: Build) -> None:
 
 
 def test_across_joints(build: Build) -> None:
-    """Where a rail is put together, the mean height is that of the heights: nothing is smoothed over a joint."""
+    """At a joint of a rail the mean height is that of the exact heights: nothing is smoothed over a joint."""
     rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle=1), gqm.line(length=3)], heading=-1)
     module = build("train_on_rail", rail)
     length = 1.25
@@ -201,7 +201,9 @@ def test_in_space(build: Build) -> None:
 
 
 def test_on_a_helix(build: Build) -> None:
-    """Where the height is linear in arc length a train falls as a body does; its cars press inwards and down."""
+    """On a helix the height is linear in arc length, so that a train falls as a body does; its cars press inwards and
+    down.
+    """
     radius, rise, length, cars = 2.0, 0.75, 3.0, 5
     module = build("train_on_helix", gqm.families.helix(R="2", c="3/4", domain=(0, 12)), cars=cars)
     rate, launch = float(np.hypot(radius, rise)), 20.0
@@ -234,8 +236,8 @@ def test_declared_in_one_piece() -> None:
     assert dict(gqm.derive(circle, train + gqm.Gravity()).defaults)["m"] == 1200
     for force, message in (
         (gqm.Gravity() + gqm.RotatingFrame(), "rotating_frame: a turning frame"),
-        (gqm.Gravity() + gqm.Potential("x**2"), "potentials other than gravity"),
-        (gqm.Kernel(terms=()), "potentials other than gravity"),
+        (gqm.Gravity() + gqm.Potential("x**2"), "no potential other than gravity"),
+        (gqm.Kernel(terms=()), "no potential other than gravity"),
         (gqm.Gravity() + gqm.Rolling(radius=1), "rolling: radius"),
         (gqm.Gravity() + train, "train is given twice"),
     ):

@@ -38,7 +38,7 @@ parameters: {a: null}
 
 
 class Outcome(NamedTuple):
-    """How a command ended, and what it said."""
+    """The exit code and the output of a command."""
 
     code: int
     out: str
@@ -296,7 +296,7 @@ def test_misuse_ends_with_2(arguments: tuple[str, ...], here: Commands) -> None:
 
 
 def test_a_folder_that_cannot_be(here: Commands) -> None:
-    """Where nothing can be written, one line says so."""
+    """If nothing can be written to the folder, one line says so."""
     Path("taken").write_text("a file")
     code, _, err = here.gen("-q", "-o", "taken", "swing.yaml")
     assert code == 2
@@ -315,7 +315,7 @@ def test_an_interruption_ends_with_130(here: Commands, monkeypatch: pytest.Monke
 
 
 def test_a_mistake_of_ours_is_one_line_too(here: Commands, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What nobody foresaw ends with 3 and says where to look."""
+    """An unforeseen error ends with exit code 3 and says where to look."""
 
     def broken(options: object) -> int:
         return 1 // 0

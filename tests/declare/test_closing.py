@@ -60,7 +60,7 @@ def test_the_least_period_is_found(name):
 
 @pytest.mark.parametrize("name", OPEN)
 def test_what_does_not_close_for_certain_stays_open(name):
-    """Also what may have a pole, or be complex somewhere."""
+    """A curve that may have a pole, or be complex somewhere, stays open too."""
     assert OPEN[name].period is None
 
 
@@ -87,14 +87,14 @@ def test_random_waves_close_after_their_least_common_period(rates, polar):
     ],
 )
 def test_a_period_that_is_none_is_refused(declare, message):
-    """With the right one, where there is one."""
+    """The message gives the right period if there is one."""
     with pytest.raises(DeclarationError, match=message):
         declare()
 
 
 @pytest.mark.parametrize("period", ["2*pi", "4*pi", "6*pi"])
 def test_a_period_is_one_however_often_it_goes_round(period):
-    """Whoever wants to count two rounds as one may."""
+    """A period may be declared that counts two rounds as one."""
     assert drawn("cos(u)", "sin(u)", period=period).period == sp.sympify(period)
 
 
@@ -109,7 +109,7 @@ def test_what_run_time_values_decide_is_not_refused():
 
 
 def test_a_file_is_told_too(tmp_path):
-    """With line and column."""
+    """The message for a file gives line and column."""
     path = tmp_path / "ring.yaml"
     path.write_text(
         "name: ring\ncurve: {parametric: {x: cos(u), z: sin(u), parameter: u, period: 3}}\nkernel: {gravity: {}}\n"
@@ -144,7 +144,7 @@ def test_random_waves_are_derived_as_they_are(rates):
 
 @pytest.mark.parametrize("numbers", [(1, 3, "7/6"), ("7/6", 3, 1), (1, 2, "9/4"), ("1/2", "1/3"), (4, 6), ("5/7",)])
 def test_a_common_measure_goes_into_all_numbers(numbers):
-    """In whatever order; SymPy's gcd_list stops at a 1."""
+    """The common measure does not depend on the order of the numbers; SymPy's gcd_list stops at a 1."""
     exact = [sp.Rational(number) for number in numbers]
     quotients = [number / common_measure(exact) for number in exact]
     assert all(quotient.is_Integer for quotient in quotients)

@@ -159,7 +159,7 @@ def test_an_unknown_family_is_no_attribute():
 
 
 def test_names_that_are_listed() -> None:
-    """What `dir` lists can be fetched, and the families are among theirs."""
+    """Every name that `dir` lists can be fetched, and the families are listed by their module."""
     assert dir(gqm) == sorted(gqm.__all__)
     for name in dir(gqm):
         assert getattr(gqm, name) is not None

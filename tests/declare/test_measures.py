@@ -1,4 +1,4 @@
-"""What curves, forces and models say of themselves, and that they can be copied and sent to another process."""
+"""Curves, forces and models describe themselves, and can be copied and sent to another process."""
 
 import copy
 import pickle
@@ -47,7 +47,7 @@ TOLD = {
 
 @pytest.mark.parametrize("name", CURVES)
 def test_a_curve_says_what_it_is(name):
-    """In a few lines, with units where its formulas tell them."""
+    """A curve describes itself in a few lines, with units where its formulas determine them."""
     text = str(CURVES[name])
     assert len(text.splitlines()) <= 6
     assert all(len(line) < 120 for line in text.splitlines())
@@ -67,7 +67,7 @@ def test_a_force_says_what_it_is(name):
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("force", ["gravity", "losses", "law"])
 def test_a_model_says_what_it_is(curve, force):
-    """Its closed forms with their units, shortened, and its parameters."""
+    """A model prints its closed forms with their units, shortened, and its parameters."""
     track, law = CURVES[curve], FORCES[force]
     if set(track.parameters) & set(law.parameters):
         law = GRAVITY
@@ -127,7 +127,7 @@ def units(formulas) -> dict[str, str]:
     ],
 )
 def test_a_graph_tells_the_units_of_its_parameters(text, told):
-    """By each of its terms."""
+    """Each term of a graph determines the unit of its parameters."""
     assert told.items() <= units(curve_formulas(gqm.Curve.graph(text))).items()
 
 
@@ -160,7 +160,7 @@ def test_a_force_tells_the_units_of_its_parameters(kernel, told):
 
 
 def test_a_printed_model_is_no_promise_of_formulas():
-    """What has no room is shortened with an ellipsis, and whole in closed_forms()."""
+    """A formula that is too long is shortened with an ellipsis, and complete in closed_forms()."""
     model = gqm.derive(gqm.Curve.graph("x**3"), GRAVITY + gqm.CoulombFriction())
     assert "..." in str(model)
     assert "..." not in str(dict(model.closed_forms())["W = V**2"])

@@ -1,4 +1,4 @@
-"""What rails are declared from, in Python and in YAML, and what cannot be: refused, and by which piece."""
+"""Declarations of rails in Python and in YAML, and refusals of impossible ones, which name the piece."""
 
 import math
 from pathlib import Path
@@ -116,13 +116,13 @@ def test_numbers_that_cannot_be(
     ],
 )
 def test_declarations_that_cannot_be(declare: Any, message: str) -> None:
-    """What is wrong whatever the parameters are is refused at once."""
+    """A declaration that is wrong for all values of the parameters is refused at once."""
     with pytest.raises(gqm.GQMError, match=f"^{message}"):
         declare()
 
 
 def test_parameters_of_pieces() -> None:
-    """In order of appearance, each once, with the defaults of curves and those given."""
+    """Parameters of pieces are listed once each in order of appearance, with the defaults of curves and those given."""
     pieces = [
         gqm.arc(radius="R", angle="turn"),
         gqm.Curve.graph("k*x + R", domain=(0, "w"), parameters={"k": 2, "w": None, "R": None}, positive=["k"]),

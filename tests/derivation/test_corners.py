@@ -34,7 +34,7 @@ def derived(text, domain=None, force=GRAVITY):
     ],
 )
 def test_what_is_not_smooth_is_refused(text, what):
-    """With the place nearest to 0 where the limits from both sides differ, and what to write instead."""
+    """The message gives the place nearest to 0 where the limits from both sides differ, and a remedy."""
     with pytest.raises(DeclarationError, match=f"{what}.* at x = "):
         derived(text)
 
@@ -79,7 +79,7 @@ def test_the_domain_may_end_there(text, side, tmp_path):
 
 
 def test_a_file_is_told_the_place_too(tmp_path):
-    """As one of its mistakes."""
+    """In a file a corner is reported as one of its mistakes."""
     path = tmp_path / "vee.yaml"
     path.write_text("name: vee\ncurve: {graph: {z: abs(x)}}\nkernel: {gravity: {}}\n")
     with pytest.raises(GQMError, match=r"vee.yaml:\d+:\d+: .*tangent turns by 90 degrees at x = 0"):
@@ -97,7 +97,7 @@ def test_a_power_that_needs_a_side_is_refused(text):
 
 
 def test_so_is_one_in_a_potential():
-    """Along the curve."""
+    """A power in a potential is refused by its values along the curve."""
     with pytest.raises(DeclarationError, match=r"potential: .*write the exponent as a number"):
         gqm.derive(gqm.families.circle(), gqm.Potential("z**n"))
     gqm.derive(gqm.families.circle(), gqm.Potential("(x**2 + z**2)**(n/2)"))

@@ -1,4 +1,4 @@
-"""What derivation and emission refuse, and what they leave to run time."""
+"""Refusals by derivation and emission, and checks that they leave to run time."""
 
 import importlib
 import os
@@ -144,7 +144,7 @@ def test_a_function_without_a_rule_is_named() -> None:
 
 
 def test_a_formula_that_is_too_large_is_counted_and_not_walked() -> None:
-    """Of 2**40 parts, which share all but forty."""
+    """A formula of 2**40 parts, of which only forty are different, is counted without a walk over all of them."""
     shared = t
     for _ in range(40):
         shared = sp.Function("f")(shared, shared)

@@ -125,7 +125,7 @@ def differences(function, at: mpf) -> tuple[mpf, mpf]:
 @pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.parametrize("place", ["1/3", "11/7"])
 def test_forms_agree_with_numerical_differentiation(name, place):
-    """From the declared x and z alone, whatever way the forms were found."""
+    """Closed forms agree with numerical differentiation of the declared x and z, however the forms were found."""
     curve = OTHERS[name]
     model = derive(curve, Gravity())
     values = defaults(model)
@@ -220,7 +220,7 @@ TEXTBOOK = {
 
 @pytest.mark.parametrize("name", TEXTBOOK)
 def test_textbook_forms(name):
-    """What is written is as books write it, not only equal to that."""
+    """Formulas are written as in textbooks, not only equal to those."""
     curve, ds, kappa = TEXTBOOK[name]
     model = derive(curve, Gravity())
     assert model.ds == read(ds)
@@ -305,7 +305,7 @@ def test_an_absolute_value_is_dropped_only_for_a_default_above_zero():
 
 
 def test_defaults_can_be_replaced():
-    """By exact values, and by None for a parameter that must be given."""
+    """Defaults can be replaced by exact values, and by None for a parameter that must be given."""
     model = derive(families.circle(L=2), Gravity(), parameters={"L": "3/2", "g": None, "m": 0.5})
     assert model.defaults == (("L", "3/2"), ("g", None), ("m", 0.5))
 
@@ -321,7 +321,7 @@ def test_wrong_defaults_are_refused(parameters, word):
 
 
 def test_a_curve_that_is_nowhere_real_is_refused():
-    """By the name of the form that shows it."""
+    """The refusal names the form that is not real."""
     with pytest.raises(DerivationError, match="contains I"):
         derive(Curve.graph("sqrt(-1 - x**2)"), Gravity())
 

@@ -89,7 +89,7 @@ def test_no_form_keeps_what_adds_up_to_one():
     ],
 )
 def test_squares_of_sine_and_cosine_are_one(form, rewritten):
-    """With their common factors, and nothing else is touched."""
+    """Squares of sine and cosine add up to one, with their common factors, and nothing else is changed."""
     assert without_waves(form) == rewritten
 
 

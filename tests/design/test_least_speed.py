@@ -24,7 +24,7 @@ def near(actual: float, expected: float) -> bool:
 
 
 def test_loop_the_loop() -> None:
-    """From the lowest point v0² = 5 g L; of a ring 4 g L; of a body that rolls (1 + 4/(1 + β)) g L."""
+    """From the lowest point v0² = 5 g L; for a bead on a ring 4 g L; for a rolling body (1 + 4/(1 + β)) g L."""
     circle = generated.circle
     assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81), sqrt(5 * 9.81 * 1.5))
     assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81, contact="bilateral"), sqrt(4 * 9.81 * 1.5))
@@ -61,7 +61,7 @@ def test_the_motion_agrees() -> None:
 
 
 def test_a_hump_asks_for_less_and_not_for_more() -> None:
-    """On top of an arch of a cycloid no speed keeps a body on all of it, and any small one near its top."""
+    """On top of an arch of a cycloid no speed keeps a body on all of it, and any small speed does so near its top."""
     with pytest.raises(SolutionError, match=r"no speed.*at most|no speed.*low enough"):
         gqm.least_speed(generated.cycloid, 3, between=(1, 5))
     assert gqm.least_speed(generated.cycloid, "pi", between=(3, "2*pi - 3")) == 0.0

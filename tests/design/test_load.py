@@ -38,7 +38,7 @@ def test_constant_load_with_parameters(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("law", ["1 + 2*sin(pi*s/20)**2", "a*t*exp(-t) + 1/2"])
 def test_prescribed_load(law: str, tmp_path: Path) -> None:
-    """As a function of arc length and of time."""
+    """The contact force is the prescribed function of arc length or of time."""
     by_time = "t" in law.replace("pi", "")
     given = {"until": 2, "parameters": {"a": 3}} if "a*" in law else {"until": 30}
     track = gqm.design.from_load(law, 12, **given)

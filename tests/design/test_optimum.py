@@ -16,7 +16,7 @@ START = {"k": (0.1, 0.5, 4)}
 
 
 def steepness(force: Any, free: Any = None, **options: Any) -> float:
-    """How steep the quickest plane to a wall 1 m away is."""
+    """Return the slope of the quickest plane to a wall 1 m away."""
     best = gqm.design.minimise("time_at", PLANE, force, free=free or START, lam0=0, **options)
     return float(dict(best.defaults)["k"])
 
@@ -75,7 +75,7 @@ BAD: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_is_refused(case: str) -> None:
-    """With one clear error."""
+    """Input that cannot be used is refused with one clear error."""
     track, free, options, said = BAD[case]
     with pytest.raises(GQMError) as raised:
         gqm.design.minimise("time_at", track, gqm.Gravity(), free=free, lam0=0, **options)

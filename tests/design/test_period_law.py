@@ -16,7 +16,7 @@ ULP = 2.0**-52
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the modules of this file are written."""
+    """Return the folder for the modules of this file."""
     return tmp_path_factory.mktemp("designs")
 
 
@@ -46,7 +46,7 @@ def heights_of(places: np.ndarray, share: Any, period: Any) -> list[Any]:
 
 
 def test_a_period_that_grows(growing: ModuleType) -> None:
-    """Through declaration, chart and sweep to 3 ulp; by `period_to` to 20 digits."""
+    """The prescribed period is met by declaration, chart and sweep to 3 ulp, and by `period_to` to 20 digits."""
     with mp.workdps(30):
         period = lambda h: 2 * (1 + h / 4)  # noqa: E731
         places = np.array([-1.6, -0.9, -0.31, 0.02, 0.2, 0.75, 1.2, 1.75])
@@ -90,7 +90,7 @@ def test_a_constant_period_is_that_of_a_cycloid(folder: Path) -> None:
 
 
 def test_there_is_no_greatest_height() -> None:
-    """Of a period that grows fast; then the height must be given."""
+    """A track whose period grows fast has no greatest height; then the height must be given."""
     assert gqm.design.height_limit("2 + 3*h") == np.inf
     with pytest.raises(GQMError, match="up_to: such a track has no greatest height"):
         gqm.design.from_period("2 + 3*h")

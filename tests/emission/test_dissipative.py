@@ -1,4 +1,4 @@
-"""What emitted modules say of friction, drag and resistance: P, Q and what holds, against the textbook equation."""
+"""Friction, drag and resistance in emitted modules: P, Q and the holding force, against the textbook equation."""
 
 from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t, c_void_p
@@ -224,7 +224,7 @@ def test_hold(case: tuple[Case, Loss, Textbook]) -> None:
 
 
 def test_flags(case: tuple[Case, Loss, Textbook]) -> None:
-    """What the runtime is told of the force."""
+    """The flags that the runtime reads are those of the force."""
     row, loss, _ = case
     assert loss.dissipation[2:] == row.flags
 
@@ -254,7 +254,7 @@ def test_a_coefficient_out_of_its_range_is_refused(rough: ModuleType, wrong: dic
 
 
 def test_static_friction_may_equal_sliding_friction(rough: ModuleType) -> None:
-    """As numbers, however they are written."""
+    """Static friction may equal sliding friction as a number, however both are written."""
     assert rough.MODEL.numbers(("1/5", "0.2", 0, "9.81", "1"))
 
 

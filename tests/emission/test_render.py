@@ -91,7 +91,7 @@ def refuses(name: str) -> Model:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the modules of this file are written."""
+    """Return the folder for the modules of this file."""
     return tmp_path_factory.mktemp("emitted")
 
 
@@ -170,7 +170,7 @@ def test_taken_names_as_the_curves_parameter(name: str) -> None:
     ],
 )
 def test_names_of_the_module_are_refused(name: str) -> None:
-    """What an emitted module calls something, no parameter may be called; the message names it."""
+    """No parameter may have a name that the emitted module uses itself; the message gives the name."""
     with pytest.raises(EmissionError, match=rf"^{name}: "):
         gqm.emit(refuses(name), name="refused")
 
@@ -184,7 +184,7 @@ def test_reserved_names_never_come_so_far(name: str) -> None:
 
 @pytest.mark.parametrize("title", TITLES, ids=range(len(TITLES)))
 def test_a_title_changes_the_docstring_alone(title: str) -> None:
-    """Whatever a title holds, it is text of one line within the docstring, and nothing else changes."""
+    """Any title is text of one line within the docstring, and nothing else changes."""
     text = gqm.emit(declared("k*u**2", title=title), name="hostile")
     tree, plain = audit(text), audit(gqm.emit(declared("k*u**2", title="plain"), name="hostile"))
     line, rest = ast.get_docstring(tree, clean=False).split("\n", 1)
@@ -199,7 +199,7 @@ def test_a_title_changes_the_docstring_alone(title: str) -> None:
     "name", ["", "1st", "a-b", "a b", 'x"\nimport os', "../up", "a.b", "class", "\u00e9t\u00e9", None, 3]
 )
 def test_a_modules_name_is_an_identifier(name: str) -> None:
-    """Nothing else gets into the header or into a file's name."""
+    """A module's name is an identifier, so that nothing else gets into the header or into a file's name."""
     with pytest.raises(InputError, match="name: "):
         gqm.emit(declared("u**2"), name=name)
 
@@ -221,7 +221,7 @@ def test_the_body_digest() -> None:
 
 
 def test_the_input_digest() -> None:
-    """It changes with whatever the module was made from."""
+    """The digest changes with every input of the module."""
     inputs = [
         gqm.emit(declared("k*u**2", k="1"), name="digest"),
         gqm.emit(declared("k*u**2", k="1"), name="other"),
@@ -261,7 +261,7 @@ def test_what_has_no_text_is_refused_by_name(form: sp.Expr, name: str, where: st
 
 @pytest.mark.parametrize("form", [sp.Function("f"), sp.gamma, sp.Heaviside, lambda u: u * sp.I, lambda u: u + sp.zoo])
 def test_sympy_expressions_are_refused_where_they_are_declared(form: Callable[[sp.Symbol], sp.Expr]) -> None:
-    """What is undefined, complex or infinite is refused before anything is derived."""
+    """Undefined, complex and infinite expressions are refused before anything is derived."""
     with pytest.raises(ExpressionError, match="graph: z: "):
         gqm.Curve.graph(form(sp.Symbol("u")), parameter="u")
 

@@ -25,7 +25,7 @@ def cells(html: str) -> list[list[str]]:
 
 
 def test_a_motion_as_html(circle: ModuleType) -> None:
-    """Its kind, launch as it was written, period, parameters and events."""
+    """The page of a motion has its kind, the launch as written, the period, the parameters and the events."""
     motion = circle.solve("5/2")
     rows = cells(motion._repr_html_())
     assert ["kind", "libration"] in rows
@@ -73,6 +73,10 @@ def test_dataset_without_times(circle: ModuleType) -> None:
     motion = circle.solve(1)
     t = motion.to_xarray().t.values
     assert (t[0], t[-1]) == (0.0, motion.period)
+    table = motion.to_pandas()
+    assert table.t.tolist() == t.tolist()
+    assert table.lam.tolist() == motion.lam(t).tolist()
+    assert motion.to_pandas([0.5, 1.0]).t.tolist() == [0.5, 1.0]
 
 
 def test_dataset_without_xarray(circle: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 
 def labels(axes: object) -> set[str]:
-    """What a legend lists."""
+    """Return the entries of a legend."""
     return {text.get_text() for text in axes.get_legend().get_texts()}  # type: ignore[attr-defined]
 
 
@@ -93,7 +93,7 @@ def test_notebooks_show_figures(circle: ModuleType) -> None:
 
 
 def test_axes_of_the_caller(circle: ModuleType) -> None:
-    """What is given is drawn on."""
+    """Figures are drawn on axes that the caller gives."""
     from matplotlib.figure import Figure
 
     figure = Figure()

@@ -34,7 +34,7 @@ def curves(figure: object, label: str) -> list[np.ndarray]:
 
 
 def test_separatrix_of_the_pendulum(circle: ModuleType) -> None:
-    """V = 2*sqrt(g)*|cos(theta/2)|, through the tops, at each of which the body could rest."""
+    """The separatrix is V = 2*sqrt(g)*|cos(theta/2)|, through the tops, where the body could rest."""
     figure = gqm.figures.phase_portrait(circle)
     branches = curves(figure, "separatrix")
     assert len(branches) == 4
@@ -76,7 +76,7 @@ def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:
 
 
 def test_a_launch_is_on_its_orbit(circle: ModuleType) -> None:
-    """What is drawn through a launch has its energy, however many turns away the launch is."""
+    """The curve that is drawn through a launch has its energy, however many turns away the launch is."""
     figure = gqm.figures.phase_portrait(circle, through=[("4*pi + 1/2", 3)])
     (axes,) = figure.axes
     (mark,) = [line for line in axes.lines if line.get_label() == "launch"]
@@ -103,7 +103,7 @@ def test_what_cannot_be_drawn(options: dict, error: type[Exception], said: str, 
 
 
 def test_period_against_amplitude(circle: ModuleType) -> None:
-    """Along the arc, in rising order, with the periods of the motions themselves; L scales them."""
+    """Amplitudes are in rising order along the arc, with the periods of the motions themselves; L scales them."""
     figure = gqm.figures.period_against_amplitude(circle, [2, 1, "pi", "-1/2"], L=4)
     (line,) = figure.axes[0].lines
     amplitude, period = line.get_data()

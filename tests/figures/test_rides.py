@@ -84,6 +84,6 @@ def test_bad_limits(hills: ModuleType, limits: Any, message: str) -> None:
 
 
 def test_no_ride_without_a_banking() -> None:
-    """What riders feel is not known there."""
+    """Loads on riders are not known without a banking."""
     with pytest.raises(InputError, match="ride: the load on a rider depends on the banking"):
         gqm.figures.ride(generated.viviani.solve("3/10"))

@@ -21,7 +21,7 @@ u = pint.UnitRegistry()
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the modules of this file are written."""
+    """Return the folder for the modules of this file."""
     return tmp_path_factory.mktemp("fits")
 
 
@@ -60,7 +60,7 @@ def test_positions_and_speeds(pendulum: ModuleType) -> None:
 
 
 def test_data_without_noise_are_met(pendulum: ModuleType) -> None:
-    """To rounding times how the measurements depend on what is sought."""
+    """Data without noise are met to rounding, amplified by the dependence of the unknowns on the measurements."""
     t = np.linspace(0.0, 20.0, 50)
     data = {"t": t, "lam": pendulum.solve(0.8, 0.3, L=1.3).lam(t)}
     found = gqm.fit(pendulum, data, {"L": 1.2, "lam0": 0.7, "v0": (0, 1)})
@@ -80,7 +80,7 @@ def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) ->
 
 
 def test_what_periods_cannot_tell(pendulum: ModuleType) -> None:
-    """Only g/L: that is said, and neither number has a finite standard deviation."""
+    """Periods determine only g/L: the result says so, and neither number has a finite standard deviation."""
     lam0 = np.linspace(0.1, 2.8, 12)
     period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
     found = gqm.fit(pendulum, {"lam0": lam0, "period": period, "sigma": 1e-3}, {"L": 1.2, "g": None})
@@ -135,7 +135,7 @@ def test_friction(spring: ModuleType) -> None:
 
 
 def test_derivatives_are_the_difference_quotients(pendulum: ModuleType) -> None:
-    """Of every kind of measurement, to the accuracy of the quotients."""
+    """Derivatives of every kind of measurement agree with difference quotients to the accuracy of the quotients."""
     free = Free(("L", "lam0", "v0"), np.array([1.3, 0.8, 0.3]), np.full(3, -np.inf), np.full(3, np.inf))
     t = np.linspace(0.5, 9.0, 7)
     many = {
@@ -169,7 +169,7 @@ BAD = {
     "nothing measured": ({"t": [1]}, {"L": 1}, "data: needs at least one of lam, s, x"),
     "an unknown column": ({"t": [1], "q": [1], "x": [1]}, {"L": 1}, "there is no column 'q'"),
     "no times": ({"x": [1, 2]}, {"L": 1}, "data: give t with lam"),
-    "nan": ({"t": [1, 2], "x": [1, np.nan]}, {"L": 1}, "data: x: row 2 is no finite number"),
+    "nan": ({"t": [1, 2], "x": [1, np.nan]}, {"L": 1}, "data: x: row 2 is not a finite number"),
     "another length": ({"t": [1, 2], "x": [1, 2, 3]}, {"L": 1}, "data: t: has 2 rows where others have 3"),
     "too few": ({"t": [1], "x": [1]}, {"L": 1, "lam0": 1}, "1 measurements cannot determine 2 numbers"),
     "a deviation of zero": ({"t": [1], "x": [1], "sigma": 0}, {"L": 1}, "sigma: standard deviations must be positive"),
@@ -192,7 +192,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_cannot_be_fitted_is_refused(case: str, pendulum: ModuleType) -> None:
-    """With one clear error."""
+    """Input that cannot be used is refused with one clear error."""
     data, free, said = BAD[case]
     fixed = {} if "lam0" in free or "lam0" in data else {"lam0": 1}
     with pytest.raises((InputError, SolutionError)) as raised:

@@ -45,7 +45,7 @@ def test_of_several_numbers() -> None:
 
 
 def test_where_there_is_no_gradient() -> None:
-    """Of motions with friction difference quotients tell: v_max is that of the body at launch."""
+    """Without a gradient difference quotients are used: v_max of a motion with friction is the launch speed."""
     found = gqm.uncertainty(rough, "v_max", {"v0": (2.0, 0.1)}, lam0=0.0, mu=0.2, L=1, samples=500)
     assert found.linear == pytest.approx((2.0, 0.1), rel=1e-9)
     assert found.sampled.std == pytest.approx(0.1, rel=0.15)
@@ -62,14 +62,14 @@ def test_draws_without_an_answer() -> None:
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
-    """Length and amplitude that positions tell."""
+    """Return the fit of length and amplitude to positions."""
     t = np.linspace(0.0, 5.0, 40)
     data = {"t": t, "lam": pendulum.solve(0.8, L=1.3).lam(t), "sigma": 1e-3}
     return gqm.fit(pendulum, data, {"L": 1.3, "lam0": 0.8})
 
 
 def test_of_a_fit(fitted: Fit) -> None:
-    """With the covariance of what was found."""
+    """The uncertainty from a fit uses the covariance of its estimates."""
     found = gqm.uncertainty(pendulum, "period", fitted, samples=4000)
     row = np.array([found.gradient[name] for name in fitted.names])
     assert found.linear.std == pytest.approx(np.sqrt(row @ fitted.covariance @ row), rel=1e-13)
@@ -93,7 +93,7 @@ BAD: dict[str, tuple[ModuleType, str, object, dict, str]] = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_what_is_refused(case: str) -> None:
-    """With one clear error."""
+    """Input that cannot be used is refused with one clear error."""
     module, quantity, uncertain, options, said = BAD[case]
     with pytest.raises(GQMError) as raised:
         gqm.uncertainty(module, quantity, uncertain, **{"lam0": 0.5, **options})

@@ -35,7 +35,7 @@ def test_gravity_has_the_exact_default():
     [(1.62, ("g", 1.62)), ("g_moon", ("g_moon", "9.81")), ("1.62", ("g", "1.62"))],
 )
 def test_gravity_takes_a_name_or_a_value(given, pair):
-    """As every kernel's argument does."""
+    """Gravity takes a name or a value, as every argument of a kernel does."""
     assert Gravity(g=given).defaults == (pair,)
 
 
@@ -69,7 +69,7 @@ def test_gravity_is_shared_with_a_potential_that_names_it():
     ],
 )
 def test_a_name_that_means_two_things_is_refused(add):
-    """With the remedy in the message."""
+    """A name with two meanings is refused, with the remedy in the message."""
     with pytest.raises(DeclarationError, match=r"another name|once"):
         add()
 
@@ -84,7 +84,7 @@ def test_curve_and_kernel_must_not_share_a_name():
 
 @pytest.mark.parametrize("centre", [(0,), (0, 0, 0, 0), ("x", 0), (0, "y", 0)])
 def test_a_centre_is_two_numbers(centre):
-    """Of the plane, or three in space, and not moving with the body."""
+    """A centre is two numbers in a plane, or three in space, and does not move with the body."""
     with pytest.raises(InputError, match="centre"):
         CentralForce(centre=centre)
 
@@ -163,7 +163,7 @@ def test_static_friction_is_that_of_sliding_if_nothing_is_said() -> None:
 
 
 def test_the_printed_droplet_is_signed() -> None:
-    """As the paper has it; it drives where the curvature is negative."""
+    """The printed droplet has the sign of the paper; it drives the body where the curvature is negative."""
     assert SurfaceTension(form="printed").resistance == gamma * ell_c * KAPPA / MASS
 
 
@@ -184,7 +184,7 @@ def test_the_printed_droplet_is_signed() -> None:
     ],
 )
 def test_what_no_force_can_be_is_refused(make, message) -> None:
-    """At the declaration, with the bound or the remedy."""
+    """An impossible force is refused at its declaration, with the bound or the remedy."""
     with pytest.raises(InputError, match=message):
         make()
 
@@ -199,7 +199,7 @@ def test_what_no_force_can_be_is_refused(make, message) -> None:
     ],
 )
 def test_defaults_out_of_their_range_are_refused(parameters, message) -> None:
-    """Where the model gives them too."""
+    """Defaults out of their range are refused, also if the model gives them."""
     force = Gravity() + CoulombFriction(mu_static="mu_s") + QuadraticDrag()
     with pytest.raises(DeclarationError, match=message):
         derive(families.parabola(), force, parameters=parameters)
@@ -230,19 +230,19 @@ def test_a_law_knows_the_curve_s_parameter_and_coordinates() -> None:
     ],
 )
 def test_names_that_forces_need_are_refused(declare, message) -> None:
-    """With what they mean."""
+    """Names that forces need are refused, with their meaning."""
     with pytest.raises(DeclarationError, match=message):
         declare()
 
 
 def test_a_law_that_is_infinite_at_rest_is_refused() -> None:
-    """Nothing could be said about a body that stops."""
+    """A law that is infinite at rest is refused, because nothing could be computed for a body that stops."""
     with pytest.raises(DerivationError, match="at rest"):
         derive(families.circle(), Gravity() + Kernel.law("-k*direction/sqrt(W)"))
 
 
 def test_a_turning_track_is_loaded_sideways() -> None:
-    """By the Coriolis force: N_b = 2 m Ω V dx/ds."""
+    """On a turning track the Coriolis force acts sideways: N_b = 2 m Ω V dx/ds."""
     model = derive(families.circle(), Gravity() + RotatingFrame())
     v = model.side_force / (2 * MASS * Omega * model.dxds)
     assert sp.simplify(v**2 - sp.Symbol("direction", real=True) ** 2 * model.speed_squared) == 0

@@ -40,7 +40,7 @@ def less_its_digits(count: int) -> str:
     ("text", "exact"), [("0**sqrt(2)", 0), ("pi**0", 1), ("sqrt(9/4)", Fraction(3, 2)), ("sqrt(2)**2 - 2", 0)]
 )
 def test_rational_numbers_are_exact(text: str, exact: Fraction) -> None:
-    """What is rational by a law of arithmetic comes out so, whatever it is made of."""
+    """A result that is rational by a law of arithmetic is returned as a rational number, whatever its parts are."""
     assert value(text) == exact
 
 

@@ -233,7 +233,7 @@ PIECES = st.lists(
 @example("*".join(["9**999"] * 500))
 @example("+".join(f"1/{n}" for n in range(1000, 1600)))
 def test_hostile_text_gives_a_tree_or_one_clear_error(text):
-    """Whatever the text, the reader must end quickly, with a tree or an error of its own."""
+    """For any text the reader must end quickly, with a tree or an error of its own."""
     refusal = None
     try:
         tree = parse(text, where="t")
@@ -317,7 +317,7 @@ def test_columns_point_into_the_text():
 
 
 def test_trouble_in_an_algebra_is_told_with_its_column():
-    """What an algebra refuses must be reported at the operand that caused it."""
+    """A refusal by an algebra must be reported at the operand that caused it."""
     with pytest.raises(ExpressionError, match="t: column 10: "):
         evaluate(parse("1 + 2/(x - x)", where="t"), Rationals(), where="t")
 

@@ -263,7 +263,7 @@ GROWN = st.recursive(
 @settings(deadline=NO_HANG, max_examples=300)
 @given(GROWN)
 def test_values_agree_with_mpmath(grown):
-    """At 450 digits mpmath, told nothing of intervals, must find the same two doubles."""
+    """At 450 digits mpmath, without intervals, must find the same two doubles."""
     text, compute = grown
     try:
         truth = compute()
@@ -325,7 +325,7 @@ PIECES = st.lists(
 @example("sqrt(" * 25 + "2" + ")" * 25)
 @example("+".join(f"sqrt({n})" for n in range(300)))
 def test_hostile_numbers_give_a_number_or_one_clear_error(hostile):
-    """Whatever is given, the answer comes soon: a finite number, or an error of the package."""
+    """Any input gives a finite number, or an error of the package, and soon."""
     number = None
     try:
         number = read_number(hostile, where="t")

@@ -72,7 +72,7 @@ def test_degrees(given: object) -> None:
     ],
 )
 def test_numbers_are_shown_as_a_person_would_write_them(given: object, unit: str, text: str) -> None:
-    """In SI units; what is shown is the same number."""
+    """Numbers are shown in SI units, and the text reads back as the same number."""
     number = read_number(given, where="it", unit=unit)
     assert number.text == str(number) == text
     again = read_number(text, where="it")
@@ -80,7 +80,9 @@ def test_numbers_are_shown_as_a_person_would_write_them(given: object, unit: str
 
 
 def test_arrays_are_converted_at_once() -> None:
-    """To two doubles each; shapes are kept, and lists of quantities are read one by one."""
+    """Arrays are converted to two doubles for each number; shapes are kept, and lists of quantities are read one by
+    one.
+    """
     high, low, shape = read_numbers(np.array([[10.0, 20.0], [30.0, 45.0]]) * u.deg, where="t", unit="1")
     assert shape == (2, 2)
     with mp.workdps(40):
@@ -106,7 +108,7 @@ def test_where_no_dimension_is_known() -> None:
         read_number(3 * u.m, where="k")
     with pytest.raises(NumberError, match="not a finite number"):
         read_numbers(np.array([1.0, np.nan]) * u.ms, where="t", unit="s")
-    with pytest.raises(NumberError, match="no unit of mechanics"):
+    with pytest.raises(NumberError, match="not a unit of mechanics"):
         read_number(3 * u.kelvin, where="t", unit="s")
 
 
@@ -123,7 +125,7 @@ def swing(pendulum: Model, tmp_path_factory: pytest.TempPathFactory) -> object:
 
 
 def test_defaults(pendulum: Model) -> None:
-    """In SI, exactly; the units of all parameters are known."""
+    """Defaults are converted to SI exactly; the units of all parameters are known."""
     assert dict(pendulum.defaults) == {"L": "0.5", "g": "9.81", "m": "1"}
     assert pendulum.units == {"theta": "1", "L": "m", "g": "m/s**2", "m": "kg"}
     twin = pickle.loads(pickle.dumps(read_value(30 * u.deg, where="it")))
@@ -179,13 +181,13 @@ def test_load_maps_and_sweeps(swing: object) -> None:
     ],
 )
 def test_wrong_units_are_refused_everywhere(swing: object, call: object, said: str) -> None:
-    """Nothing is stripped."""
+    """A wrong unit is refused everywhere, and never just removed."""
     with pytest.raises(InputError, match=said):
         call(swing)  # type: ignore[operator]
 
 
 def test_declarations_are_checked() -> None:
-    """By the dimensions that the formulas leave; what they leave open is refused when a model is derived."""
+    """Declarations are checked by the dimensions of the formulas; open ones are refused when a model is derived."""
     with pytest.raises(DeclarationError, match="L: must be in m"):
         gqm.families.circle(L=3 * u.kg)
     with pytest.raises(DeclarationError, match="mu: must be a plain number"):

@@ -265,7 +265,7 @@ def test_a_closed_track_closes(seed: int) -> None:
 def test_turned_moved_and_magnified(
     angle: float, scale: float, shift: tuple[float, float], name: str, known: bool
 ) -> None:
-    """What is done to the points is done to the track, and nothing else."""
+    """Turning, moving or magnifying the points does the same to the track, and nothing else."""
     truth = TRACKS[name]
     points = truth.surveyed(100, 0.02, 3)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -426,7 +426,7 @@ def test_bad_curve_files(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_the_command_line_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What smoothing changed is printed with the closed forms; a warning is one line that names the file."""
+    """The changes by smoothing are printed with the closed forms; a warning is one line that names the file."""
     assert main([str(written(tmp_path, "auto")), "-o", str(tmp_path)]) == 0
     out, err = capsys.readouterr()
     assert "100 points, smoothed (by cross-validation)" in out

@@ -27,7 +27,7 @@ RING = "implicit: {F: x**2 + z**2 - 1, start: [100 cm, 0]}"
 
 
 def read(folder: Path, **parts: str) -> Spec:
-    """What a file of these parts declares."""
+    """Return the declaration in a file of these parts."""
     text = FILE
     for name, part in {**PARTS, **parts}.items():
         text = text.replace("{" + name + "}", part)

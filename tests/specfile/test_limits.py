@@ -45,7 +45,7 @@ def read(folder: Path, text: str) -> gqm.Model:
             "2:32: curve.family: unknown key 'R'; allowed are L, domain, inverted, name, parameter",
         ),
         ("{family: {L: 2}}", "2:9: curve.family: name is missing; known are cartesian_graph, circle"),
-        ("{family: {name: circel}}", "2:18: curve.family: unknown family 'circel'; known are cartesian_graph, circle"),
+        ("{family: {name: circel}}", "2:18: curve.family: unknown family 'circel'; did you mean circle?"),
         (
             "{family: {name: ellipse}}",
             "2:9: 'a' is not in parameters; add it there, as in a: 1 (null: to be given at run time)",

@@ -136,8 +136,8 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "what rolls and slides": (
         edited(("gravity: {}", "coulomb: {mu: 0.1}\n  rolling: {beta: 1}")),
         [
-            "a.yaml:6:3: kernel.rolling: rolling and coulomb exclude each other: what rolls without slipping does "
-            "not slide; leave one of them out (rolling has mu_static, the friction that it needs)"
+            "a.yaml:6:3: kernel.rolling: rolling and coulomb exclude each other: a body that rolls without slipping "
+            "does not slide; leave one of them out (rolling has mu_static, the friction that it needs)"
         ],
     ),
     "no form of surface tension": (
@@ -280,11 +280,15 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         ],
     ),
     "an unknown family": (
-        edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
+        edited((GRAPH, "family: {name: spline, a: h, b: 1}")),
         [
-            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, circle, "
+            "a.yaml:3:12: curve.family: unknown family 'spline'; known are cartesian_graph, circle, "
             "ellipse, parabola, log_spiral, catenary, cycloid, helix, conical_helix, torus_knot, viviani, implicit"
         ],
+    ),
+    "a family that was probably meant": (
+        edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
+        ["a.yaml:3:12: curve.family: unknown family 'elipse'; did you mean ellipse?"],
     ),
     "a name that means two things": (
         edited((GRAPH, "family: {name: ellipse, a: h, b: h}")),
@@ -519,7 +523,7 @@ UNFIT = {
 
 @pytest.mark.parametrize("case", UNFIT.values(), ids=UNFIT.keys())
 def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> None:
-    """What only shows when curve and kernel meet is a mistake of the file too, with its place."""
+    """A mistake that appears only when curve and kernel are combined is reported with its place in the file too."""
     text, expected = case
     spec = read(tmp_path, text)
     with pytest.raises(SpecFileError) as caught:
@@ -530,11 +534,11 @@ def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> Non
 UNSOLVABLE = {
     "no launch": (
         edited(("launch: {lam0: 1/2, v0: 0}", "")),
-        ["a.yaml:1:1: launch is missing, which is needed to solve; add it, as in launch: {lam0: 0.5, v0: 0}"],
+        ["a.yaml:1:1: launch is missing; solving needs it; add it, as in launch: {lam0: 0.5, v0: 0}"],
     ),
     "no value": (
         edited(("{h: 3}", "{h: null}")),
-        ["a.yaml:6:14: parameters.h: null, and to solve needs a value; write one, as in h: 1"],
+        ["a.yaml:6:14: parameters.h: is null; solving needs a value; write one, as in h: 1"],
     ),
     "no curve there": (
         edited(("h*x**2", "h*sqrt(x)"), ("lam0: 1/2", "lam0: -1/2")),

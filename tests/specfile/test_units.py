@@ -67,7 +67,7 @@ def test_numbers_stay_as_they_are_written() -> None:
 
 
 def test_names_in_si() -> None:
-    """What a value is in after it was converted."""
+    """The name of a unit is that of the SI unit to which values are converted."""
     names = {text: read_unit(text, where="unit").name for text in ("mm", "km/h", "lbf", "1/ft", "deg/min", "percent")}
     assert names == {"mm": "m", "km/h": "m/s", "lbf": "kg*m/s**2", "1/ft": "1/m", "deg/min": "rad/s", "percent": ""}
     assert Unit(kilogram=-1, second=-2).name == "1/kg/s**2"
@@ -81,14 +81,14 @@ REFUSED = {
     "-m": "a unit has no sign",
     "m**0.5": "an exponent must be a whole number",
     "m**m": "an exponent must be a whole number",
-    "sin(m)": "sin is no part of a unit",
-    "ampere": "'ampere' is no unit of mechanics",
-    "degC": "'degC' is no unit of mechanics",
+    "sin(m)": "sin cannot be part of a unit",
+    "ampere": "'ampere' is not a unit of mechanics",
+    "degC": "'degC' is not a unit of mechanics",
     "dB": "there is no unit 'dB'",
-    "0*m": "0*m is nothing",
+    "0*m": "0*m is zero",
     "m/0": "division by zero",
     "9**9**9**9": "exponent",
-    "e": "no unit of mechanics",
+    "e": "not a unit of mechanics",
     "__import__": "",
 }
 
@@ -115,7 +115,7 @@ def test_dimensions() -> None:
 
 
 def test_every_kernel_argument_has_its_unit() -> None:
-    """What a force is given for a number is known to be of some dimension."""
+    """The dimension of every argument of a force is known."""
     arguments = {argument for row in KERNELS.values() for argument in row.arguments}
     assert arguments - _KERNEL_ARGUMENTS.keys() <= KERNEL_UNITS.keys()
 

@@ -131,8 +131,8 @@ def test_mistakes_have_their_place(case: str, here: Path) -> None:
 
 
 TABLES = {
-    "no number": ("t,lam\n1,2\n3,x\n", "'swings.csv', row 3: 'x' is no finite decimal number"),
-    "a formula": ("t,lam\n1,=1+1\n", "row 2: '=1+1' is no finite decimal number"),
+    "no number": ("t,lam\n1,2\n3,x\n", "'swings.csv', row 3: 'x' is not a finite decimal number"),
+    "a formula": ("t,lam\n1,=1+1\n", "row 2: '=1+1' is not a finite decimal number"),
     "no names": ("1,2\n3,4\n", "row 1: must name the columns"),
     "nothing measured": ("t\n1\n2\n", "data: needs at least one of lam"),
     "an unknown column": ("t,lam,q\n1,2,3\n", "there is no column 'q'"),

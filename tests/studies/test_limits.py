@@ -54,7 +54,7 @@ def test_keys_that_are_none(text: str, message: str, here: Path) -> None:
 
 
 def test_reading_has_a_budget(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What takes too long is refused by the file's name."""
+    """A file that takes too long to read is refused with its name."""
     monkeypatch.setattr(reader, "SECONDS", -1.0)
     with pytest.raises(SpecFileError, match=r"^a\.yaml: reading: not done after -1 s of processor time; write fewer"):
         read_sweep(sweep("grid: {lam0: [1, 2]}"))
@@ -101,7 +101,7 @@ def test_a_table_that_changes_meanwhile(kind: str, here: Path, monkeypatch: pyte
     if kind == "a pipe":
         os.mkfifo("pipe")
         monkeypatch.setattr(beside, "path_beside", lambda *_, **__: here / "pipe")
-        message = "'a.csv': is no plain file; give a CSV file"
+        message = "'a.csv': is not a plain file; give a CSV file"
     else:
 
         def refuse(*_: Any) -> int:

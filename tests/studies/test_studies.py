@@ -201,9 +201,9 @@ def test_mistakes_have_their_place(line: str, instead: str, message: str, here: 
         ("lam0\n", "'a.csv', row 1: must name the columns"),
         ("lam0,lam0\n1,2\n", "'a.csv', row 1: names a column twice"),
         ("lam0,v0\n1,2\n3\n", "'a.csv', row 3: must have 2 numbers, has 1"),
-        ("lam0,v0\n1,pi\n", "'a.csv', row 2: 'pi' is no finite decimal number"),
-        ("lam0,v0\n1,inf\n", "'a.csv', row 2: 'inf' is no finite decimal number"),
-        ("lam0,v0\n1,1e-400000000\n", "'a.csv', row 2: '1e-400000000' is no finite decimal number"),
+        ("lam0,v0\n1,pi\n", "'a.csv', row 2: 'pi' is not a finite decimal number"),
+        ("lam0,v0\n1,inf\n", "'a.csv', row 2: 'inf' is not a finite decimal number"),
+        ("lam0,v0\n1,1e-400000000\n", "'a.csv', row 2: '1e-400000000' is not a finite decimal number"),
         ("lam0,v_0\n1,2\n", "there is no 'v_0' in swing.yaml; did you mean v0?"),
     ],
 )
@@ -234,7 +234,7 @@ def test_files_that_are_none_are_refused(here: Path) -> None:
     os.mkfifo("pipe.yaml")
     Path("inside").mkdir()
     Path("inside/link.yaml").symlink_to(here / "swing.yaml")
-    for where, name, message in ((".", "pipe.yaml", "is no plain file"), ("inside", "link.yaml", "by a link")):
+    for where, name, message in ((".", "pipe.yaml", "is not a plain file"), ("inside", "link.yaml", "by a link")):
         path = Path(where) / "a.yaml"
         path.write_text(f"curve: {name}\nquantities: [period]\ngrid: {{lam0: [1, 2]}}\n")
         with pytest.raises(SpecFileError, match=message):
@@ -242,7 +242,7 @@ def test_files_that_are_none_are_refused(here: Path) -> None:
 
 
 def test_every_quantity_has_a_name_and_a_unit() -> None:
-    """What is swept is described in the results."""
+    """Every quantity of a sweep is described in the results."""
     assert set(QUANTITIES) - {"turning_points"} <= set(DESCRIBED)
 
 
@@ -297,7 +297,7 @@ def test_a_killed_sweep_goes_on(here: Path) -> None:
 
 
 def test_a_damaged_part_is_computed_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What an interruption leaves is used where it is sound."""
+    """Parts that an interruption leaves are used if they are sound."""
     plan = read_sweep("periods.yaml")
     object.__setattr__(plan, "part", 13)
     whole = run(plan, "whole.nc")

@@ -33,7 +33,7 @@ def _geometry(track: Track) -> Callable[..., list[mpf]]:
 
 
 def point(problem: Problem, track: Track, lam: mpf | float | str) -> Point:
-    """What the definitions give at ``lam``, to 50 digits: V**2 = v0**2 - 2*g*(z - z0) and so on."""
+    """The values at ``lam`` by the definitions, to 50 digits: V**2 = v0**2 - 2*g*(z - z0) and so on."""
     given = dict(problem.parameters)
     with mp.workdps(DIGITS):
         geometry = _geometry(track)
@@ -49,7 +49,7 @@ def point(problem: Problem, track: Track, lam: mpf | float | str) -> Point:
 
 
 class Scale(NamedTuple):
-    """What "within so much of its scale" refers to (a time's scale is the time itself)."""
+    """The scales to which "of its scale" refers (a time's scale is the time itself)."""
 
     lam: float
     place: float

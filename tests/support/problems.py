@@ -63,7 +63,7 @@ class Position:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sample:
-    """What the speed field says at one place."""
+    """The values of the speed field at one place."""
 
     lam: str
     v2: str

@@ -1,1 +1,1 @@
-"""Expressions as exact algebra: polynomials, signs, derivatives, divided differences, and how results are written."""
+"""Exact algebra of expressions: polynomials, signs, derivatives, divided differences, and the form of results."""

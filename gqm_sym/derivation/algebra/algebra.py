@@ -1,4 +1,4 @@
-"""Expressions as fractions of polynomials, in which sines and cosines are exact algebra.
+"""Expressions as fractions of polynomials in which sines and cosines are algebraic.
 
 A polynomial in a pair (s, c) of sine and cosine is kept homogeneous: a term of too low a degree is
 multiplied by s² + c² = 1 (hyperbolic: c² - s²) until all terms have one degree, for which the base
@@ -6,7 +6,7 @@ angle is halved where degrees differ by an odd number. Homogeneous forms factor 
 conditions, so that 1 - cos u is found to be 2 sin²(u/2), and a perfect square to be one, by plain
 factoring.
 
-Nothing here looks at a clock: what is too large is refused by counting terms (`OverBudget`), so
+Nothing here depends on a clock: expressions that are too large are refused by counting terms (`OverBudget`), so that
 the outcome is the same on every machine.
 """
 
@@ -35,7 +35,7 @@ from gqm_sym.derivation.algebra.generators import (
 )
 
 Polynomial: TypeAlias = Any
-"""SymPy's sparse polynomial, which has no type information."""
+"""SymPy's sparse polynomials, which have no type information."""
 MAX_TERMS = 160
 MAX_DEGREE = 40
 
@@ -49,12 +49,12 @@ class Fraction:
 
 
 class Algebra:
-    """The ring that a handful of expressions and their derivatives live in.
+    """The ring that contains a few expressions and their derivatives.
 
     Parameters
     ----------
     expressions
-        What must be expressible.
+        The expressions that must be representable.
     variable
         The variable of derivatives.
     halved
@@ -76,7 +76,7 @@ class Algebra:
         self._place = {name: place for place, name in enumerate(self.names)}
         self.squares: list[tuple[int, Polynomial]] = []
         self.squares = self._square_relations()
-        # Polynomials written out so far, by `derive.spelling`.
+        # Polynomials that have been written out so far (`normal_form`).
         self.texts: dict[Polynomial, sp.Expr] = {}
 
     def _square_relations(self) -> list[tuple[int, Polynomial]]:
@@ -138,7 +138,7 @@ class Algebra:
         return Fraction(sine, cosine)
 
     def multiple(self, pair: Pair, times: int) -> tuple[Polynomial, Polynomial]:
-        """Return sine and cosine of a multiple of a base angle: De Moivre, homogeneous."""
+        """Return sine and cosine of a multiple of a base angle by De Moivre's formula, as homogeneous polynomials."""
         if times > MAX_DEGREE:
             raise OverBudget(f"an angle {times} times another")
         s, c = self.generators[pair.sine], self.generators[pair.cosine]
@@ -153,13 +153,13 @@ class Algebra:
     # Arithmetic within the budget
 
     def bounded(self, polynomial: Polynomial) -> Polynomial:
-        """Return a polynomial if it is small enough."""
+        """Return a polynomial if it is small enough; otherwise raise OverBudget."""
         if len(polynomial) > MAX_TERMS:
             raise OverBudget(f"a polynomial of more than {MAX_TERMS} terms")
         return polynomial
 
     def times(self, first: Polynomial, second: Polynomial) -> Polynomial:
-        """Return a product; refused before it is computed if that would take long."""
+        """Return a product; it is refused before it is computed if that would take long."""
         if len(first) * len(second) > 8 * MAX_TERMS:
             raise OverBudget(f"a product of {len(first)} by {len(second)} terms")
         return self.bounded(first * second)
@@ -187,7 +187,7 @@ class Algebra:
         return result
 
     def reduced(self, fraction: Fraction) -> Fraction:
-        """Return the fraction in lowest terms, both parts normal."""
+        """Return the fraction in lowest terms, with both parts in normal form."""
         top, bottom = self.normal(fraction.top), self.normal(fraction.bottom)
         if not top:
             return Fraction(self.ring.zero, self.one)
@@ -197,7 +197,9 @@ class Algebra:
     # Normal forms
 
     def normal(self, polynomial: Polynomial) -> Polynomial:
-        """Square roots out, make homogeneous where one parity allows it, and drop factors 1."""
+        """Replace squares of roots, make the polynomial homogeneous if its degrees have one parity, and remove factors
+        of 1.
+        """
         for place, square in self.squares:
             polynomial = self.replace_squares(polynomial, place, square)
         for pair in self.pairs:
@@ -228,7 +230,7 @@ class Algebra:
         for monomial, coefficient in polynomial.terms():
             parts[pair.degree(monomial)] += self.ring({monomial: coefficient})
         result = self.ring.zero
-        # Horner's scheme in the unit, from the lowest degree up.
+        # Horner's scheme in powers of s² + c², from the lowest degree up.
         for degree in range(min(degrees), highest + 1, 2):
             result = self.times(result, unit) + parts.get(degree, self.ring.zero)
         while result and pair.degree(result.LM) >= 2:
@@ -248,10 +250,10 @@ class Algebra:
         )
 
     def doubled(self, polynomial: Polynomial, pair: Pair) -> "tuple[Algebra, Polynomial, int] | None":
-        """Rewrite a polynomial in sine and cosine of twice a pair's angle, if it is of even degree.
+        """Rewrite a polynomial of even degree in sine and cosine of twice a pair's angle.
 
-        Returns the same ring read with the double angle, the polynomial in it, and the number by
-        which that must be divided.
+        The function returns the same ring with the double angle in place of the angle, the polynomial in it, and the
+        number by which the polynomial must be divided.
         """
         degrees = {pair.degree(monomial) for monomial in polynomial}
         if len(degrees) != 1 or degrees == {0} or max(degrees) % 2:

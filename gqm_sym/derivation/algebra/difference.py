@@ -16,7 +16,7 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import MEAN_HEIGHT, SPACE, chart_alpha, chart_x, chart_z
 
-# Heads with helpers `divdiff1_<name>` and `divdiff2_<name>` in the runtime.
+# Functions that have the helpers `divdiff1_<name>` and `divdiff2_<name>` in the runtime.
 HELPERS = {
     sympy.sin: "sin",
     sympy.cos: "cos",
@@ -61,11 +61,11 @@ class Differences:
     _second: dict[Expr, Expr] = field(default_factory=dict)
 
     def value(self, u: Expr, i: int) -> Expr:
-        """``u`` at place i."""
+        """Return ``u`` at place i."""
         return u.xreplace({self.parameter: self.points[i]})
 
     def first(self, u: Expr, i: int, j: int) -> Expr:
-        """``u[points[i], points[j]]``."""
+        """Return ``u[points[i], points[j]]``."""
         key = (u, i, j)
         if key not in self._first:
             spend()
@@ -73,14 +73,14 @@ class Differences:
         return self._first[key]
 
     def second(self, u: Expr) -> Expr:
-        """``u[a, lam, b]``."""
+        """Return ``u[a, lam, b]``."""
         if u not in self._second:
             spend()
             self._second[u] = self._build_second(u)
         return self._second[u]
 
     def gap(self, u: Expr, i: int, j: int) -> Expr:
-        """``u(points[j]) - u(points[i])``, without subtracting."""
+        """Return ``u(points[j]) - u(points[i])`` without a subtraction."""
         return self.gaps[i, j] * self.first(u, i, j)
 
     def _build_first(self, u: Expr, i: int, j: int) -> Expr:
@@ -119,7 +119,7 @@ class Differences:
 
 
 def _halves(product: Expr, parameter: Symbol) -> tuple[Expr, Expr]:
-    """Split a product into two factors, of which the first is what does not depend on the parameter."""
+    """Split a product into two factors, the first of which does not depend on the parameter if possible."""
     fixed, moving = product.as_independent(parameter, as_Add=False)
     if fixed != 1:
         return fixed, moving
@@ -129,7 +129,7 @@ def _halves(product: Expr, parameter: Symbol) -> tuple[Expr, Expr]:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """A function with helpers of its own in the runtime."""
+    """A function that has its own helpers in the runtime."""
 
     name: str
 
@@ -142,7 +142,7 @@ class _Named:
 
 @dataclass(frozen=True, slots=True)
 class _Power:
-    """A power with a constant exponent: small whole ones written out, others by helpers."""
+    """A power with a constant exponent; small integer powers are written out, others use helpers."""
 
     exponent: Expr
 
@@ -178,7 +178,7 @@ class _Power:
 
 
 def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power, Expr]:
-    """``u`` as a function of something simpler."""
+    """Return ``u`` as a function of a simpler expression."""
     if type(u) in HELPERS:
         return _Named(HELPERS[type(u)]), u.args[0]
     if u.is_Pow:

@@ -12,7 +12,7 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import DerivationError
 from gqm_sym.sympy_charts import SpaceFunction, TrainLoad
 
-# Factors up to which the product rule is written out in one sum.
+# The largest number of factors for which the product rule is written out in one sum.
 MAX_FLAT_FACTORS = 4
 
 # Outer derivatives f'(u), by the name of f.
@@ -27,12 +27,12 @@ _OUTER: dict[type[sp.Basic], Callable[[sp.Expr], sp.Expr]] = {
     sp.cosh: sp.sinh,
     sp.tanh: lambda u: sp.cosh(u) ** -2,
     sp.asinh: lambda u: 1 / sp.sqrt(1 + u**2),
-    # Two roots, not the root of a product: acosh is real only where both factors are.
+    # This has two roots and not the root of a product, because acosh is real only where both roots are.
     sp.acosh: lambda u: 1 / (sp.sqrt(u - 1) * sp.sqrt(u + 1)),
     sp.atanh: lambda u: 1 / (1 - u**2),
     sp.exp: sp.exp,
     sp.log: lambda u: 1 / u,
-    # The sign of u without leaving the grammar; undefined at a kink, as it must be.
+    # The sign of u in terms of the grammar's functions; it is undefined at a kink, as it must be.
     sp.Abs: lambda u: sp.Abs(u) / u,
 }
 
@@ -43,7 +43,7 @@ def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
     Raises
     ------
     DerivationError
-        If the expression holds a function that the grammar does not have.
+        If the expression contains a function that the grammar does not have.
     """
     known: dict[sp.Basic, sp.Expr] = {}
 
@@ -61,7 +61,7 @@ def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
 def _product_rule(factors: Sequence[sp.Basic], variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Expr]) -> sp.Expr:
     moving = [place for place, factor in enumerate(factors) if variable in factor.free_symbols]
     if len(moving) > MAX_FLAT_FACTORS:
-        # One term a factor would square the length, and cube it in the second derivative.
+        # A term for each factor would square the length of the expression, and cube it in the second derivative.
         middle = moving[len(moving) // 2]
         first, second = factors[:middle], factors[middle:]
         return sp.Add(
@@ -87,7 +87,7 @@ def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Ex
             result += node * sp.log(base) * visit(exponent)
         return result
     if isinstance(node, sp.atan2):
-        # The angle of a tangent: a curve that a law reads by its turning holds one.
+        # This is the angle of a tangent, which occurs in the laws of some curves.
         up, along = node.args
         return (along * visit(up) - up * visit(along)) / (along**2 + up**2)
     if isinstance(node, SpaceFunction | TrainLoad):

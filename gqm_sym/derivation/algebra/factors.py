@@ -5,8 +5,8 @@ from math import prod
 from gqm_sym.derivation.algebra.algebra import Algebra, Polynomial
 from gqm_sym.derivation.algebra.generators import Pair
 
-# Factoring is far dearer than arithmetic, above all in many variables: polynomials with more
-# possible monomials are only made square-free, and yet larger ones left as they are.
+# Factoring takes far longer than arithmetic, above all in many variables. Polynomials with more possible monomials than
+# the first number are only made square-free, and even larger ones are left as they are.
 MAX_FACTORED = 600
 MAX_SQUARE_FREE = 6000
 

@@ -21,7 +21,7 @@ _KINDS: dict[type[sp.Basic], str] = {
     sp.exp: EXPONENTIAL,
 }
 Angle = tuple[str, sp.Basic]
-"""Kind of function, and the argument without its rational factor."""
+"""The kind of a function, and its argument without the rational factor."""
 
 
 class OverBudget(Exception):
@@ -30,7 +30,7 @@ class OverBudget(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Sine and cosine of one base angle, by their places among the generators.
+    """Sine and cosine of one base angle, given by their indices among the generators.
 
     ``sign`` is that of s² in the relation: s² + c² = 1, or c² - s² = 1 for hyperbolic ones.
     """
@@ -41,7 +41,7 @@ class Pair:
     sign: int
 
     def degree(self, monomial: tuple[int, ...]) -> int:
-        """Return the degree of a monomial in both."""
+        """Return the total degree of a monomial in both."""
         return monomial[self.sine] + monomial[self.cosine]
 
 
@@ -52,11 +52,11 @@ class Generators:
     Attributes
     ----------
     names
-        What they stand for.
+        The expressions that the generators stand for.
     pairs
-        By angle.
+        The pairs of sine and cosine, by angle.
     exponentials
-        Places of the exponentials, by angle.
+        The indices of the exponentials, by exponent.
     steps
         The rational factor of each base angle.
     """
@@ -73,11 +73,11 @@ def collect(expressions: Iterable[sp.Expr], variable: sp.Symbol, halved: frozens
     Parameters
     ----------
     expressions
-        What must be expressible.
+        The expressions that must be representable.
     variable
         The variable of derivatives.
     halved
-        Angles whose base is to be half of what the expressions need.
+        Angles whose base is to be half of that which the expressions need.
     """
     atoms: dict[sp.Basic, None] = {variable: None}
     angles: dict[Angle, set[sp.Rational]] = {}
@@ -140,22 +140,22 @@ def waves(angle: sp.Expr, sign: int) -> tuple[sp.Expr, sp.Expr]:
 
 
 def kind_of(node: sp.Basic) -> str:
-    """Return the kind of a function of an angle or exponent, "" of anything else."""
+    """Return the kind of a function of an angle or exponent, "" for anything else."""
     return _KINDS.get(node.func, "")
 
 
 def is_integer_power(node: sp.Basic) -> bool:
-    """Whether a node is a power that polynomials have."""
+    """Return whether a node is a power that polynomials may contain."""
     return isinstance(node, sp.Pow) and isinstance(node.exp, sp.Integer)
 
 
 def is_real_power(node: sp.Basic) -> bool:
-    """Whether a node is a power whose exponent is not a rational number."""
+    """Return whether a node is a power whose exponent is not a rational number."""
     return isinstance(node, sp.Pow) and not isinstance(node.exp, sp.Rational)
 
 
 def angle_of(node: sp.Basic) -> tuple[sp.Rational, Angle]:
-    """Return the rational factor and the rest of an argument: commensurate ones share the rest."""
+    """Return the rational factor and the rest of an argument; commensurate arguments share the rest."""
     factor, rest = node.args[0].primitive()
     inner, rest = rest.as_coeff_Mul()
     factor *= inner
@@ -165,14 +165,14 @@ def angle_of(node: sp.Basic) -> tuple[sp.Rational, Angle]:
 
 
 def root_of(node: sp.Basic) -> sp.Basic:
-    """Return the generator that ``node`` is an integer power of."""
+    """Return the generator of which ``node`` is an integer power."""
     if isinstance(node, sp.Pow) and isinstance(node.exp, sp.Rational):
         return sp.Pow(node.base, sp.Rational(1, node.exp.q))
     return node
 
 
 def slope(node: sp.Basic, variable: sp.Symbol) -> sp.Expr:
-    """Return what the derivative of a generator is made from, in generators that are closed.
+    """Return the expression that determines the derivative of a generator in terms of the generators.
 
     For angles and exponents that is the derivative of the argument, for u**p the logarithmic
     derivative (which needs no further power of u), for the q-th root y = u**(1/q) it is

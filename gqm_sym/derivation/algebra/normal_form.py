@@ -1,7 +1,7 @@
 """Polynomials written out as sums, in the shortest of several ways.
 
-Tried are powers of sine and cosine, cosines or sines alone, multiple angles, sums of different
-angles, and all that again for twice the angle.
+The forms tried are powers of sine and cosine, cosines or sines alone, multiple angles, sums of different angles, and
+the same again for twice the angle.
 """
 
 from collections.abc import Iterable
@@ -16,16 +16,16 @@ from gqm_sym.derivation.algebra.generators import Pair, waves
 # Longer sums are written in powers only: no other form would make them readable.
 MAX_SPELLED = 24
 
-# Terms, and factors in a term, up to which sines and cosines of different angles are combined.
+# The largest number of terms, and of factors in a term, for which sines and cosines of different angles are combined.
 MAX_COMBINED_TERMS = 12
 MAX_COMBINED_FACTORS = 4
 Monomial = tuple[int, ...]
 Terms = dict[sp.Expr, dict[Monomial, Fraction]]
-"""For each product of sines, cosines and exponentials the polynomial that it is multiplied by."""
+"""For each product of sines, cosines and exponentials, the polynomial that multiplies it."""
 
 
 def shortest(candidates: Iterable[sp.Expr]) -> sp.Expr:
-    """Return the form with the fewest operations; ties by SymPy's canonical order.
+    """Return the form with the fewest operations; ties are broken by SymPy's canonical order.
 
     A minus sign counts three times: 1 + s² keeps digits that 2 - c² may lose.
     """
@@ -70,7 +70,7 @@ def _spell(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
 
 
 def _in_powers(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
-    """Write it in powers of the generators, collected by those of sines, cosines, exponentials."""
+    """Write a polynomial in powers of the generators, collected by powers of sines, cosines and exponentials."""
     paired = {place for pair in algebra.pairs for place in (pair.sine, pair.cosine)}
     leads = [place in paired or isinstance(name, sp.exp) for place, name in enumerate(algebra.names)]
     terms: Terms = {}
@@ -91,7 +91,7 @@ def _add(terms: Terms, wave: sp.Expr, monomial: Monomial, size: Fraction) -> Non
 
 
 def _sum(algebra: Algebra, terms: Terms) -> sp.Expr:
-    """Add up products of functions and polynomials, common factors taken out of the latter."""
+    """Add up products of functions and polynomials, with common factors taken out of the polynomials."""
     parts = []
     for wave, polynomial in terms.items():
         kept = {monomial: size for monomial, size in polynomial.items() if size}
@@ -111,10 +111,10 @@ def _sum(algebra: Algebra, terms: Terms) -> sp.Expr:
         )
         number = _rational(content)
         if wave == 1 and not any(common):
-            # Among other terms 2*(a + b) is 2*a + 2*b.
+            # In a sum with other terms, 2*(a + b) is written as 2*a + 2*b.
             parts += [number * term for term in sp.Add.make_args(rest)]
         else:
-            # All at once: SymPy multiplies a number alone into a sum.
+            # All factors are multiplied at once, because SymPy distributes a single number over a sum.
             parts.append(sp.Mul(number, _monomial(algebra, common), rest, wave))
     return sp.Add(*parts)
 
@@ -124,7 +124,7 @@ def _rational(number: Fraction) -> sp.Rational:
 
 
 def _as_exponential(algebra: Algebra, polynomial: Polynomial) -> sp.Expr | None:
-    """Write ±(cosh u ± sinh u) as ±exp(±u), which cancels nothing."""
+    """Write ±(cosh u ± sinh u) as ±exp(±u), in which nothing cancels."""
     for pair in algebra.pairs:
         if pair.sign > 0:
             continue
@@ -148,7 +148,7 @@ def _one_sided(algebra: Algebra, polynomial: Polynomial, keep_cosine: bool) -> P
 
 
 def in_multiple_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
-    """Write it in sines and cosines of multiple angles."""
+    """Write a polynomial in sines and cosines of multiple angles."""
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():
         rest = list(monomial)
@@ -175,7 +175,7 @@ def _multiple_angles(pair: Pair, sines: int, cosines: int) -> list[tuple[sp.Expr
             grown[power + 1] = grown.get(power + 1, 0) + size
             grown[power - 1] = grown.get(power - 1, 0) + sign * size
         row = grown
-    # 1/i**sines is (-1)**(sines//2), times 1/i for an odd power, which makes the sine.
+    # 1/i**sines is (-1)**(sines//2), times 1/i for an odd power, which gives the sine.
     scale = Fraction((-pair.sign) ** (sines // 2), 2 ** (sines + cosines))
     odd = sines % 2
     return [
@@ -193,7 +193,9 @@ def _may_combine(algebra: Algebra, polynomial: Polynomial) -> bool:
 
 
 def _in_combined_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
-    """Write it in sines and cosines of sums of different angles: sin a cos b - cos a sin b."""
+    """Write a polynomial in sines and cosines of sums of different angles, for example sin a cos b - cos a sin b as
+    sin(a - b).
+    """
     circular = [pair for pair in algebra.pairs if pair.sign > 0]
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():

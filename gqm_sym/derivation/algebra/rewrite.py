@@ -1,8 +1,8 @@
-"""The one home of simplification policy: which of many equal forms is handed on.
+"""The policy of simplification: which of several equal forms is used.
 
-What is short must also be accurate: products stay products, so that a form that vanishes does so
-with all its digits, and a sum of squares is multiplied out only where no terms of different sign
-appear. Expressions beyond a fixed size are left as they are.
+A short form must also be accurate: products stay products, so that a form that vanishes is accurate near its zero, and
+a sum of squares is multiplied out only if no terms of different sign appear. Expressions beyond a fixed size are left
+as they are.
 """
 
 from collections.abc import Iterable
@@ -19,13 +19,13 @@ from gqm_sym.derivation.algebra.normal_form import MAX_SPELLED, in_multiple_angl
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.errors import DerivationError
 
-# Above this many operations an expression is handed on as it is.
+# An expression with more operations than this is left as it is.
 MAX_TIDIED = 400
 
-# Terms up to which a product of sums is multiplied out.
+# The largest number of terms for which a product of sums is multiplied out.
 MAX_EXPANDED = 16
 
-# Factors that are tried together as one multiple angle.
+# The largest number of factors that are tried together as one multiple angle.
 MAX_MERGED = 5
 
 # Waves up to which products of sines and cosines are written as sums.
@@ -42,10 +42,10 @@ def tidy(expression: sp.Expr) -> sp.Expr:
 
 
 def without_waves(expression: sp.Expr) -> sp.Expr:
-    """Write sin(u)**2 + cos(u)**2 as 1 in every sum, with whatever factors the two squares share.
+    """Replace sin(u)**2 + cos(u)**2 by 1 in every sum, also if the two squares have common factors.
 
-    Forces along polar curves are full of it, for x**2 + z**2 is r**2*cos(u)**2 + r**2*sin(u)**2. Each step makes a
-    sum shorter by one term, and nothing else is rewritten.
+    Such sums are frequent in forces along polar curves, because x**2 + z**2 is r**2*cos(u)**2 + r**2*sin(u)**2. Each
+    step makes a sum shorter by one term, and nothing else is rewritten.
     """
     known: dict[sp.Basic, sp.Basic] = {}
 
@@ -65,7 +65,7 @@ def without_waves(expression: sp.Expr) -> sp.Expr:
 
 
 def _without_unit(terms: list[sp.Expr]) -> sp.Expr:
-    """Add terms, with each pair w*sin(u)**2 + w*cos(u)**2 as w."""
+    """Add terms, and replace each pair w*sin(u)**2 + w*cos(u)**2 by w."""
     left = dict.fromkeys(terms)
     for term in terms:
         for base, power in term.as_powers_dict().items():
@@ -80,7 +80,7 @@ def _without_unit(terms: list[sp.Expr]) -> sp.Expr:
 
 
 def multiplied_out(expression: sp.Expr) -> sp.Expr:
-    """Multiply sums of products out where squares of sines and cosines then add up, and that is shorter."""
+    """Multiply out sums of products if squares of sines and cosines then add up to a shorter form."""
     terms = sum(prod(len(f.args) for f in sp.Mul.make_args(part) if f.is_Add) for part in sp.Add.make_args(expression))
     if terms > MAX_EXPANDED * MAX_EXPANDED or sp.count_ops(expression) > MAX_TIDIED:
         return expression
@@ -111,9 +111,9 @@ def in_single_waves(expression: sp.Expr, place: sp.Symbol) -> sp.Expr:
 
 
 def without_poles(expression: sp.Expr) -> sp.Expr:
-    """Multiply a product of sums out where that cancels a denominator: (b/s - a)*s is b - a*s.
+    """Multiply out a product of sums if that cancels a denominator: (b/s - a)*s is b - a*s.
 
-    Nothing else is multiplied out: (a - b)*(a + b) has more digits than a**2 - b**2.
+    Nothing else is multiplied out, because (a - b)*(a + b) is more accurate than a**2 - b**2.
     """
     terms = prod(len(factor.args) for factor in expression.args if factor.is_Add)
     if not expression.is_Mul or terms > MAX_EXPANDED:
@@ -186,7 +186,7 @@ def spell_product(algebra: Algebra, top: Polynomial, bottom: Polynomial) -> list
 def spell_factors(algebra: Algebra, found: Iterable[tuple[Polynomial, int]]) -> tuple[sp.Rational, list[Power]]:
     """Write factors one by one, joining those that together are one sine or cosine.
 
-    Returns a number and the expressions with their powers.
+    The function returns a number and the expressions with their powers.
     """
     by_power: dict[int, list[Polynomial]] = {}
     for factor, power in found:
@@ -209,7 +209,7 @@ def spell_factors(algebra: Algebra, found: Iterable[tuple[Polynomial, int]]) -> 
 
 
 def _is_wave(algebra: Algebra, polynomial: Polynomial) -> bool:
-    """Whether it is made of numbers and the sine and cosine of one pair."""
+    """Return whether a polynomial consists of numbers and the sine and cosine of one pair."""
     touched = {place for monomial in polynomial for place, power in enumerate(monomial) if power}
     return any(touched <= {pair.sine, pair.cosine} for pair in algebra.pairs)
 
@@ -217,7 +217,7 @@ def _is_wave(algebra: Algebra, polynomial: Polynomial) -> bool:
 def _merged(algebra: Algebra, waves: list[Polynomial]) -> tuple[sp.Rational, sp.Expr, tuple[int, ...]]:
     """Find the largest subset, with the first factor, whose product is a single sine or cosine.
 
-    Returns its number, the function, and the places of the factors used.
+    The function returns the product's numerical factor, the function, and the indices of the factors used.
     """
     for size in range(min(len(waves), MAX_MERGED), 1, -1):
         for others in combinations(range(1, len(waves)), size - 1):
@@ -233,7 +233,7 @@ def _merged(algebra: Algebra, waves: list[Polynomial]) -> tuple[sp.Rational, sp.
 
 
 def _content(form: sp.Expr) -> tuple[sp.Rational, sp.Expr]:
-    """Return a number and the rest: signs and numbers are kept in one place of a product."""
+    """Return the numerical factor and the rest of a form, so that signs and numbers are in one place of a product."""
     content, rest = form.primitive() if form.is_Add else form.as_coeff_Mul()
     if rest.is_Add and minus_signs(-rest) < minus_signs(rest):
         return -content, -rest
@@ -241,7 +241,7 @@ def _content(form: sp.Expr) -> tuple[sp.Rational, sp.Expr]:
 
 
 def magnitudes(signs: Signs, powers: Iterable[Power]) -> list[Power]:
-    """Return the factors of an absolute value, without bars where a sign is known."""
+    """Return the factors of an absolute value, without bars for those whose sign is known."""
     result: list[Power] = []
     for factor, power in powers:
         sign = known_sign(signs, factor) if power % 2 else 1
@@ -263,7 +263,7 @@ def direction(signs: Signs, powers: Iterable[Power]) -> list[Power]:
 
 
 def known_sign(signs: Signs, factor: sp.Expr) -> int | None:
-    """Return the sign of a factor, taking parameters as positive where that is allowed."""
+    """Return the sign of a factor, with parameters taken as positive if that is allowed."""
     signs.assume(factor)
     return signs.sign(factor)
 
@@ -279,5 +279,5 @@ def absorb_bars(expression: sp.Expr) -> sp.Expr:
 
 
 def is_safe(signs: Signs, expression: sp.Expr) -> bool:
-    """Whether no terms of a sum can cancel."""
+    """Return whether no terms of a sum can cancel."""
     return not expression.is_Add or signs.sign(expression) is not None

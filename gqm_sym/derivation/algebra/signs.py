@@ -1,4 +1,4 @@
-"""Signs of expressions on the domain of a curve, as far as structure and end points prove them."""
+"""Signs of expressions on the domain of a curve, as far as their structure and the ends of the domain prove them."""
 
 from collections.abc import Iterable
 
@@ -7,23 +7,24 @@ import sympy as sp
 _ALWAYS_POSITIVE = (sp.exp, sp.cosh)
 _NEVER_NEGATIVE = (sp.Abs,)
 
-# Angles beyond which nobody's curve is within one half-wave; SymPy would need a digit more for each digit of theirs.
+# The largest angle that is considered: no practical curve reaches further within half a wave, and SymPy would need more
+# digits for larger angles.
 FAR = 10**6
 _ODD = (sp.sinh, sp.tanh, sp.asinh, sp.atan, sp.asin, sp.atanh)
 
 
 class Signs:
-    """Answers what sign an expression has inside the domain.
+    """The signs of expressions inside the domain.
 
-    A run-time parameter that stands alone where only its absolute value would be right is taken
-    to be positive if nothing speaks against it; ``assumed`` says which were.
+    If a closed form would contain the absolute value of a run-time parameter, the parameter is taken to be positive
+    unless its default contradicts that; ``assumed`` lists these parameters.
 
     Parameters
     ----------
     parameter, domain
         The curve's parameter and its range.
     positive
-        Parameters promised to be positive.
+        Parameters that are declared to be positive.
     may_be_positive
         Parameters whose defaults are positive, or that have none.
     """
@@ -43,13 +44,13 @@ class Signs:
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Parameters promised or taken to be positive, in that order."""
+        """Parameters that are declared or taken to be positive, in that order."""
         return tuple(self._positive)
 
     def assume(self, expression: sp.Expr) -> None:
-        """Take parameters as positive if their defaults allow that and it gives a sign.
+        """Take parameters as positive if their defaults allow it and the expression then has a sign.
 
-        That is so for a lone parameter and for sums like ``R + r``.
+        This applies to a single parameter and to sums such as ``R + r``.
         """
         names = [symbol.name for symbol in expression.free_symbols]
         if not self._candidates.issuperset(names):
@@ -83,7 +84,7 @@ class Signs:
         return None
 
     def nonzero(self, expression: sp.Expr) -> bool:
-        """Whether structure proves that the expression vanishes nowhere."""
+        """Return whether the structure of the expression proves that it vanishes nowhere."""
         if expression.is_number:
             return bool(expression != 0)
         if isinstance(expression, sp.Symbol):
@@ -108,13 +109,13 @@ class Signs:
     def _sign_of_power(self, expression: sp.Pow) -> int | None:
         base, exponent = expression.args
         if not isinstance(exponent, sp.Integer):
-            # Real only where the base is not negative (odd roots too: SymPy takes the real branch
-            # for positive bases only).
+            # A power is real only where the base is not negative (also for odd roots, of which SymPy takes the real
+            # branch for positive bases only).
             return 1
         return 1 if exponent % 2 == 0 else self.sign(base)
 
     def _sign_of_line(self, expression: sp.Add) -> int | None:
-        """Sign of a linear function of the parameter with numbers for coefficients."""
+        """Return the sign of a linear function of the parameter whose coefficients are numbers."""
         slope = expression.coeff(self.parameter)
         rest = sp.expand(expression - slope * self.parameter)
         if not (slope.is_Rational and rest.is_number and slope):
@@ -128,13 +129,13 @@ class Signs:
     def _sign_of_range(self, low: sp.Expr | None, high: sp.Expr | None) -> int | None:
         if low is not None and self.sign(low) == 1:
             return 1
-        # Of an end at zero `sign` says 1; at the upper end that is a range below zero.
+        # For an end at zero `sign` returns 1; if that is the upper end, the range is below zero.
         if high is not None and (high == 0 or self.sign(high) == -1):
             return -1
         return None
 
     def _sign_of_wave(self, expression: sp.Expr) -> int | None:
-        """Sign of a sine or cosine whose argument stays within one half-wave."""
+        """Return the sign of a sine or cosine whose argument stays within half a wave."""
         angle = expression.args[0]
         slope = angle.coeff(self.parameter)
         rest = angle - slope * self.parameter

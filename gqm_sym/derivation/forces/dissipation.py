@@ -1,8 +1,8 @@
 """A force law that is not conservative, along a curve: dW/dλ = P - Q W, and the forces that hold a body at rest.
 
-The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
-adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
-would. At a cusp κ is infinite and σ zero: P and Q contain dΘ/dλ = σ κ, which is neither.
+The law is first written in terms of the geometric quantities that it depends on, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and
+dx/ds), to which every force adds its terms; then the pieces are replaced by their closed forms. Emitted code computes
+the pieces separately. At a cusp κ is infinite and σ zero; P and Q contain dΘ/dλ = σ κ, which is finite there.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, Kernel, W
 
-# Names with a mark that no text of a user's can have.
+# These names contain a mark that no text of a user can have.
 SIGMA, TURN, PUSH, LOAD, TILT = (sp.Symbol(name, real=True) for name in ("σ", "dΘ/dλ", "F·t", "n₀", "dx/ds"))
 TURNS = tuple(sp.Symbol(f"(t × dt/dλ)_{axis}", real=True) for axis in "xyz")
 LOADS = tuple(sp.Symbol(f"-(t × F)_{axis}", real=True) for axis in "xyz")
@@ -23,22 +23,24 @@ CORIOLIS = tuple(sp.Symbol(f"2 Ω (t × (ẑ × t))_{axis}", real=True) for axis
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dissipation:
-    """A force law along a curve, in the sign v of ds/dt, the sign ν of the contact force, and W where not linear.
+    """A force law along a curve, in terms of the sign v of ds/dt, the sign ν of the contact force, and W if the law is
+    not linear.
 
     Attributes
     ----------
     pieces
-        Symbols of what the forms below take of the curve, with their closed forms in λ.
+        The symbols of the curve's quantities in the forms below, with their closed forms in λ.
     drive, decay
-        P and Q in the pieces; for a law that is not linear in W its linearisation, so that P - Q W is the law itself.
+        P and Q in terms of the pieces; for a law that is not linear in W, its linearisation at W, where P - Q W is the
+        law itself.
     acceleration
-        Tangential acceleration A in the pieces, so that dW/ds = 2 A.
+        The tangential acceleration A in terms of the pieces; dW/ds = 2 A.
     holds
-        A of a body at rest that is about to move forwards and backwards, under static friction, in the pieces.
+        A of a body at rest that is about to move forwards or backwards, under static friction, in terms of the pieces.
     contact
-        The contact force per unit mass in the pieces: what of it is there at rest, and what W is multiplied by. Of a
-        curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it; but on
-        a banked one both are what it has along the upward direction of riders.
+        The contact force per unit mass in terms of the pieces: its value at rest, and the factor of W. For a curve in
+        no vertical plane it has no sign, and if the law is not linear in W the first is the whole force; on a banked
+        curve both are components along the upward direction of riders.
     friction, kinked, linear
         Whether the law depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
@@ -72,10 +74,10 @@ def dissipation(
     kernel
         The force law.
     pieces
-        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT, and on a curve in no vertical plane TURNS and
-        LOADS, CORIOLIS in a frame that turns, and UPRIGHT where its riders have an upward direction.
+        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT; on a curve in no vertical plane also of TURNS and
+        LOADS, of CORIOLIS in a rotating frame, and of UPRIGHT if its riders have an upward direction.
     coordinates
-        What the coordinates are along the curve, where a law of the user's own names them.
+        The coordinates along the curve, for a user's own law that contains them.
     signs
         The signs of expressions on the curve.
     cars_load
@@ -90,13 +92,13 @@ def dissipation(
     if kernel.friction and cars_load is not None:
         contact, rubbing, sliding = (cars_load, sp.S.Zero), v * kernel.friction * SIGMA * cars_load, sp.S.Zero
     elif kernel.friction and TURNS[0] in pieces:
-        # σ |N|/m, in which nothing is infinite at a cusp.
+        # This is σ |N|/m, in which nothing is infinite at a cusp.
         vectors = zip(TURNS, LOADS, CORIOLIS if kernel.spin else (0, 0, 0), strict=True)
         parts = (turn * W + SIGMA * (load + v * sp.sqrt(W) * aside) for turn, load, aside in vectors)
         force = sp.sqrt(sp.Add(*(part**2 for part in parts)))
         contact, rubbing, sliding = (force / SIGMA, sp.S.Zero), v * kernel.friction * force, sp.S.Zero
     elif kernel.spin:
-        # The contact force has a part out of the plane: friction is not linear in W.
+        # The contact force has a component out of the plane, so friction is not linear in W.
         sideways = 2 * kernel.spin * TILT
         other -= v * kernel.friction * sp.sqrt((LOAD + KAPPA * W) ** 2 + sideways**2 * W)
         sliding = sp.S.Zero
@@ -131,5 +133,5 @@ def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, wa
 
 
 def _without_bars(resistance: sp.Expr, sign: int | None) -> sp.Expr:
-    """Write |κ| as κ or -κ where the sign of κ is known: on a curve that bends one way only."""
+    """Replace |κ| by κ or -κ if the sign of κ is known, on a curve that bends in one direction only."""
     return resistance if sign is None else resistance.xreplace({sp.Abs(KAPPA): sign * KAPPA})

@@ -25,19 +25,20 @@ class Forces:
     potential
         Φ(λ).
     effective_potential
-        U = Φ/inertia, so that W + 2U is constant where nothing is lost.
+        U = Φ/inertia; W + 2U is constant if no energy is lost.
     effective_potential_slope
         dU/dλ.
     push
         F·t.
     static_normal_load
-        n₀ = -F·n: what the track carries at rest; N/m = κ W + n₀. Of a curve in no vertical plane its length.
+        n₀ = -F·n, the contact force per unit mass at rest; N/m = κ W + n₀. For a curve in no vertical plane its length.
     pressure
-        σ n₀, in which no absolute values are left.
+        σ n₀, without absolute values.
     loads
-        Of a curve in no vertical plane: the components of t × (-F), so that t × N/m = W t × dt/ds - t × F.
+        For a curve in no vertical plane, the components of t × (-F); t × N/m = W t × dt/ds - t × F.
     coriolis
-        Of such a curve in a frame that turns: the components of what ds/dt adds to t × N/m, for each unit of it.
+        For such a curve in a rotating frame, the components of the vector that is added to t × N/m for each unit of
+        ds/dt.
     """
 
     potential: sp.Expr
@@ -51,8 +52,8 @@ class Forces:
 
 
 def potential_gradient(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
-    """The derivatives of the potential by x, y and z along a curve, and the potential itself."""
-    # The force before the coordinates are put in: the curve's own symbols may be called x or z.
+    """Return the derivatives of the potential by x, y and z along a curve, and the potential itself."""
+    # The force is found before the coordinates are inserted, because the curve's own symbols may be called x or z.
     axes = (X, Y, Z)
     written = (*(differentiate(kernel.potential, axis) for axis in axes), kernel.potential)
     return tuple(form.xreplace(dict(zip(axes, place, strict=True))) for form in written)
@@ -65,7 +66,7 @@ def turned_force(
     w: sp.Expr,
     direction: sp.Expr = DIRECTION,
 ) -> tuple[sp.Expr, ...]:
-    """The vector t × N/m at V² = w, which has the length of N/m; ``direction`` is the sign of ds/dt."""
+    """Return the vector t × N/m at V² = w, which has the length of N/m; ``direction`` is the sign of ds/dt."""
     fixed = (turn * w + load for turn, load in zip(bend, loads, strict=True))
     return tuple(
         part + direction * sp.sqrt(w) * aside for part, aside in zip(fixed, coriolis or (0, 0, 0), strict=True)
@@ -73,9 +74,11 @@ def turned_force(
 
 
 def is_planar(heading: Heading, place: Place, kernel: Kernel) -> bool:
-    """Whether it is proved that no force acts across a vertical plane, so that the contact force lies in it.
+    """Return whether it is proved that no force acts across a vertical plane, so that the contact force lies in the
+    plane.
 
-    The Coriolis force does: `Forces` leaves it out of a planar curve's contact force, but not out of a vector.
+    The Coriolis force does act across it: `Forces` omits it from the contact force of a planar curve, but not from that
+    of a space curve.
     """
     cosine, sine = heading
     pull_x, pull_y, *_ = potential_gradient(place, kernel)
@@ -83,7 +86,7 @@ def is_planar(heading: Heading, place: Place, kernel: Kernel) -> bool:
 
 
 def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> Forces:
-    """Put the coordinates x, y and z of a curve in its parameter into the force law."""
+    """Insert the coordinates x, y and z of a curve, as functions of its parameter, into the force law."""
     written = potential_gradient(place, kernel)
     forms = [without_waves(form) for form in written]
     pull_x, pull_y, pull_z, potential = forms
@@ -91,12 +94,12 @@ def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> For
         return _in_space((pull_x, pull_y, pull_z), potential, kernel, shape)
     cosine, sine = shape.heading
     pull_x = cosine * pull_x + sine * pull_y
-    # (F_x, F_z) turned into the tangent's frame, before the length of the tangent comes in: a
-    # common root stays one piece.
+    # (F_x, F_z) is rotated into the frame of the tangent before the length of the tangent is introduced, so that a
+    # common root stays one factor.
     push = tidy(pull_x * shape.along + pull_z * shape.across)
     load = tidy(pull_z * shape.along - pull_x * shape.across)
     if forms != list(written):
-        # Along a curve about the centre of a force most of its components cancels.
+        # Along a curve about the centre of a force most of its components cancel.
         push, load = (multiplied_out(form) for form in (push, load))
         if shape.cusp is None:
             push = shortest([push, tidy(differentiate(potential, lam) / shape.size)])
@@ -111,7 +114,7 @@ def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> For
 
 
 def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
-    """The same along a curve in no vertical plane."""
+    """Return the forces along a curve in no vertical plane."""
     way = (shape.along, shape.sideways, shape.across)
     push = tidy(sp.Add(*(part * rate for part, rate in zip(pull, way, strict=True))))
     crossed = [tidy(part) for part in cross(way, pull)]
@@ -129,22 +132,22 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
 
 
 def _coriolis(spin: sp.Expr, shape: Geometry) -> Place:
-    """The components of 2 Ω t × (ẑ × t)."""
+    """Return the components of 2 Ω t × (ẑ × t)."""
     across, along, up = shape.tangent
     return -2 * spin * up * across, -2 * spin * up * along, 2 * spin * (across**2 + along**2)
 
 
 def load_of_cars(kernel: Kernel, lam: sp.Symbol, *, in_space: bool) -> sp.Expr:
-    """The mean of |N|/m over the cars of a train, which friction is proportional to."""
+    """Return the mean of |N|/m over the cars of a train, to which friction is proportional."""
     pull = differentiate(kernel.potential, Z)
     head = train_load if in_space else train_load_in_plane
     return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), pull)
 
 
 def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
-    """The forces along the track of a train: gravity acts on its mean height.
+    """Return the forces along the track of a train, in which gravity acts on its mean height.
 
-    The contact force stays that of a body at the middle, and so do `Forces.loads`.
+    The contact force remains that of a body at the middle of the train, and so do `Forces.loads`.
 
     Raises
     ------
@@ -153,9 +156,7 @@ def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
     """
     pull = differentiate(kernel.potential, Z)
     if not pull or (pull.free_symbols | (kernel.potential - pull * Z).free_symbols) & {X, Y, Z}:
-        raise DeclarationError(
-            "derive: train: potentials other than gravity are not known of a train; use Gravity() alone"
-        )
+        raise DeclarationError("derive: train: a train can have no potential other than gravity; use Gravity() alone")
     height, slope, _ = (head(lam) for head in MEAN_HEIGHT)
     potential = kernel.potential.xreplace({Z: height})
     return replace(

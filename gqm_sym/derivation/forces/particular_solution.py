@@ -1,10 +1,10 @@
 """Elementary solutions of W' + Q W = P, by undetermined coefficients.
 
-Where ∫ E P dλ with E = exp(∫ Q dλ) is elementary, it is E times a function U of the field that P and Q live in
-(Liouville's theorem, for an exponential), and U itself is a solution. So U is sought as a sum of products of the
-functions in P and Q, with coefficients that do not depend on λ: linear equations. Whether they have a solution is
-found out modulo a prime at random values of the parameters, and what it is exactly only if they have one. All sizes are
-bounded, and no clock is looked at.
+If ∫ E P dλ with E = exp(∫ Q dλ) is elementary, it is E times a function U of the field that contains P and Q
+(Liouville's theorem, for an exponential), and U itself is a solution. So U is assumed to be a sum of products of the
+functions in P and Q, with coefficients that do not depend on λ; these obey linear equations. Whether the equations have
+a solution is decided modulo a prime at random values of the parameters, and the solution is computed exactly only if
+there is one. All sizes are bounded, and nothing depends on a clock.
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,14 +20,14 @@ from gqm_sym.derivation.algebra.generators import OverBudget, Pair
 from gqm_sym.derivation.algebra.rewrite import product, spell_quotient
 from gqm_sym.errors import DerivationError
 
-# Of products that may appear in the solution, and of those that must cancel.
+# The largest number of products that may appear in the solution, and of those that must cancel.
 MAX_UNKNOWNS = 60
 MAX_EQUATIONS = 240
 
-# Of coefficients that are found to be there: beyond, nobody wants to read the form.
+# The largest number of coefficients that do not vanish; a form with more would be unreadable.
 MAX_KEPT = 8
 
-# Degree in a function beyond that in P and Q.
+# The excess of the degree in each function over the degree in P and Q.
 MORE = 1
 PRIME = 2**61 - 1
 Monomial = tuple[int, ...]
@@ -38,7 +38,7 @@ FieldElement: TypeAlias = Any
 def particular_solution(
     source: sp.Expr, decay: sp.Expr, variable: sp.Symbol, signs: Sequence[sp.Symbol] = ()
 ) -> sp.Expr | None:
-    """Return a solution of W' + decay*W = source, or None if none of the kind looked for was found.
+    """Return a solution of W' + decay*W = source, or None if there is none of the assumed form.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class _Search:
         return None if values is None else self._written([candidates[c] for c in columns], values)
 
     def _candidates(self) -> list[Polynomial]:
-        """Return the products of functions that the solution may be a sum of."""
+        """Return the products of functions whose sum the solution may be."""
         algebra = self.algebra
         sines = {pair.sine for pair in algebra.pairs}
         ranges = []
@@ -103,7 +103,7 @@ class _Search:
         return found
 
     def _rows(self, candidates: Iterable[Polynomial]) -> list[list[Polynomial]]:
-        """Return one equation a monomial in λ, each the coefficients of the candidates and the right-hand side."""
+        """Return one equation for each monomial in λ, as the coefficients of the candidates and the right-hand side."""
         algebra = self.algebra
         sides = []
         for candidate in candidates:
@@ -128,7 +128,7 @@ class _Search:
         return list(rows.values())
 
     def _canonical(self, polynomial: Polynomial) -> Polynomial:
-        """Return the one form of a polynomial: no squares of sines, of square roots, of signs."""
+        """Return the canonical form of a polynomial, without squares of sines, of square roots or of signs."""
         algebra = self.algebra
         for pair in algebra.pairs:
             cosine = algebra.generators[pair.cosine]
@@ -143,12 +143,14 @@ class _Search:
         return polynomial
 
     def _solved(self, rows: list[list[Polynomial]]) -> list[Fraction] | None:
-        """Solve equations with as many independent ones as unknowns, exactly; None if they contradict each other."""
+        """Solve equations exactly, of which as many are independent as there are unknowns; return None if they
+        contradict each other.
+        """
         field = self.algebra.ring.to_field()
         waiting = [[field(polynomial) for polynomial in row] for row in rows if any(row)]
         done: list[list[FieldElement]] = []
         for column in range(len(rows[0]) - 1):
-            # The shortest first: the others grow by it.
+            # The shortest equation is used first, because the others grow by it.
             usable = [row for row in waiting if row[column]]
             if not usable:
                 return None
@@ -184,9 +186,9 @@ def _pair_degree(polynomial: Polynomial, pair: Pair) -> int:
 
 
 def _support(rows: list[list[Polynomial]]) -> list[int] | None:
-    """Return the places of the unknowns that are not zero, found at random values of the parameters.
+    """Return the indices of the unknowns that are not zero, found at random values of the parameters.
 
-    None if the equations have no solution. Unknowns that remain free are taken as zero.
+    The result is None if the equations have no solution. Unknowns that remain free are taken as zero.
     """
     if not rows:
         return []

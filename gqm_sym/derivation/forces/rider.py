@@ -2,8 +2,8 @@
 
 With t × N/m = T the contact force has the component T·(t × u) along any unit vector u across the track. Riders sit
 upright along u = u₀ cos ψ + l₀ sin ψ, where l₀ is horizontal and points to the left, u₀ = t × l₀, and ψ is the roll
-angle. In a vertical plane u₀ is its normal, so that it also is defined where the tangent is vertical. A track without
-lateral force has u along N, at the speed of the motion or at a declared one.
+angle. In a vertical plane u₀ is the normal, so that it is also defined where the tangent is vertical. On a track
+without lateral force, u is parallel to N at the speed of the motion or at a declared speed.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from gqm_sym.derivation.geometry.geometry import Geometry, cross
 from gqm_sym.kernels.base import DIRECTION, W
 
 STANDARD_GRAVITY = sp.Rational(980665, 100000)
-"""What loads are measured in, in m/s²."""
+"""The unit of loads, in m/s²."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +27,7 @@ class Rider:
     Attributes
     ----------
     loads
-        Along the rider's upward direction, to the left and forwards: what is felt, in units of 9.80665 m/s².
+        The loads on a rider along the rider's upward direction, to the left and forwards, in units of 9.80665 m/s².
     onsets
         The rates of change of the loads, per second.
     roll
@@ -35,7 +35,7 @@ class Rider:
     up
         The rider's upward direction.
     level
-        The square of the tangent's horizontal part, where the roll angle is measured from the level; else 1.
+        The square of the tangent's horizontal component, if the roll angle is measured from the horizontal; else 1.
     """
 
     loads: Place
@@ -46,13 +46,13 @@ class Rider:
 
     @property
     def forms(self) -> tuple[sp.Expr, ...]:
-        """All of them."""
+        """All closed forms."""
         return (*self.loads, *self.onsets, *self.roll, *self.up, self.level)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Seat:
-    """The force on a rider per unit mass, upwards and to the left, and which direction is upwards."""
+    """The force on a rider per unit mass, upwards and to the left, and the rider's upward direction."""
 
     vertical: sp.Expr
     lateral: sp.Expr
@@ -62,7 +62,7 @@ class _Seat:
 
 
 def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr, lam: sp.Symbol) -> Rider:
-    """Derive what a rider feels.
+    """Derive the loads on a rider.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     shape, law
         The curve and the applied forces along it.
     acceleration
-        A in λ and W, so that dW/ds = 2 A.
+        A in terms of λ and W; dW/ds = 2 A.
     lam
         The curve's parameter.
     """
     seat = _in_plane(banking, shape, law) if shape.heading is not None else _in_space(banking, shape, law)
-    # What holds the rider back or pushes him: all that the potential does not do.
+    # The longitudinal load contains all forces except that of the potential.
     felt = (seat.vertical, seat.lateral, acceleration - law.push)
     vertical, lateral, ahead = (load / STANDARD_GRAVITY for load in felt)
 
@@ -94,9 +94,10 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
 
 
 def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, sp.Expr] | None:
-    """Curvature and static load along the rider's upward direction, so that N/m has the component κ W + n₀ along it.
+    """Return κ and n₀ for which κ W + n₀ is the component of N/m along the rider's upward direction.
 
-    None in a vertical plane, where N has a sign; where that direction depends on the motion; and in a frame that turns.
+    The result is None in a vertical plane, where N has a sign; if that direction depends on the motion; and in a
+    rotating frame.
     """
     if shape.heading is not None or law.coriolis or (banking.angle is None and banking.speed is None):
         return None
@@ -106,7 +107,9 @@ def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Ex
 
 
 def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
-    """In a vertical plane, whose normal carries the contact force: that alone has no lateral part."""
+    """Return the force on a rider in a vertical plane, where the contact force is along the normal and has no lateral
+    component.
+    """
     assert shape.heading is not None
     cosine, sine = shape.heading
     angle = sp.S.Zero if banking.angle is None else banking.angle
@@ -148,7 +151,7 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
 
 
 def _turned(shape: Geometry, law: Forces, w: sp.Expr, forwards: sp.Expr = DIRECTION) -> Place:
-    """The vector t × N/m at V² = w, of a motion forwards (1) or backwards (-1)."""
+    """Return the vector t × N/m at V² = w, for a motion forwards (1) or backwards (-1)."""
     along_x, along_y, along_z = turned_force(shape.bend, law.loads, law.coriolis, w, forwards)
     return along_x, along_y, along_z
 

@@ -1,7 +1,7 @@
 """V² along a motion: W(λ) = U(λ) + (v0² - U(lam0)) e^(-q), with q = ∫ Q dλ and U any solution of W' + Q W = P.
 
-U is an antiderivative of P where Q = 0, and else looked for among elementary functions (`particular_solution`). Where
-none is found, W is written as the quadrature that it is, and where the law is not linear in W, as an unknown function.
+If Q = 0, U is an antiderivative of P; otherwise it is searched for among elementary functions (`particular_solution`).
+If none is found, W is written as a quadrature, and if the law is not linear in W, as an unknown function.
 """
 
 from dataclasses import dataclass
@@ -29,23 +29,24 @@ _TEXTS = {
     EQUATION: "solved in space, for dV**2/ds = 2*A is not linear in it",
 }
 
-# A closed form's derivative must be P - Q W to so many digits, and to such a share of their size.
+# The number of digits with which the derivative of a closed form is compared with P - Q W, and the largest difference
+# as a share of their size.
 _DIGITS = 40
 _SHARE = sp.Rational(1, 10**25)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedField:
-    """W = V² in λ, ``lam0`` and ``v0``.
+    """W = V² as a function of λ, ``lam0`` and ``v0``.
 
     Attributes
     ----------
     squared
         W.
     form
-        ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (it is an unknown function).
+        ``closed``, ``quadrature`` (W contains an Integral) or ``equation`` (W is an unknown function).
     gain
-        dW/d(v0²), where W is a closed form: it is linear in v0².
+        dW/d(v0²), if W is a closed form, which is linear in v0².
     """
 
     squared: sp.Expr
@@ -67,7 +68,7 @@ class SpeedField:
 
 
 def conservative_speed(law: Forces, lam: sp.Symbol) -> SpeedField:
-    """W of a motion that loses nothing."""
+    """Return W for a motion without losses."""
     squared = V0**2 + tidy(2 * (law.effective_potential.xreplace({lam: LAM0}) - law.effective_potential))
     return SpeedField(squared=squared, form=CLOSED, gain=sp.S.One)
 
@@ -79,12 +80,12 @@ def dissipative_speed(
     loss: Dissipation,
     curve: Curve,
 ) -> SpeedField:
-    """W of a motion along one leg, in closed form where one is found."""
+    """Return W for a motion along one leg, in closed form if one is found."""
     lam = curve.parameter
     if not loss.linear:
         return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
     side = sp.Symbol("|κ|/κ", real=True)
-    # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
+    # The pieces of the law without the absolute values in σ, and their antiderivatives if these are known.
     table: dict[sp.Expr, tuple[sp.Expr, sp.Expr | None]] = {
         SIGMA * PUSH: (-kernel.inertia * law.effective_potential_slope, -kernel.inertia * law.effective_potential),
         SIGMA * LOAD: (law.pressure, None),
@@ -94,7 +95,7 @@ def dissipative_speed(
     drive, decay = (_Sum(form, table, shape.ds, lam) for form in (loss.drive, loss.decay))
     spent = decay.antiderivative()
     ground = drive.antiderivative() if not decay.rate else particular_solution(drive.rate, decay.rate, lam, _SIGNS)
-    # One sign on a leg, which ends where κ changes sign; it may begin where κ is zero.
+    # κ has one sign on a leg, which ends where κ changes sign; it may begin where κ is zero.
     signed = {side: sp.Abs(shape.kappa) / shape.kappa if shape.kappa else sp.S.Zero}
     if spent is not None and ground is not None:
         start = {lam: LAM0}
@@ -102,7 +103,7 @@ def dissipative_speed(
         launch = ground.xreplace(start)
         squared = V0**2 + tidy(ground - launch) if gain == 1 else ground + (V0**2 - launch) * gain
         squared = squared.xreplace(signed)
-        # A charted curve has no numbers before it is traced; the only closed forms on it are those of Φ and Θ.
+        # A charted curve has no coordinates before it is traced; the only closed forms on it are those of Φ and Θ.
         if curve.charted or _agrees(squared, loss, lam, curve.domain):
             return SpeedField(squared=squared, form=CLOSED, gain=gain)
     return SpeedField(squared=_quadrature(drive.rate.xreplace(signed), decay.rate, spent, lam), form=QUADRATURE)
@@ -112,7 +113,7 @@ _SIGNS = (DIRECTION, CONTACT_SIGN)
 
 
 class _Sum:
-    """A form in the pieces as a sum over what it takes of the curve."""
+    """A form in terms of the pieces, as a sum over the curve's quantities in it."""
 
     def __init__(
         self,
@@ -143,8 +144,10 @@ class _Sum:
 
 
 def _agrees(squared: sp.Expr, loss: Dissipation, lam: sp.Symbol, domain: tuple[sp.Expr | None, sp.Expr | None]) -> bool:
-    """Differentiate a closed form back, at a place of the curve and values of everything else."""
-    # Each apart: of a sum that is zero, no number of digits is enough for SymPy.
+    """Return whether the derivative of a closed form agrees with the law, at a place of the curve and at values of all
+    other symbols.
+    """
+    # Each term is evaluated separately, because no number of digits is enough for SymPy to evaluate a sum that is zero.
     terms = (differentiate(squared, lam), -loss.along(loss.drive), loss.along(loss.decay) * squared)
     named = [*terms, *(end for end in domain if end is not None)]
     free = sorted(set().union(*(form.free_symbols for form in named)) - {lam, LAM0, *_SIGNS}, key=str)
@@ -166,7 +169,7 @@ def _agrees(squared: sp.Expr, loss: Dissipation, lam: sp.Symbol, domain: tuple[s
 
 
 def _quadrature(drive: sp.Expr, decay: sp.Expr, spent: sp.Expr | None, lam: sp.Symbol) -> sp.Expr:
-    """Write W as an integral, of exponents that do not grow on the way."""
+    """Write W as an integral whose exponents do not grow along the motion."""
     between, inner = (sp.Symbol(f"{mark}{lam.name}", real=True) for mark in ("_", "__"))
 
     def loss(start: sp.Symbol) -> sp.Expr:

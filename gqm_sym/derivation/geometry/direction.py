@@ -33,7 +33,7 @@ from gqm_sym.errors import DeclarationError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Direction:
-    """A vector that is common/below times its ``parts``, which have no common factors, in a frame turned by ``frame``.
+    """A vector that is common/below times its ``parts``, which have no common factors, in a frame rotated by ``frame``.
 
     ``square`` is the sum of the squares of the parts.
     """
@@ -46,17 +46,17 @@ class Direction:
     below: Polynomial
 
     def scale(self, root: "Root") -> list[Power]:
-        """The factor of the parts, over the weight of the root."""
+        """Return the factor of the parts, divided by the weight of the root."""
         one = self.algebra.one
         return spell_product(self.algebra, self.common, self.below if root.weight == one else one)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Root:
-    """The length of the parts of a direction over a weight, as factors.
+    """The length of the parts of a direction divided by a weight, as factors.
 
-    ``square`` is the expression under the root if that is one factor, otherwise None. ``weight`` is what the parts were
-    divided by: a denominator of r' that then is no part of H.
+    ``square`` is the expression under the root if that is one factor, otherwise None. ``weight`` is the divisor of the
+    parts: a denominator of r' that is not included in H.
     """
 
     powers: list[Power]
@@ -65,7 +65,7 @@ class Root:
 
 
 def length_of(components: list[Fraction], algebra: Algebra, signs: Signs) -> list[Power]:
-    """The length of a vector with these components."""
+    """Return the length of a vector with these components."""
     if not any(component.top for component in components):
         return [(sp.S.Zero, 1)]
     vector = _without_common_factor(algebra, components, sp.S.Zero)
@@ -74,7 +74,7 @@ def length_of(components: list[Fraction], algebra: Algebra, signs: Signs) -> lis
 
 
 def direction_of(curve: Curve) -> Direction:
-    """dr/dλ of a curve, of a polar one along and across its radius."""
+    """Return dr/dλ of a curve; for a polar curve along and across its radius."""
     lam = curve.parameter
     if curve.radius is not None:
         return primitive(curve, (differentiate(curve.radius, lam), curve.radius), lam)
@@ -82,7 +82,7 @@ def direction_of(curve: Curve) -> Direction:
 
 
 def primitive(curve: Curve, components: Sequence[sp.Expr], frame: sp.Expr) -> Direction:
-    """The vector of some components, of which one is not zero, without their common factor."""
+    """Return the vector with the given components, at least one of which is not zero, without their common factor."""
     lam = curve.parameter
     halved: frozenset[Angle] = frozenset()
     while True:
@@ -100,7 +100,7 @@ def primitive(curve: Curve, components: Sequence[sp.Expr], frame: sp.Expr) -> Di
 
 
 def _without_common_factor(algebra: Algebra, fractions: Sequence[Fraction], frame: sp.Expr) -> Direction:
-    """A vector of fractions, not all of them zero, as a direction."""
+    """Return a vector of fractions, not all of which are zero, as a direction."""
     tops, below = [fractions[0].top], fractions[0].bottom
     for fraction in fractions[1:]:
         _, lacking, lacking_here = below.cofactors(fraction.bottom)
@@ -123,7 +123,7 @@ def _without_common_factor(algebra: Algebra, fractions: Sequence[Fraction], fram
 
 
 def root_of_sum(way: Direction, signs: Signs) -> Root:
-    """The length of the parts of a direction, written as is simplest."""
+    """Return the length of the parts of a direction in its simplest form."""
     algebra, one = way.algebra, way.algebra.one
     content, found = factors(algebra, way.square)
     number, written = spell_factors(algebra, found)
@@ -131,7 +131,7 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
     number *= content
     odd = [factor for factor, power in written if power % 2]
     if odd and number.is_negative:
-        # Both signs under one root: (a - x)*(a + x), not -(x - a)*(x + a).
+        # Both signs are put under one root: (a - x)*(a + x), not -(x - a)*(x + a).
         number, odd[0] = -number, -odd[0]
     known = [factor for factor in odd if known_sign(signs, factor) == 1]
     unknown = sp.Mul(*(factor for factor in odd if factor not in known))
@@ -146,7 +146,7 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
         halves = (parts[0] + parts[1], parts[0] - parts[1])
         sums.append(_sum_of_squares(algebra, [algebra.normal(half) for half in halves], one) / 2)
     else:
-        # So may components in a frame that turns about the z axis: the one with the fewest terms is written out.
+        # So may components in a frame that rotates about the z axis; the one with the fewest terms is written out.
         frames = [(along, across, parts[2]) for _, along, across in in_turning_frames(algebra, parts[0], parts[1])]
         frame = min(frames, key=lambda frame: sum(map(len, frame)), default=parts)
         if sum(map(len, frame)) < sum(map(len, parts)):
@@ -155,7 +155,7 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
     if all(is_safe(signs, factor) for factor in odd) and text <= sp.count_ops(sp.sqrt(kept)):
         return Root(powers=whole, square=None, weight=one)
     for part in parts:
-        # A graph: 1 + (dz/dx)², which also overflows later than with its denominator cleared.
+        # For a graph this is 1 + (dz/dx)², which also overflows later than with its denominator cleared.
         if way.below != one and algebra.reduced(Fraction(part, way.below)).top.is_ground:
             square = _sum_of_squares(algebra, parts, way.below)
             return Root(powers=[(sp.sqrt(square), 1)], square=square, weight=way.below)
@@ -167,12 +167,12 @@ def _sum_of_squares(algebra: Algebra, parts: Sequence[Polynomial], weight: Polyn
 
 
 def inverse_of(powers: Iterable[Power]) -> list[Power]:
-    """One over a product of powers."""
+    """Return the inverse of a product of powers."""
     return [(base, -power) for base, power in powers]
 
 
 def change_of(way: Direction, pair: tuple[int, int]) -> Fraction:
-    """The change u v' - v u' of two parts; in a frame that turns, with what its turning adds."""
+    """Return u v' - v u' for two parts; in a rotating frame, including the contribution of its rotation."""
     algebra, one = way.algebra, way.algebra.one
     first, second = (way.parts[k] for k in pair)
     change = algebra.add(

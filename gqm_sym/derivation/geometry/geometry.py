@@ -51,7 +51,7 @@ PAIRS = ((1, 2), (2, 0), (0, 1))
 
 
 def cross(one: Sequence[sp.Expr], other: Sequence[sp.Expr]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """The vector product of two vectors."""
+    """Return the vector product of two vectors."""
     along_x, along_y, along_z = (one[i] * other[j] - one[j] * other[i] for i, j in PAIRS)
     return along_x, along_y, along_z
 
@@ -65,20 +65,20 @@ class Geometry:
     along, across, size, per_length
         dx/dλ = size·along, dz/dλ = size·across, dx/ds = along·per_length, dz/ds likewise.
     ds, dxds, dzds, kappa
-        σ, the unit tangent and the signed curvature.
+        σ, the components of the unit tangent, and the signed curvature.
     turning_rate, angle
-        dΘ/dλ, and an angle of the tangent, without jumps where that could be proved.
+        dΘ/dλ, and an angle of the tangent, without jumps if that could be proved.
     cusp
         A factor of σ that vanishes at the cusps and changes sign there, or None.
     positive
-        Parameters promised or taken to be positive.
+        Parameters that are declared or taken to be positive.
     notes
-        What was left unsimplified, and why.
+        Remarks on forms that were not simplified, with the reason.
     heading
         Cosine and sine of the angle from the x axis to the plane of a curve in a vertical plane; ``along`` and ``dxds``
         are measured along that plane. None for a curve that lies in no vertical plane.
     sideways, dyds, turning
-        Of a curve in no vertical plane: dy/dλ = size·sideways, dy/ds, and the components of t × dt/dλ. ``kappa`` and
+        For a curve in no vertical plane: dy/dλ = size·sideways, dy/ds, and the components of t × dt/dλ. ``kappa`` and
         ``turning_rate`` are then the lengths of t × dt/ds and t × dt/dλ, and there is no ``angle``.
     """
 
@@ -110,7 +110,9 @@ class Geometry:
 
     @property
     def normal(self) -> tuple[sp.Expr, ...]:
-        """The unit normal to the left of the tangent in a vertical plane, along x, y and z; empty outside of one."""
+        """The unit normal to the left of the tangent in a vertical plane, along x, y and z; empty for a curve in no
+        vertical plane.
+        """
         if self.heading is None:
             return ()
         cosine, sine = self.heading
@@ -118,7 +120,7 @@ class Geometry:
 
     @property
     def bend(self) -> tuple[sp.Expr, ...]:
-        """The components of the curvature as a vector along the binormal, t × dt/ds; empty in a vertical plane."""
+        """The components of t × dt/ds, the curvature as a vector along the binormal; empty in a vertical plane."""
         return tuple(part / self.ds for part in self.turning)
 
 
@@ -130,14 +132,15 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...], heading: Heading
     curve
         The declaration.
     may_be_positive
-        Parameters that may be taken as positive where |parameter| would stand otherwise.
+        Parameters that may be taken as positive to avoid their absolute values.
     heading
-        Of a space curve: the vertical plane that it is in (`vertical_plane`); None for a shape in space.
+        For a space curve, the vertical plane in which it lies (`vertical_plane`); None for a shape in space.
     """
     if curve.charted:
         return _charted(curve)
     if curve.in_space and heading is not None:
-        # In the plane: the distance along it, which is a coordinate over the cosine or the sine, and the height.
+        # In the plane the coordinates are the height and the distance along the plane, which is x or y divided by the
+        # cosine or the sine.
         cosine, sine = heading
         distance = curve.x / cosine if cosine else curve.y / sine
         flat = replace(curve, kind="parametric", x=distance, y=sp.S.Zero)
@@ -155,9 +158,10 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...], heading: Heading
 
 
 def vertical_plane(curve: Curve) -> Heading | None:
-    """Cosine and sine of the angle from the x axis to the vertical plane that a curve is in.
+    """Return cosine and sine of the angle from the x axis to the vertical plane in which a curve lies.
 
-    None where it is in none, or that cannot be seen: it is too long, or known by numbers only.
+    The result is None if it lies in none, or if that cannot be decided because the forms are too long or known as
+    numbers only.
     """
     if curve.charted:
         return None
@@ -180,7 +184,7 @@ def vertical_plane(curve: Curve) -> Heading | None:
 
 
 def _charted(curve: Curve) -> Geometry:
-    """Read the shape from the chart: its parameter is arc length."""
+    """Read the shape from the chart, whose parameter is arc length."""
     s, one = curve.parameter, sp.S.One
     if curve.in_space:
         first, second = ([SPACE_ROWS[axis][order](s) for axis in AXES] for order in (1, 2))
@@ -192,7 +196,7 @@ def _charted(curve: Curve) -> Geometry:
 
 
 def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:
-    """Write the definitions down as they are."""
+    """Return the shape by its definitions, without simplification."""
     lam = curve.parameter
     first = [differentiate(form, lam) for form in (curve.x, curve.y, curve.z)]
     second = [differentiate(form, lam) for form in first]
@@ -216,7 +220,7 @@ def _undivided(
     angle: sp.Expr | None = None,
     turning: tuple[sp.Expr, ...] = (),
 ) -> Geometry:
-    """A shape of which the components of dr/dλ are not divided by anything, with σ and dΘ/dλ."""
+    """Return a shape whose components of dr/dλ are not divided by a common factor, given σ and dΘ/dλ."""
     along, sideways, across = first
     return Geometry(
         along=along,
@@ -309,7 +313,7 @@ def _turning_rate(way: Direction, root: Root, pair: tuple[int, int]) -> list[Pow
     reduced = spell_quotient(algebra, rate.top, rate.bottom)
     if root.square is None or rate.bottom.is_ground or not rate.top:
         return reduced
-    # Divided by the same factor that is in σ, so that both powers become one.
+    # It is divided by the same factor as in σ, so that both powers are combined.
     weight = algebra.times(root.weight, root.weight)
     part = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, weight)))
     shared = [*spell_quotient(algebra, part.top, part.bottom), (root.square, -1)]

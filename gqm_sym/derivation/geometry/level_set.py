@@ -12,7 +12,7 @@ from gqm_sym.errors import DeclarationError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelSet:
-    """F and what follows from it, in x, z and run-time parameters.
+    """F and the functions that follow from it, in terms of x, z and run-time parameters.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class LevelSet:
     along, across
         The unit tangent: (-F_z, F_x)/|grad F|, or the opposite.
     kappa
-        The signed curvature that belongs to it.
+        The signed curvature for this tangent.
     """
 
     level: Level
@@ -45,7 +45,7 @@ class LevelSet:
         return (self.value, self.slope_x, self.slope_z, self.bend_xx, self.bend_xz, self.bend_zz)
 
     def closed_forms(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The forms as they are printed."""
+        """Return the forms as they are printed."""
         return (
             ("F", self.value),
             ("dF/dx", self.slope_x),
@@ -57,7 +57,7 @@ class LevelSet:
 
     @property
     def note(self) -> str:
-        """The rows of the chart that follow from them."""
+        """A remark on the rows of the chart, which follow from these forms."""
         x, z = self.level.start
         sign = "" if self.level.tangent > 0 else "-"
         return (

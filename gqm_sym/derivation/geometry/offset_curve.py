@@ -11,8 +11,8 @@ from gqm_sym.derivation.geometry.geometry import Geometry
 def offset_curve(x: sp.Expr, z: sp.Expr, shape: Geometry, radius: sp.Expr) -> tuple[sp.Expr, sp.Expr, Geometry]:
     """Return the curve at a distance to the left of another, in the same parameter (MATHS, section 2).
 
-    Its tangent is that of the track, its arc ``1 - kappa*radius`` times as long: where that is not positive, the body
-    does not fit.
+    Its tangent is that of the track, and its arc length element is ``1 - kappa*radius`` times that of the track; where
+    this is not positive, the body does not fit.
     """
     if not radius:
         return x, z, shape

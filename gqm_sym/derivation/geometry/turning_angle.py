@@ -9,15 +9,15 @@ from gqm_sym.derivation.algebra.generators import Pair
 from gqm_sym.derivation.algebra.rewrite import product, spell_ratio
 from gqm_sym.derivation.algebra.signs import Signs
 
-# Frames turning with up to so many times an angle of the curve are tried.
+# Frames that rotate with up to so many times an angle of the curve are tried.
 MAX_TURNS = 4
 
 
 def tangent_angle(algebra: Algebra, parts: tuple[Polynomial, ...], weight: Polynomial, signs: Signs) -> sp.Expr:
     """Return the angle of two parts over a weight, up to a constant.
 
-    Where one component, seen in a frame that turns evenly, never vanishes, it is that frame's
-    angle and an arc tangent; else an ``atan2``, whose jumps by 2π whoever evaluates it must undo.
+    If one component in a uniformly rotating frame never vanishes, the result is the angle of that frame plus an arc
+    tangent; otherwise it is an ``atan2``, whose jumps by 2π must be removed when it is evaluated.
     """
     first, second = parts
     u, v = (product(spell_ratio(algebra, part, weight)) for part in parts)
@@ -34,10 +34,10 @@ def tangent_angle(algebra: Algebra, parts: tuple[Polynomial, ...], weight: Polyn
 def in_turning_frames(
     algebra: Algebra, first: Polynomial, second: Polynomial
 ) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
-    """Yield (u, v) as seen in frames that turn with multiples of an angle of the curve's own."""
+    """Yield (u, v) in frames that rotate with multiples of an angle of the curve."""
     parts = (first, second)
     used = [pair for pair in algebra.pairs if any(pair.degree(monomial) for part in parts for monomial in part)]
-    # With several angles no such frame has been seen to help.
+    # With several angles such a frame is not known to help.
     for pair in used if len(used) == 1 else ():
         if pair.sign < 0:
             continue
@@ -51,7 +51,7 @@ def in_turning_frames(
 
 
 def _is_definite(algebra: Algebra, signs: Signs, polynomial: Polynomial) -> bool:
-    """Whether a form like a s² + b c² is proved to vanish nowhere by the signs of its terms."""
+    """Return whether a form such as a s² + b c² is proved to vanish nowhere by the signs of its terms."""
     return any(_definite_in(algebra, pair, signs, polynomial) for pair in algebra.pairs)
 
 

@@ -5,9 +5,9 @@ ones of Y = tanh(k d/4)**2, and even powers of d are powers of Y = d**2. With Y 
 moves as sqrt(T)*sin(u), and V**2 = (T - Y)*D with the divided difference D = U2[Y, T], where U2 is twice the effective
 potential. So the time is the integral over u of the square root of (ds/dy)**2/D, which contains no sine of u. For a
 pendulum it is the elliptic integral after Landen's transformation, for which the trapezoidal rule needs no more nodes
-than in the angle itself. Where D/(ds/dy)**2 is linear in the square of the sine, as for the pendulum and for Duffing's
-oscillator, the integral is a complete elliptic one of the first kind, which is given by Gauss's arithmetic-geometric
-mean.
+than in the angle itself. If D/(ds/dy)**2 is linear in the square of the sine, as for the pendulum and for Duffing's
+oscillator, the integral is a complete elliptic integral of the first kind, which Gauss's arithmetic-geometric mean
+gives.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,10 +19,10 @@ import sympy as sp
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.wells.symmetry import MAX_OPERATIONS, Symmetry, is_half_turn
 
-# How much of the growth of U2 with a square must be left at the turning point, as a share of the size of its terms.
+# The smallest growth of U2 with a square that must remain at the turning point, as a share of the size of its terms.
 MIN_GROWTH = sp.Rational(1, 4)
 
-# A sine or cosine is written by powers of the slowest one if its rate is at most this multiple of that one's.
+# A sine or cosine is written in powers of the slowest one if its rate is at most this multiple of the slowest rate.
 MAX_MULTIPLE = 8
 
 # The highest degree of a polynomial in the square of a sine that is evaluated: of higher ones the powers cancel.
@@ -33,18 +33,18 @@ def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(f"_{name}", real=True)
 
 
-# Of one place of an orbit: Y, 1 - Y, T - Y, 1 - Y*T.
+# Symbols for one place of an orbit: Y, 1 - Y, T - Y, 1 - Y*T.
 Y, ONE_MINUS_Y, T_MINUS_Y, ONE_MINUS_YT = (_symbol(name) for name in ("y", "one_minus_y", "t_minus_y", "one_minus_yt"))
 
-# Of the whole orbit: half its width; T, which is Y at its ends, 1 - T, 1 - T**2; the square of the sine there, and the
-# fourth power of the cosine of half its argument.
+# Symbols for the whole orbit: half its width; T, which is Y at its ends, 1 - T, 1 - T**2; the square of the sine there,
+# and the fourth power of the cosine of half its argument.
 HALF, T, ONE_MINUS_T, ONE_MINUS_TT = (_symbol(name) for name in ("half", "t", "one_minus_t", "one_minus_tt"))
 SINE_SQUARED, COSINE_FOURTH = _symbol("sine_squared"), _symbol("cosine_fourth")
 
-# Of a launch: the distance from the axis, and V**2 there.
+# Symbols for a launch: the distance from the axis, and V**2 there.
 OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
 
-# For intermediate results: the squares of the sine and of the cosine of half the argument.
+# Symbols for intermediate results: the squares of the sine and of the cosine of half the argument.
 _SINE, _COSINE = _symbol("sine"), _symbol("cosine")
 
 
@@ -62,14 +62,13 @@ class SymmetricOrbits:
     invariants
         The symbols of the whole orbit, each with its value as a function of HALF.
     turning_point
-        As functions of OFFSET and LAUNCH: half the orbit's width; by how much U2 grows with the square in which it is
-        written, that of a sine or of the distance; and the square of the sine at the turning point, which is above 1
-        where the body passes over the barrier (0 for other squares). Where the second is positive, U2 grows all the way
-        from the axis to the turning point. None where U2 has a third or higher power of that square, or is not a
-        polynomial.
+        As functions of OFFSET and LAUNCH: half the orbit's width; the growth of U2 per unit of the square in which it
+        is written, that of a sine or of the distance; and the square of the sine at the turning point, which is above 1
+        if the body passes over the barrier (0 for other squares). If the second is positive, U2 grows all the way from
+        the axis to the turning point. None if U2 has a third or higher power of that square, or is not a polynomial.
     agm_arguments
-        Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None
-        where it is not a complete elliptic integral of the first kind.
+        Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None if
+        the time is not a complete elliptic integral of the first kind.
     """
 
     time_integrand: sp.Expr | None
@@ -94,7 +93,7 @@ _CIRCULAR, _HYPERBOLIC = _Waves(sp.sin, sp.cos, -1), _Waves(sp.sinh, sp.cosh, 1)
 def symmetric_orbits(
     potential: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
 ) -> SymmetricOrbits | None:
-    """Return the time of orbits about an axis of symmetry; None where there is no such axis or coordinate.
+    """Return the time of orbits about an axis of symmetry; None if there is no such axis or coordinate.
 
     Parameters
     ----------
@@ -160,10 +159,11 @@ def symmetric_orbits(
 
 
 def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) -> tuple[sp.Expr | None, sp.Expr]:
-    """The square at the turning point, and by how much U2 grows with it; None where that takes more than a root.
+    """Return the square at the turning point, and the growth of U2 per unit of the square; None if that is not the
+    solution of a quadratic equation.
 
-    Where U2 is not known to be ``monotone``, the growth is the smaller one of those at the axis and at the turning
-    point, less a margin within which the root would lose digits: a linear function has its extremes at the ends.
+    If U2 is not known to be ``monotone``, the growth is the smaller one of those at the axis and at the turning point,
+    less a margin within which the root would lose digits; as a linear function, it has its extremes at the ends.
     """
     if not 0 < _degree(height, {square}) <= 2:
         return None, sp.S.Zero
@@ -181,7 +181,9 @@ def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) ->
 
 
 def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """The symbols of one place, where Y = ``sine2``*T and ``sine2 + cosine2`` = 1, as sums without cancellation."""
+    """Return the symbols of one place, where Y = ``sine2``*T and ``sine2 + cosine2`` = 1, as sums without
+    cancellation.
+    """
     return {
         Y: invariants.get(T, T) * sine2,
         T_MINUS_Y: invariants.get(T, T) * cosine2,
@@ -191,7 +193,9 @@ def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: s
 
 
 def _degree(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
-    """The degree of a polynomial as it is written, since expanding it may take very long; infinite for other forms."""
+    """Return the degree of a polynomial as it is written, because expanding it may take very long; infinity for other
+    forms.
+    """
     if not form.free_symbols & symbols:
         return 0
     if form.is_Symbol:
@@ -211,7 +215,7 @@ def _with_agm(
     invariants: tuple[tuple[sp.Symbol, sp.Expr], ...],
     turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
 ) -> SymmetricOrbits:
-    """The record, with the arguments of the arithmetic-geometric mean where there are any."""
+    """Return the record, with the arguments of the arithmetic-geometric mean if there are any."""
     if integrand is None:
         return SymmetricOrbits(None, divisor, invariants, turning_point, None)
     sine2, cosine2 = _symbol("sine2"), _symbol("cosine2")
@@ -224,14 +228,14 @@ def _with_agm(
 
 
 def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:
-    """``height[square, top]``; 0 where the height is constant."""
+    """Return ``height[square, top]``; 0 if the height is constant."""
     difference = Differences(square, (square, top), {(0, 1): gap}).first(height, 0, 1)
-    # Products are written out: their terms may cancel, as those of cos**2 and sin**2 do.
+    # Products are expanded, because their terms may cancel, as those of cos**2 and sin**2 do.
     return sp.Mul(*(sp.expand(f) if f.is_polynomial(square, top) else f for f in sp.Mul.make_args(difference)))
 
 
 def _even(form: sp.Expr | None, root: sp.Symbol, square: sp.Expr) -> sp.Expr | None:
-    """A form that has only even powers of ``root``, in terms of its square; None where it has others."""
+    """Return a form that has only even powers of ``root`` in terms of its square; None if it has other powers."""
     for f in () if form is None else (form, sp.expand(form)):
         found = f.replace(
             lambda t: t.is_Pow and t.base == root and t.exp.is_Integer and t.exp % 2 == 0,
@@ -243,7 +247,9 @@ def _even(form: sp.Expr | None, root: sp.Symbol, square: sp.Expr) -> sp.Expr | N
 
 
 def _of_waves(forms: Sequence[sp.Expr], d: sp.Symbol, waves: _Waves) -> tuple[sp.Expr, sp.Expr, sp.Expr] | None:
-    """A rate for which the forms are functions of the square of a sine, and these functions; None if there is none."""
+    """Return a rate for which the forms are functions of the square of a sine, and these functions; None if there is
+    none.
+    """
     calls = {call for form in forms for call in form.atoms(waves.sine, waves.cosine) if call.has(d)}
     shifted = {call: call.func(sp.expand(call.args[0])) for call in calls}
     forms = [form.xreplace(shifted) for form in forms]
@@ -266,7 +272,7 @@ def _of_waves(forms: Sequence[sp.Expr], d: sp.Symbol, waves: _Waves) -> tuple[sp
     }
     even = [_even(form.xreplace(by_first), s, s2) for form in forms]
     squares = [_even(form, c, c2) for form in even]
-    # Where only squares appear, they are functions of twice the rate.
+    # If only squares appear, they are functions of twice the rate.
     if None in squares:
         rate, found, names = common * first, even, {c: _COSINE + waves.sign * _SINE, s2: 4 * _SINE * _COSINE}
     else:

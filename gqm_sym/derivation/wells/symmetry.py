@@ -1,4 +1,4 @@
-"""Places about which a well and its curve are even: orbits around one are their own mirror images."""
+"""Places about which a well and its curve are even, so that orbits around them are their own mirror images."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from itertools import islice
 
 import sympy as sp
 
-# Longer forms are not looked at, and only forms of so many operations are written out to find their symmetry.
+# Longer forms are not examined, and only forms with at most so many operations are expanded to find their symmetry.
 MAX_LENGTH, MAX_OPERATIONS = 1000, 200
 _WAVES = (sp.sin, sp.cos)
 
@@ -20,10 +20,11 @@ class Symmetry:
     place
         One such place.
     step
-        From each to the next, None for a lone one: two mirrors make one of every multiple of their distance.
+        The distance from each place to the next, None for a single one; two places of symmetry imply one at every
+        multiple of their distance.
     monotone
-        Whether the potential is proved to rise or fall all the way between two of them that are neighbours, on a path
-        on which σ is nowhere negative.
+        Whether the potential is proved to be monotone between two neighbouring places, on a path on which σ is nowhere
+        negative.
     """
 
     place: sp.Expr
@@ -32,7 +33,7 @@ class Symmetry:
 
 
 def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
-    """Return where the effective potential and ds are even; None where no such place was found.
+    """Return the places about which the effective potential and ds are even; None if none was found.
 
     The candidates are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines,
     0, and the centre that follows from the two highest powers of a polynomial.
@@ -48,7 +49,7 @@ def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) ->
 
 
 def _is_longer(form: sp.Expr, length: int) -> bool:
-    """Whether a form has more parts, written out; found without going through all of them."""
+    """Return whether a form has more than ``length`` parts when it is expanded, without visiting all of them."""
     return next(islice(sp.preorder_traversal(form), length, None), None) is not None
 
 
@@ -78,12 +79,14 @@ def _is_even(form: sp.Expr, lam: sp.Symbol, place: sp.Expr) -> bool:
 
 
 def is_half_turn(step: sp.Expr | None, rate: sp.Expr) -> bool:
-    """Whether a step is half a turn of a wave of this rate."""
+    """Return whether a step is half a period of a sine of this rate."""
     return step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
 
 
 def _only_there(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | None) -> bool:
-    """Whether a slope vanishes at places of symmetry and nowhere else: a wave, a power, or a hyperbolic sine."""
+    """Return whether a slope vanishes at places of symmetry and nowhere else, as a sine, a power or a hyperbolic sine
+    does.
+    """
     shape = slope.as_independent(lam, as_Add=False)[1]
     if shape.xreplace({lam: place}) != 0:
         return False

@@ -190,7 +190,7 @@ class Traced:
         """Return the start point, moved onto the curve: x and z as two doubles each."""
         x, z = (float(c) for c in self.start(FLOATS, p))
         if not (isfinite(x) and isfinite(z)):
-            raise LaunchError(f"start: ({x!r}, {z!r}) is no finite point; give one on the curve")
+            raise LaunchError(f"start: ({x!r}, {z!r}) is not a finite point; give one on the curve")
         size = max(abs(x), abs(z)) or 1.0
         at = np.array([x, 0.0, z, 0.0])
         moved, regular = inf, True

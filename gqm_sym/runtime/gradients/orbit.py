@@ -138,7 +138,7 @@ class OrbitDerivatives(ABC):
         rows : tuple of int
             The variables; there is a derivative for each of their pairs, in the order of `second_programs.pairs_of`.
         """
-        raise SolutionError("gradient: second derivatives along curves without formulas are not there yet")
+        raise SolutionError("gradient: there are no second derivatives along curves without formulas yet")
 
     @property
     def action(self) -> float:

@@ -160,6 +160,25 @@ def states_along_legs(record, p, t, out, begin, end):  # type: ignore[no-untyped
     find_states(record, p, t, out, begin, end)
 
 
+@entry(types.float64(VECTOR, types.float64))
+def place_on_leg(record, t):  # type: ignore[no-untyped-def]
+    """Return the curve parameter at one time."""
+    pair = np.empty(2)
+    pair[0] = t
+    find_places(record, pair[:1], pair[1:], 0, 1)
+    return pair[1]
+
+
+@entry(types.UniTuple(types.float64, 10)(VECTOR, VECTOR, types.float64))
+def state_on_leg(record, p, t):  # type: ignore[no-untyped-def]
+    """Return the time, and the nine numbers of `find_states` at it."""
+    when, out = np.empty(1), np.empty((9, 1))
+    when[0] = t
+    find_states(record, p, when, out, 0, 1)
+    r = out.reshape(-1)
+    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
+
+
 @entry(types.void(VECTOR, VECTOR, MATRIX))
 def phases_along_legs(record, t, out):  # type: ignore[no-untyped-def]
     """Fill rows for times: the number of the interval, the phase angle, and the velocity."""

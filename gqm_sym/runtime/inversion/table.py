@@ -16,7 +16,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.buffers import longer, taller
 from gqm_sym.runtime.compiled.intrinsics import fma, item_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE, derivative
 
 # The number of coefficients of a segment's polynomial, and the index of the last one.
@@ -28,6 +28,17 @@ LAST = TERMS - 1
 # table.
 _HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 * LAST) - LAST)
 COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
+
+
+def _chebyshev() -> Array:
+    """Return the coefficients of the Chebyshev polynomials in powers of x: those of degree j in row j."""
+    rows = np.eye(TERMS)
+    for j in range(2, TERMS):
+        rows[j] = np.append(0.0, 2.0 * rows[j - 1, :-1]) - rows[j - 2]
+    return rows
+
+
+CHEBYSHEV = _chebyshev()
 
 # A fit is resolved when its last two coefficients are below this share of the largest phase angle.
 MAX_TAIL_RATIO = 2e-16
@@ -217,23 +228,11 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 
     No digits are lost, because the coefficients fall fast.
     """
-    n = c.size
-    one, two = np.zeros(n), np.zeros(n)
-    out[:] = 0.0
-    one[0] = 1.0
-    out[0] = c[0]
-    two[1] = 1.0
-    out[1] = c[1]
-    for j in range(2, n):
-        # one, two <- T_(j-1), T_j
-        previous = one.copy()
-        for i in range(n):
-            one[i] = two[i]
-        two[0] = -previous[0]
-        for i in range(1, n):
-            two[i] = 2.0 * one[i - 1] - previous[i]
-        for i in range(n):
-            out[i] += c[j] * two[i]
+    for i in range(TERMS):
+        out[i] = 0.0
+    for j in range(TERMS):
+        for i in range(TERMS):
+            out[i] += c[j] * CHEBYSHEV[j, i]
 
 
 @Inner

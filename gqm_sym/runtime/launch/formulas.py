@@ -52,6 +52,8 @@ class ParameterValues(tuple[Number, ...]):
         only.
     columns : tuple of lists of arrays or None
         The columns of sweeps with these values (`sweep.columns`), once one has been asked for.
+    conditions : dict
+        What is the same for all legs with losses (`legs.driver.Conditions`), by contact, once it has been asked for.
     """
 
     values: Array
@@ -60,6 +62,7 @@ class ParameterValues(tuple[Number, ...]):
     tape: Any = None
     true_pieces: Any = None
     columns: Any = None
+    conditions: dict[str, Any]
 
 
 def shape_of(maker: ChartMaker, values: tuple[Any, ...], other: Any) -> tuple[Any, ...]:
@@ -236,6 +239,7 @@ class Formulas:
         self._check_lower_limits(dict(zip(self.parameters, out, strict=True)))
         p = ParameterValues(out)
         p.values = np.array([*(number.value for number in out), *self.trigonometric_values(out)])
+        p.conditions = {}
         return p
 
     def trigonometric_over(self, operations: Any, p: tuple[Any, ...]) -> tuple[Any, ...]:

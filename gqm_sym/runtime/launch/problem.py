@@ -53,17 +53,24 @@ class Problem:
         The launch of the motion.
     p : ParameterValues
         The exact values of the run-time parameters.
-    functions : BoundFunctions
-        The compiled functions bound to these values.
     domain : Domain
         The range of the curve parameter.
+    bound : BoundFunctions, optional
+        The compiled functions bound to these values; by default they are bound when they are first needed.
     """
 
     formulas: Formulas
     launch: Launch
     p: ParameterValues
-    functions: BoundFunctions
     domain: Domain
+    bound: BoundFunctions | None = None
+
+    @property
+    def functions(self) -> BoundFunctions:
+        """The compiled functions bound to these values, with the launch in extended precision where there is such."""
+        if self.bound is None:
+            self.bound = bind(self.formulas, self.p, self.launch)
+        return self.bound
 
     @property
     def low(self) -> float:

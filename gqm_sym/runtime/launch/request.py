@@ -98,7 +98,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
             f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way"
         )
     if speed.value > MAX_SPEED:
-        raise LaunchError(f"v0: must be at most {MAX_SPEED:g} m/s, for its square is computed with, got {speed.text}")
+        raise LaunchError(f"v0: must be at most {MAX_SPEED:g} m/s, because its square is computed, got {speed.text}")
     horizon = None if t_max is None else read_number(t_max, where="t_max", unit="s")
     if horizon is not None and not horizon.value > 0.0:
         raise LaunchError(f"t_max: must be positive, got {horizon.text}")
@@ -108,7 +108,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         raise LaunchError(f"lam0: must lie in the domain {ends} of {formulas.parameter}, got {place.text}")
     if domain.period and abs(place.value) > MAX_LAPS * domain.period:
         raise LaunchError(
-            f"lam0: {place.text} is so many laps away that doubles cannot tell places there; the curve repeats after "
+            f"lam0: {place.text} is so many laps away that doubles cannot tell places apart; the curve repeats after "
             f"{domain.period!r}"
         )
     return Launch(place, speed, direction, contact, horizon, at)
@@ -147,7 +147,7 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
             "direction by Curve.space(..., roll=...), as an angle (0 is level) or for a speed; without it the body is "
             "held from all sides, which is 'bilateral'"
             if not formulas.directed
-            else f"contact: {contact!r} is not known in a frame that turns about a space curve; leave it 'bilateral'"
+            else f"contact: {contact!r} is not defined in a frame that turns about a space curve; leave it 'bilateral'"
         )
 
 

@@ -91,7 +91,7 @@ def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction
     assert rows is not None
     if (vertical := rows[-1] < MIN_LEVEL).any():
         raise SolutionError(
-            f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[vertical][0])!r}, where no level is "
-            "there to measure a roll angle from; declare roll='coordinated'"
+            f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[vertical][0])!r}, where there is no "
+            "level to measure a roll angle from; declare roll='coordinated'"
         )
     return rows[:-1]

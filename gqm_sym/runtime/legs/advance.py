@@ -273,7 +273,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
     gaps = gaps_on_leg(dissipation, joints, reading)
-    limit = place + direction * (LAPS_AHEAD if gaps.size == 0 else 1) * period if period > 0.0 else end
+    limit = place + direction * (LAPS_AHEAD if joints.gaps.size == 0 else 1) * period if period > 0.0 else end
     drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
     limit = drops[0] if drops.size else limit
     # Breaks a little behind the body show on which piece of the curve it is, and one at the limit shows the end of that

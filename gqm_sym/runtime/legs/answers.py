@@ -32,6 +32,7 @@ from gqm_sym.runtime.legs.body import (
     HORIZON,
     LAM0,
     LAPS,
+    LEAST_SIZE,
     MAY_REST,
     ONLY_SIGN,
     PANEL_COUNT,
@@ -236,12 +237,12 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
 
 
 @Inner
-def is_tiny(record):  # type: ignore[no-untyped-def]
+def is_tiny(record, least_size):  # type: ignore[no-untyped-def]
     """Return whether a leg is so short that the next one may have to be followed by the distance from an equilibrium,
     or cannot be followed at all.
     """
     start, end = record[START], record[END]
-    return fabs(end - start) < SMALL_SHARE * fabs(end) or max(fabs(start), fabs(end)) < LEAST_SWING
+    return fabs(end - start) < SMALL_SHARE * max(fabs(end), least_size) or max(fabs(start), fabs(end)) < LEAST_SWING
 
 
 @Inner
@@ -274,7 +275,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
             break
         count += 1
         body[PANEL_COUNT] += 1.0 + records[count - 1, AHEAD] + records[count - 1, BACK]
-        body[STATUS] = 1.0 if is_tiny(records[count - 1]) else 0.0
+        body[STATUS] = 1.0 if is_tiny(records[count - 1], body[LEAST_SIZE]) else 0.0
         if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
     body[VALUE] = count

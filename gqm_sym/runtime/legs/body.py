@@ -35,6 +35,7 @@ MAY_REST              whether the body could stay at its last turn, were the cur
 FROM_REST             1 if the launch was from rest
 ENDING                the code of what has ended the motion (`advance`), or 0
 PANEL_COUNT           how many panels the records of the legs had, with one more for each (counted for `solve`)
+LEAST_SIZE            a size of places below which their roundings do not decrease; 0 on a curve with formulas
 VALUE, STATUS         the quantity that was asked for, and whether it has a value (`answers`)
 ===================== ===========================================================================================
 """
@@ -48,7 +49,7 @@ from gqm_sym.runtime.compiled.types import Array
 LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
-LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, VALUE, STATUS, SIZE = range(26, 35)
+LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS, SIZE = range(26, 36)
 
 
 def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:

@@ -11,7 +11,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
-from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
+from gqm_sym.runtime.inversion.leg_tables import place_on_leg, places_along_legs, state_on_leg, states_along_legs
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import Launch
@@ -58,7 +58,7 @@ EXTENSION = 1.25
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """Return the motion of a launch with dissipative forces."""
-    problem = Problem(formulas, launch, p, bind_all(formulas, p), formulas.domain(p))
+    problem = Problem(formulas, launch, p, formulas.domain(p), bind_all(formulas, p))
     motion = DissipativeMotion(problem)
     return motion if motion.direction else MotionAtRest(problem)
 
@@ -73,11 +73,10 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
     return v2
 
 
-def _plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Return times from launch on as doubles, with the smallest and the largest; None if they are not such numbers."""
-    time = plain_time(t)
-    times = plain_times(t) if time is None else (np.array([time]), time, time)
-    return times if times is not None and 0.0 <= times[1] <= times[2] < inf else None
+def _times_from_launch(t: Any) -> tuple[Array, float] | None:
+    """Return an array of times from launch on as doubles, with the largest; None if they are not such numbers."""
+    times = plain_times(t)
+    return (times[0], times[2]) if times is not None and 0.0 <= times[1] <= times[2] < inf else None
 
 
 class Reading(NamedTuple):
@@ -152,34 +151,47 @@ class DissipativeMotion(FollowedMotion):
 
     def lam(self, t: Any) -> Any:
         """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
-        times = _plain_times(t)
+        one = self._one_time(t, errors=False)
+        if one is not None:
+            return place_on_leg(*one)
+        times = _times_from_launch(t)
         if times is None:
             return super().lam(t)
-        out = self._read(*times, 1, self._read_places, super().lam)[0]
-        return out.reshape(times[0].shape) if np.ndim(t) else float(out[0])
+        return self._read(*times, 1, self._read_places, super().lam)[0].reshape(times[0].shape)
 
     def state(self, t: Any) -> State:
         """Return the state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
-        times = _plain_times(t)
-        if times is None or (self.problem.formulas.path_in_space is not None and self.problem.period):
+        in_space = self.problem.formulas.path_in_space is not None
+        if in_space and self.problem.period:
+            return super().state(t)
+        one = self._one_time(t, errors=True)
+        if one is not None:
+            found = state_on_leg(one[0], self.problem.functions.p, one[1])
+            return State(*found) if not in_space else self._state_of(one[1], np.array(found[1:]).reshape(-1, 1))
+        times = _times_from_launch(t)
+        if times is None:
             return super().state(t)
 
         def by_segments(later: Array) -> Array:
             return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
 
-        out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
-        if not np.ndim(t) and self.problem.formulas.path_in_space is None:
-            return State(float(times[0][0]), *out[:, 0].tolist())
-        return self._state_of(times[0] if np.ndim(t) else float(times[0][0]), out)
+        return self._state_of(times[0], self._read(*times, STATE_ROWS, self._read_states, by_segments))
 
     def error_bound(self, t: Any) -> Any:
-        """Return a bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
-        return super().error_bound(t) if _plain_times(t) is None else self.state(t).error
+        """Return a bound of the error of ``lam(t)``; see `Motion.error_bound`."""
+        return self.state(t).error
+
+    def _one_time(self, t: Any, errors: bool) -> tuple[Array, float] | None:
+        """Return the record that compiled code reads at a single time, and the time; None for any other times."""
+        time = plain_time(t)
+        if time is None or not 0.0 <= time < inf:
+            return None
+        reading = self._reading_at(time, errors)
+        return (reading.record, time) if time <= reading.until else None
 
     def _read(
         self,
         times: Array,
-        _: float,
         greatest: float,
         rows: int,
         by_record: Callable[[Array, Array, Array], None],
@@ -302,12 +314,13 @@ class DissipativeMotion(FollowedMotion):
 
     def _march_points(self, t: Any) -> tuple[MarchPoints, tuple[int, ...]]:
         """Return the points of the motion at times, and the shape of the times."""
-        given = _plain_times(t)
+        one = plain_time(t)
+        given = _times_from_launch(t if one is None else [one])
         if given is not None:
-            times, _, greatest = given
+            times, greatest = given
             reading = (self._reading_at if times.size == 1 else self._reading_up_to)(greatest, errors=False)
             if greatest <= reading.until:
-                shape = np.shape(times) if np.ndim(t) else ()
+                shape = times.shape if one is None else ()
                 return points_by_record(reading.record, reading.pieces, times.reshape(-1)), shape
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))

@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +33,10 @@ from gqm_sym.runtime.legs.body import (
     ENDING,
     FIRST_STEP,
     HIGH,
+    HORIZON,
     LAM0,
     LAPS,
+    LEAST_SIZE,
     LOW,
     MAY_REST,
     PANEL_COUNT,
@@ -41,6 +44,7 @@ from gqm_sym.runtime.legs.body import (
     PERIOD,
     PLACE,
     PLACE_LOW,
+    PREFERRED,
     REACH,
     STATUS,
     STEP,
@@ -68,6 +72,9 @@ FEW_PANELS, LEGS_PER_CALL = 12, 8
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
+
+# The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
+PIECE_SHARE = 2.0**-6
 
 # If a body creeps towards an equilibrium and no panel is narrow enough any more, its distance from the equilibrium is
 # at most this share of its place, or of the length of the leg.
@@ -98,17 +105,49 @@ END_NAMES = {
 SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 
 
-def _loss(problem: Problem) -> Dissipation:
-    """Return the dissipation of the model."""
-    loss = problem.functions.dissipation
-    assert loss is not None
-    return loss
+class Conditions(NamedTuple):
+    """The arguments of compiled code that all launches with the same run-time parameters and contact share.
+
+    Attributes
+    ----------
+    dissipation : Dissipation
+        The forces on the body.
+    track : Track
+        The curve, with all places at which the curve or its chart is not smooth.
+    parameters : (1, n) array
+        The run-time parameters, followed by the curve's chart if it has one.
+    passes : bool
+        Whether legs are followed by the data kept of gaps, and may have to be followed again.
+    space : int
+        The number of panels for which a record has space.
+    lines : array
+        The lines of a body (`legs.body`) without its launch.
+    """
+
+    dissipation: Dissipation
+    track: Track
+    parameters: Array
+    passes: bool
+    space: int
+    lines: Array
 
 
-def _track(problem: Problem) -> Track:
-    """Return the curve of a motion, with all places at which the curve or its chart is not smooth."""
-    f = problem.functions
-    return Track(f.chart, f.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact])) if f.chart.size else SMOOTH
+def _conditions(problem: Problem) -> Conditions:
+    """Return the conditions of a launch, which are kept with the run-time parameters."""
+    p, contact = problem.p, problem.launch.contact
+    known: Conditions | None = p.conditions.get(contact)
+    if known is None:
+        f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
+        assert f.dissipation is not None
+        track = Track(f.chart, f.joints, f.corners, f.drops(only_sign)) if f.chart.size else SMOOTH
+        passes = track.is_kept(f.dissipation)
+        given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
+        lines = launched((given,), LEGS_PER_CALL if passes else 0)
+        if f.chart.size:
+            lines[0, LEAST_SIZE] = PIECE_SHARE * float(f.chart[3] - f.chart[2]) / float(f.chart[1])
+        space = FEW_PANELS + (0 if passes else track.breaks.size)
+        known = p.conditions[contact] = Conditions(f.dissipation, track, f.p[None], passes, space, lines)
+    return known
 
 
 class Driver:
@@ -149,20 +188,20 @@ class Driver:
     last_swing = 0.0
     force_error = 0.0
     launch_error: float | None = None
+    _last_record: Array = np.empty(0)
+    _frame: Frame | None = None
 
     def __init__(self, problem: Problem, horizon: float) -> None:
         launch = problem.launch
-        self.problem, self.dissipation, self.track = problem, _loss(problem), _track(problem)
+        self.problem = problem
+        self.dissipation, self.track, self._parameters, self._passes, self._space, lines = _conditions(problem)
         self.runs: list[Run] = []
         self.at: list[float] = []
         self._horizon = horizon
-        # Whether legs are followed by the data kept of gaps, and may have to be followed again.
-        self._passes = passes = self.track.is_kept(self.dissipation)
-        self._space = FEW_PANELS + (0 if passes else self.track.breaks.size)
-        ends, asked = problem.domain.numbers[:3], (ONLY_SIGN[launch.contact], horizon, nan)
-        given = (launch.lam0.value, *ends, launch.direction, *asked, problem.w0)
-        self.body = launched((given,), LEGS_PER_CALL if passes else 0)
-        self._frame: Frame | None = None
+        self.body = body = lines.copy()
+        body[0, LAM0], body[0, PREFERRED], body[0, V2] = launch.lam0.value, launch.direction, problem.w0
+        if horizon < inf:
+            body[0, HORIZON] = horizon
 
     @property
     def reached(self) -> float:
@@ -185,23 +224,24 @@ class Driver:
     def go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         if self.at and self.at[PANEL_COUNT] >= MAX_STORED:
+            if self._force_cancels(self._last_record):
+                raise self._lost(self._last_record)
             raise BudgetError(
                 f"motion: {self.at[PANEL_COUNT]:.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         what, records = self._followed()
         frame, at = self._frame, self.body[0].tolist()
-        before = self.body[1 : 1 + len(records)].copy() if self._passes and frame is None else [None] * len(records)
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
-        self.at, record = at, records[-1]
-        if len(records) > 1:
-            earlier = zip(records[:-1], before[:-1], strict=True)
-            self.runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
-        if what == TURN and frame is None and not at[STATUS]:
-            self.runs.append(Run(record, TURN, END_NAMES[TURN], None, before[-1]))
-        else:
-            self._end_run(what, record, before[-1])
+        self.at, count = at, int(at[VALUE]) or 1
+        self._last_record = records[count - 1]
+        before = self.body[1 : 1 + count].copy() if self._passes and frame is None else [None] * count
+        is_plain = what == TURN and frame is None and not at[STATUS]
+        for k in range(count if is_plain else count - 1):
+            self.runs.append(Run(records[k], TURN, END_NAMES[TURN], None, before[k]))
+        if not is_plain:
+            self._end_run(what, self._last_record, before[-1])
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
@@ -209,11 +249,12 @@ class Driver:
             return [run]
         parts: list[Array] = []
         space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()
-        p = self.problem.functions.p.reshape(1, -1)
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))
-            what = drive_along(self.track, self.dissipation, p, RUN_AGAIN, body, record)
-            if what in PASSED:
+            what = drive_along(self.track, self.dissipation, self._parameters, RUN_AGAIN, body, record)
+            # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
+            left = abs(float(run.record[END] - record[0, END]))
+            if what in PASSED or (what == PAUSED and left <= ULP * self.problem.period):
                 return run.with_panels([*parts, record[0]], self._horizon)
             if what == FULL:
                 space *= 4
@@ -251,29 +292,26 @@ class Driver:
             )
 
     def _followed(self) -> tuple[int, Array]:
-        """Return the code for the end of the last of the next legs (`advance`), and the records of all of them, or one
-        record if the body stays.
+        """Return the code for the end of the last of the next legs (`advance`), and an array that begins with their
+        records.
         """
         legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
         while True:
-            records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
-            what = self._drive(question, self.body, records)
-            count = int(self.body[0, VALUE])
+            frame = self._frame
+            records = np.empty((legs if frame is None else 1, self._space * COLUMNS))
+            if frame is None:
+                what = drive_along(self.track, self.dissipation, self._parameters, question, self.body, records)
+            else:
+                what = drive_along(SMOOTH, frame.dissipation, frame.p[None], question, self.body, records)
             if what == NEARBY:
                 self._launch_nearby()
                 question = LEGS
-            elif what != FULL or count:
-                return (what if what != FULL else TURN), records[: max(count, 1)]
+            elif what != FULL:
+                return what, records
+            elif self.body[0, VALUE]:
+                return TURN, records
             else:
                 legs, self._space = 1, 4 * self._space
-
-    def _drive(self, question: int, bodies: Array, records: Array) -> int:
-        """Drive the body along the curve, or by its distance from an equilibrium (`answers.drive`)."""
-        frame = self._frame
-        if frame is not None:
-            return drive_along(SMOOTH, frame.dissipation, frame.p.reshape(1, -1), question, bodies, records)
-        p = self.problem.functions.p.reshape(1, -1)
-        return drive_along(self.track, self.dissipation, p, question, bodies, records)
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Decide whether a run has come so close to an equilibrium that the motion ends there, or is followed in a
@@ -285,7 +323,7 @@ class Driver:
         elif what == ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame:
-            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * abs(end)
+            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
             creeps = what == PAUSED and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
             if turns_nearby or creeps:
                 self._enter_frame()
@@ -350,7 +388,7 @@ class Driver:
         place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
         reach = min(starting_step(problem), float(ends.min()))
-        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach, float(line[LEAST_SIZE]))
         if frame is None or not (frame.is_stable or lam0):
             return
         if isinstance(problem.formulas.exact, ExactLaw):

@@ -22,7 +22,7 @@ from gqm_sym.runtime.launch.ends import (
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.kinds import MotionKind
-from gqm_sym.runtime.launch.problem import Problem, bind
+from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
 from gqm_sym.runtime.launch.survey import survey
@@ -85,9 +85,8 @@ def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
 
 def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """Return the motion if contact is never lost; if it is aperiodic, only the part for which contact lasts."""
-    domain = formulas.domain(p)
-    f = bind(formulas, p, launch)
-    problem = Problem(formulas, launch, p, f, domain)
+    f, domain = bind_all(formulas, p), formulas.domain(p)
+    problem = Problem(formulas, launch, p, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
     near = CORNER_ROUNDINGS * ulp(lam0)
     if v0 == 0.0 and f.corners.size and f.between(f.corners, lam0 - near, lam0 + near).size:
@@ -99,8 +98,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         # plane.
         direction = launch.direction if behind_v2 > 0.0 and ahead_v2 > 0.0 else 1 if ahead_v2 > behind_v2 else -1
         lam0 += direction * near
-        f = f._replace(exact=None)
-        problem = Problem(formulas, launch._replace(lam0=read_number(lam0, where="lam0"), point=None), p, f, domain)
+        problem = Problem(formulas, launch._replace(lam0=read_number(lam0, where="lam0"), point=None), p, domain, f)
     is_smooth = f.breaks.size == 0
     direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers, is_smooth)
     is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
@@ -119,8 +117,15 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     known_duration = time if time == time else None
     if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have determined the libration completely
         near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
-        segment = between_turns(f, lam0 + near, lam0 + far, known_duration)
-        return PeriodicMotion(problem, "libration", direction, segment, (abs(near), abs(far)))
+        ends = lam0 + near, lam0 + far
+        return PeriodicMotion(
+            problem,
+            "libration",
+            direction,
+            lambda: between_turns(problem.functions, *ends, known_duration),
+            (abs(near), abs(far)),
+        )
+    f = problem.functions
     front = end_of_motion(problem, direction, ahead)
     _check_ridges(problem, front.place)
     if front.what == "closed":

@@ -224,6 +224,23 @@ class Motion(History, Derivatives):
 
         return drawing(self, what, axes)
 
+    def to_pandas(self, t: Any = None) -> Any:
+        """Return the states at given times as a table with a row for each time.
+
+        Parameters
+        ----------
+        t : array_like, optional
+            Times in s from launch; by default equally spaced over one period or over the whole motion.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column for each field of `State`.
+        """
+        from gqm_sym.export.datasets import motion_frame
+
+        return motion_frame(self, t)
+
     def to_xarray(self, t: Any = None) -> Any:
         """Return the states at given times as an xarray Dataset, with units and provenance.
 

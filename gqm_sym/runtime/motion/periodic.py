@@ -20,7 +20,7 @@ from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import lock_of, locked
 from gqm_sym.runtime.motion.periodic_times import PeriodicTimes, Times
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
@@ -49,8 +49,8 @@ class PeriodicMotion(PeriodicTimes):
         The kind of motion.
     direction : int
         The sign of ds/dt after launch.
-    segment : Segment
-        The segment from one turning point to the other, or a lap from the launch.
+    segment : Segment or callable
+        The segment from one turning point to the other, or a lap from the launch; or what makes it when it is needed.
     offsets : (float, float)
         The distances of a libration's lower and upper end from the launch, in units of the curve parameter.
     """
@@ -197,7 +197,7 @@ class PeriodicMotion(PeriodicTimes):
         if times.sampler is None:
             of_states = partial(self._constants_of_states, times)
             times.sampler = Sampler(
-                self.problem, times.repeated, times.timing, times.span, self.direction, of_states, self._lock
+                self.problem, times.repeated, times.timing, times.span, self.direction, of_states, lock_of(self)
             )
         self._sampler = times.sampler
         return self._sampler if end_time <= self._sampler.max_time else None

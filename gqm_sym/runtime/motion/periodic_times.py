@@ -1,5 +1,6 @@
 """The times of motions that repeat, computed in the arithmetic that each question requires."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -73,11 +74,17 @@ class PeriodicTimes(Motion):
         problem: Problem,
         kind: MotionKind,
         direction: int,
-        segment: Segment,
+        segment: Segment | Callable[[], Segment],
         offsets: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__(problem, kind, direction)
-        self._segment_in_doubles, self._offsets = segment, offsets
+        self._given_segment, self._offsets = segment, offsets
+
+    @cached_property
+    def _segment_in_doubles(self) -> Segment:
+        """Its segment between the turning points that doubles have found."""
+        given = self._given_segment
+        return given if isinstance(given, Segment) else given()
 
     @cached_property
     def _segment(self) -> Segment:

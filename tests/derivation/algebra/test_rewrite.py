@@ -98,7 +98,7 @@ def test_a_sum_without_minus_signs_is_preferred():
     ],
 )
 def test_signs_on_a_domain(text, domain, sign):
-    """What structure and ends prove, and nothing more."""
+    """Signs are known where the structure of the expression and the ends of the domain prove them, and only there."""
     assert signs(domain).sign(read(text)) == sign
 
 

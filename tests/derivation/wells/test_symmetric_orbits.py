@@ -70,7 +70,7 @@ def functions(model: gqm.Model, *forms: sp.Expr | None, by: tuple[sp.Symbol, ...
 
 
 def integral(rate: Callable[[Any], Any]) -> mpf:
-    """Over a quarter turn; no node comes near its ends."""
+    """Return the integral over a quarter turn; no node comes near its ends."""
     return mp.quad(rate, mp.linspace(0, mp.pi / 2, 7), method="gauss-legendre")
 
 
@@ -131,7 +131,7 @@ def test_which_have_closed_forms() -> None:
 
 @pytest.mark.parametrize("name", AGM)
 def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
-    """Of two numbers, the arithmetic-geometric one."""
+    """A half period is pi over the arithmetic-geometric mean of two numbers."""
     model, half = model_of(name), CASES[name][-1]
     assert model.symmetric_orbits is not None
     assert model.symmetric_orbits.agm_arguments is not None
@@ -166,7 +166,9 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     "z", ["x**3", "exp(x)", "cos(x) + x**2", "cos(x) + cosh(x)", "cos(x) + cos(9*x)", "exp(-x**2)"]
 )
 def test_there_is_none(z: str) -> None:
-    """Of wells that are not even, of unlike heads, and of waves of which one is many times as fast."""
+    """There is no such form for wells that are not even, for unlike functions, and for waves of very different
+    frequencies.
+    """
     assert gqm.derive(graph(z), gqm.Gravity()).symmetric_orbits is None
 
 

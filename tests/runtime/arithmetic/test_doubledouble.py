@@ -145,7 +145,7 @@ def test_at_and_about_zero(t: float, count: int) -> None:
 
 @given(PERIODS, SHARES, st.lists(st.tuples(COUNTS, st.floats(0.0, 1.0)), min_size=1, max_size=8))
 def test_many_times_are_reduced_as_each_alone(high: float, share: float, places: list[tuple[int, float]]) -> None:
-    """What else is in the array changes nothing."""
+    """The other times in an array do not change a result."""
     period = pair(high, share)
     times = np.array([(whole + part) * high for whole, part in places])
     together = reduce_many(times, np.zeros_like(times), *period)

@@ -46,7 +46,7 @@ exponents = st.integers(-12, 12)
 
 
 def holds(interval: Interval, true: mpf) -> bool:
-    """Whether the exact number lies in the interval."""
+    """Return whether the exact number lies in the interval."""
     return mpf(interval[0]) <= true <= mpf(interval[1])
 
 
@@ -124,7 +124,7 @@ def test_real_powers_hold_every_value(data: st.DataObject, p: float) -> None:
 
 @given(a=st.tuples(*[st.floats(allow_nan=True)] * 2), b=st.tuples(*[st.floats(allow_nan=True)] * 2))
 def test_never_nan(a: Interval, b: Interval) -> None:
-    """Whatever comes in, even NaN and infinities, no bound is NaN."""
+    """No bound is NaN for any input, even NaN and infinities."""
     assume(not (a[0] > a[1] or b[0] > b[1]))  # NaN is let through
     results = [getattr(intervals, f"i{name}")(a, b) for name in BINARY]
     results += [intervals.ipow(a, 2), intervals.ipow(a, 3), intervals.ipow(a, -1), intervals.ipow(a, -2)]
@@ -198,7 +198,7 @@ def test_pole_at_an_end_bounds_one_side() -> None:
 
 
 def test_overflow_is_no_infinite_lower_bound() -> None:
-    """What overflows is bounded below by the largest float."""
+    """The lower bound of a number that overflows is the largest float."""
     assert intervals.iexp((1e3, 1e4)) == (math.nextafter(math.inf, 0.0), math.inf)
     assert intervals.imul((1e300, 1e300), (-1e300, -1e300)) == (-math.inf, -math.nextafter(math.inf, 0.0))
 

@@ -102,7 +102,7 @@ def test_rows() -> None:
 
 @pytest.mark.parametrize("ring_", [Ring(1), Ring(2), Ring(9), Ring(9, closed=False)])
 def test_rows_in_any_order(ring_: Ring) -> None:
-    """What a chart says of a place does not depend on what else it is asked for, outside of an open curve too."""
+    """The values of a chart at a place do not depend on the other places of a call, outside of an open curve too."""
     chart, s = ring_.chart((RADIUS,)), np.random.default_rng(5).uniform(-9.0, 12.0, 200)
     one_by_one = np.hstack([chart.points([place]) for place in s])
     for order in (np.arange(s.size), np.argsort(s), np.argsort(-s)):

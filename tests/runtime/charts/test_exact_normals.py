@@ -32,7 +32,7 @@ def exactly(text: str) -> mpf:
 
 
 def agrees(text: str, truth: mpf) -> bool:
-    """Whether every digit of a decimal string is right, but for the last one's rounding."""
+    """Return whether every digit of a decimal string is right, except for the rounding of the last one."""
     digits = len(text.replace(".", "").lstrip("0"))
     with mp.workdps(digits + 20):
         return bool(abs(mpf(text) - truth) <= abs(truth) * mpf(10) ** (1 - digits))
@@ -85,7 +85,7 @@ def test_what_does_not_swing(ring: ModuleType) -> None:
 
 
 def test_a_hundred_digits(ring: ModuleType) -> None:
-    """As many as are asked for."""
+    """A period is computed to as many digits as are asked for."""
     with mp.workdps(130):
         assert agrees(ring.solve(lam0="6/5").period_to(100), pendulum_period(mpf("1.2"), mpf(0)))
 
@@ -260,7 +260,7 @@ def test_spline(generated_folder: Path) -> None:
 
 
 def _spline_place(at: Callable[[mpf, int], tuple[mpf, mpf]], length: mpf, breaks: np.ndarray) -> mpf:
-    """Where a spline has come to a length that lies before its first break."""
+    """Return the place on a spline at a length that lies before its first break."""
     place = length
     for _ in range(8):
         gone = mp.quad(lambda u: mp.hypot(*at(u, 1)), [mpf(0), place])
@@ -332,7 +332,7 @@ def test_launch_by_a_length_over_many_pieces(generated_folder: Path) -> None:
 
 
 def test_polynomials() -> None:
-    """In whole numbers as in mpmath's, at whatever precision it works."""
+    """Polynomials in integers agree with mpmath's at any precision."""
     rows = [[mpf("0.7"), mpf(-3), mpf("1e-20"), mpf(5)], [mpf("1e9"), mpf(2), mpf(0), mpf("-1e-3")]]
     found = Polynomials(mp, rows)
     for digits in (30, 60):
@@ -346,7 +346,7 @@ def test_polynomials() -> None:
 
 
 def test_quadrature_takes_what_it_needs() -> None:
-    """Digits asked for, on panels easy and hard; what is not analytic is told."""
+    """Quadrature returns the digits asked for, on easy and hard panels; it refuses integrands that are not analytic."""
     with mp.workdps(60):
         for rate, edges, wanted in (
             (lambda x: mp.exp(x), [mpf(0), mpf(1)], mp.e - 1),

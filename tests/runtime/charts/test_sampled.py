@@ -228,8 +228,8 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
         ([*LINE[:4], (4.0, math.nan), *LINE[5:]], {}, "row 5: nan is not finite"),
         ([*LINE[:4], (4.0, "1e999"), *LINE[5:]], {}, "row 5: '1e999' is not finite"),
         ([*LINE[:4], (4.0, "0x10"), *LINE[5:]], {}, "row 5: '0x10' is not a decimal number"),
-        ([*LINE[:4], (4.0, None), *LINE[5:]], {}, "row 5: None is no number"),
-        ([*LINE[:4], (4.0, True), *LINE[5:]], {}, "row 5: True is no number"),
+        ([*LINE[:4], (4.0, None), *LINE[5:]], {}, "row 5: None is not a number"),
+        ([*LINE[:4], (4.0, True), *LINE[5:]], {}, "row 5: True is not a number"),
         ([*LINE[:4], (4.0, 1.6, 0.0), *LINE[5:]], {}, "row 5: must be two numbers, x and z, got"),
         ([*LINE[:4], "12", *LINE[5:]], {}, "row 5: must be two numbers, x and z, got '12'"),
         ([*LINE[:4], LINE[3], *LINE[4:]], {}, "row 5: repeats row 4; leave one of them out"),
@@ -256,7 +256,7 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
     ],
 )
 def test_bad_points_are_refused(points: object, options: dict[str, object], message: str) -> None:
-    """With the row, counted from 1."""
+    """Bad points are refused with their row, counted from 1."""
     with pytest.raises(DeclarationError, match=f"^sampled: {message}"):
         gqm.Curve.sampled(points, **options)
 
@@ -311,13 +311,13 @@ def test_options_of_a_file(tmp_path: Path) -> None:
         ("track.csv", "1,2\n" * 500_001, "'track.csv': has 500001 rows; 500000 is the most"),
         ("../track.csv", ROWS, "'../track.csv': must be a path inside the YAML file's folder"),
         ("/etc/passwd", ROWS, "'/etc/passwd': must be a path inside the YAML file's folder"),
-        ("inside", None, "'inside': is no plain file|'inside': cannot be read"),
+        ("inside", None, "'inside': is not a plain file|'inside': cannot be read"),
         ("{file: track.csv, kind: round}", ROWS, "curve.points.kind: must be 'spline' or 'linear', got 'round'"),
         ("{kind: linear}", ROWS, "curve.points: file is missing; add file: track.csv"),
     ],
 )
 def test_bad_files_are_refused(tmp_path: Path, points: str, data: bytes | str | None, message: str) -> None:
-    """With the place in the YAML, the file and its row; nothing outside the folder is read."""
+    """Bad files are refused with the place in the YAML, the file and its row; nothing outside the folder is read."""
     folder = tmp_path / "here"
     (folder / "inside").mkdir(parents=True)
     with pytest.raises(gqm.GQMError, match=message):
@@ -341,5 +341,5 @@ def test_links_and_pipes_are_refused(tmp_path: Path) -> None:
     os.mkfifo(folder / "pipe.csv")
     with pytest.raises(gqm.GQMError, match=r"'link\.csv': leads out of the YAML file's folder by a link"):
         spec(folder, "link.csv", None)
-    with pytest.raises(gqm.GQMError, match=r"'pipe\.csv': is no plain file"):
+    with pytest.raises(gqm.GQMError, match=r"'pipe\.csv': is not a plain file"):
         spec(folder, "pipe.csv", None)

@@ -26,7 +26,7 @@ def test_domain_shorter_than_the_loop() -> None:
 
 
 def test_near_start_is_moved_onto_the_curve() -> None:
-    """To the foot of the perpendicular, which becomes s = 0."""
+    """A start near the curve is moved to the foot of the perpendicular, which becomes s = 0."""
     chart = trace("x**2 + z**2 - 1", (0.6 + 1e-8, 0.8 + 1e-8))
     x, z = chart.points([0.0])[:2, 0]
     size = math.hypot(0.6 + 1e-8, 0.8 + 1e-8)

@@ -1,4 +1,4 @@
-"""What the disk cache knows of, and what is compiled when."""
+"""The contents of the disk cache, and the times at which functions are compiled."""
 
 import ast
 import math
@@ -175,7 +175,7 @@ def test_python_runs_an_entry_point_at_first(monkeypatch: pytest.MonkeyPatch) ->
 def test_an_entry_point_is_compiled_where_python_takes_long_or_raises(
     seconds: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What it has written by then is taken back."""
+    """Anything that Python has written before compilation starts is undone."""
 
     def run(values, n):  # type: ignore[no-untyped-def]
         values[0] = fma(2.0, 3.0, 1.0)
@@ -189,7 +189,7 @@ def test_an_entry_point_is_compiled_where_python_takes_long_or_raises(
 
 
 def test_python_stops_when_its_time_has_run_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the middle of a loop."""
+    """Python stops in the middle of a loop when its time has run out."""
     monkeypatch.setattr(uncompiled, "MAX_CALL", 0.05)
 
     def run(x):  # type: ignore[no-untyped-def]
@@ -222,7 +222,7 @@ def hashed(x):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize("run", [norm, root, exponential, hashed])
 def test_what_cannot_be_run_to_the_same_bits_is_compiled(run: Callable[..., Any]) -> None:
-    """Whether that is found when the function is read or when it is run."""
+    """It is compiled whether the difference is found when the function is read or when it is run."""
     with pytest.raises(NotPlainError):
         PlainEntry(run, (types.float64,), Trial(1e9))((1.0,))
 

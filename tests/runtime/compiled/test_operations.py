@@ -1,4 +1,4 @@
-"""What runs in Python in place of an operation of compiled code gives its bits."""
+"""The Python versions of operations of compiled code give the same bits."""
 
 from typing import Any
 

@@ -52,7 +52,7 @@ def _functions(module: str) -> dict[str, Emitted]:
 
 
 def _results(function: Emitted, call: Any, seed: int, count: int) -> np.ndarray:
-    """What a function writes, of random arguments, some of which are extreme."""
+    """Run a function on random arguments, including extreme ones, and return the bits of its output."""
     rng = np.random.default_rng(seed)
     given: list[Any] = []
     for kind in function.signature.args:
@@ -84,7 +84,9 @@ def test_bits_are_those_of_compiled_code(module: str) -> None:
 
 
 def _calls() -> dict[str, tuple[str, ...]]:
-    """What a function may call of the arithmetic, with its arguments, where these are numbers or intervals."""
+    """Return functions of the arithmetic that a function may call, with their arguments if these are numbers or
+    intervals.
+    """
     taken = {("x",): "a", ("x", "y", "h"): "a, b, b - a", ("x", "y", "w", "h1", "h2"): "a, b, c, b - a, c - b"}
     taken |= {("x", "y", "h", "n"): "a, b, b - a, 3", ("x", "y", "w", "h1", "h2", "n"): "a, b, c, b - a, c - b, 4"}
     taken |= {("x", "y", "h", "p"): "a, b, b - a, 0.7", ("x", "y", "w", "h1", "h2", "p"): "a, b, c, b - a, c - b, 0.7"}

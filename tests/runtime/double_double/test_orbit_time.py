@@ -41,7 +41,7 @@ def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
 
 
 def orbit(motion: Any) -> Any:
-    """What double-double arithmetic has found, and that it has."""
+    """Return the orbit from double-double arithmetic, after a check that it was found there."""
     assert isinstance(motion, PeriodicMotion)
     found = motion._orbit
     assert found is not None
@@ -49,7 +49,7 @@ def orbit(motion: Any) -> Any:
 
 
 def is_within(found: Any, wanted: mpf) -> bool:
-    """Whether a number is as near as its bound says."""
+    """Return whether a number is within its bound of the true one."""
     return bool(abs(mpf(found.high) + mpf(found.low) - wanted) <= found.error)
 
 

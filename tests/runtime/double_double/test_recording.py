@@ -50,7 +50,7 @@ def recorded(formula: Any, parameters: int = 1) -> BoundTape | None:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_tape_is_its_formula(name: str) -> None:
-    """At 64 places, within the bound, which promises 29 digits."""
+    """At 64 places a tape gives its formula within the bound, which promises 29 digits."""
     tape = recorded(FUNCTIONS[name])
     assert tape is not None
     places = np.random.default_rng(1).uniform(1.1, 1.9, BLOCK)

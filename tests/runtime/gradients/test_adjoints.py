@@ -42,7 +42,7 @@ def found(formula: Any, order: int) -> np.ndarray:
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_derivatives(name: str, order: int) -> None:
-    """At 70 places to 28 digits, and within the bounds; also derivatives of derivatives."""
+    """Derivatives at 70 places have 28 digits and lie within the bounds, also derivatives of derivatives."""
     rows = found(FUNCTIONS[name], order)
     with mp.workdps(60):
         for k in range(0, PLACES.size, 23):

@@ -64,7 +64,9 @@ def durations(module: ModuleType, launch: dict[str, Any], name: str) -> float:
 
 
 def is_near(found: float, wanted: float, size: float, ulps: float = 4.0) -> bool:
-    """Whether a derivative is within so many units in the last place, of itself or of what it is a difference of."""
+    """Return whether a derivative is within some units in the last place of itself or of the terms that it is a
+    difference of.
+    """
     return abs(found - wanted) <= ulps * ULP * max(abs(wanted), size)
 
 
@@ -81,7 +83,9 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "launch"), CASES)
 def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
-    """By launch, forces and shape; at rest the derivative by the speed is zero."""
+    """Durations have derivatives with respect to launch, forces and shape; at rest that with respect to the speed is
+    zero.
+    """
     module = request.getfixturevalue(name)
     motion = module.solve(**launch)
     quantity = "period" if motion.kind == "circulation" else "half_period"

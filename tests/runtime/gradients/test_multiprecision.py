@@ -36,14 +36,14 @@ def test_small_swings(amplitude: float) -> None:
 
 
 def test_launches_from_rest_in_the_middle() -> None:
-    """On rounds from lam0 = 1e-300, dT/dlam0 = dT/dE g sin(lam0)."""
+    """For circulations from lam0 = 1e-300, dT/dlam0 = dT/dE g sin(lam0)."""
     motion = generated("circle").solve(lam0=1e-300, v0=9.0, L=1, g="9.81")
     assert motion.gradient("period", "lam0")["lam0"] == pytest.approx(motion.period_slope * 9.81e-300, rel=4 * ULP)
 
 
 @pytest.mark.parametrize(("name", "v0"), [("ellipse", 1.0), ("ellipse", 9.0), ("parabola_rolling", 0.5)])
 def test_the_same_as_in_double_double(name: str, v0: float) -> None:
-    """Where both have digits enough, all means, ends and samples agree."""
+    """Where both arithmetics have enough digits, all means, ends and samples agree."""
     motion = generated(name).solve(lam0=0.25 if name == "parabola_rolling" else -1.25, v0=v0)
     direction = motion.direction if motion.kind == "circulation" else 0
     fast, slow = (

@@ -38,7 +38,9 @@ def generated(name: str) -> ModuleType:
 
 
 def is_near(found: float, wanted: Any, ulps: float = 2.0, size: float = 0.0) -> bool:
-    """Whether a number is within so many units in the last place, of itself or of what it is a difference of."""
+    """Return whether a number is within some units in the last place of itself or of the terms that it is a difference
+    of.
+    """
     return bool(abs(mpf(found) - mpf(wanted)) <= ulps * ULP * max(abs(float(wanted)), size))
 
 
@@ -246,7 +248,7 @@ def test_what_has_no_gradient(
 
 @pytest.mark.parametrize("place", [0.4, -1.1, 1.15])
 def test_the_time_at_a_place(place: float, circle: ModuleType) -> None:
-    """Of a pendulum released at rest, in elliptic integrals."""
+    """The derivative of the time at a place of a pendulum released at rest is known in elliptic integrals."""
     launch = {"lam0": 1.2, "L": 1.25, "g": 9.81}
     found = circle.solve(**launch).gradient("time_at", tuple(launch), lam=place)
 

@@ -77,7 +77,7 @@ def test_the_reference_number(circle: ModuleType) -> None:
 
 
 def test_an_asymmetric_well(generated_folder: Path) -> None:
-    """On z = x**2 + c*x**3: as differences of first derivatives, which are exact."""
+    """On z = x**2 + c*x**3 second derivatives agree with differences of first derivatives, which are exact."""
     module = gqm.build(
         gqm.derive(gqm.Curve.graph("x**2 + c*x**3"), gqm.Gravity() + gqm.Rolling()),
         name="second_well",

@@ -16,7 +16,7 @@ def circle(**launch: Any) -> Any:
 
 
 def test_a_pendulum() -> None:
-    """At 1.2 rad: 8 sqrt(q)/(1 + q) and the third coefficient; even ones and sines vanish."""
+    """At 1.2 rad the first coefficient is 8 sqrt(q)/(1 + q); the third is known too, and even ones and sines vanish."""
     found = circle(lam0="6/5").fourier("lam", 5)
     assert found.a.shape == found.b.shape == (6,)
     wanted = [0.0, 1.20976057007855867244104160222, 0.0, -0.00990061091437302041253432191172, 0.0]
@@ -27,7 +27,7 @@ def test_a_pendulum() -> None:
 @pytest.mark.parametrize("quantity", ["x", "z", "v", "normal_force"])
 @pytest.mark.parametrize("launch", [{"lam0": 2.5, "v0": 1.0, "direction": -1}, {"lam0": 0.4, "v0": 7.0}])
 def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
-    """At random times, to rounding."""
+    """The sum is the motion at random times, to rounding."""
     motion = circle(**launch)
     a, b = motion.fourier(quantity, 90)
     times = np.random.default_rng(1).uniform(0.0, motion.period, 50)

@@ -19,7 +19,7 @@ def generated(name: str) -> ModuleType:
 
 
 def test_pendulums() -> None:
-    """By amplitude and length, for a table of both: dT/dA in closed form, dT/dL = T/(2L)."""
+    """Periods over a table of amplitude and length have dT/dA in closed form and dT/dL = T/(2L)."""
     amplitudes, lengths = np.linspace(0.1, 3.0, 15), np.array([[0.5], [2.0]])
     found = generated("circle").sweep("period", lam0=amplitudes, L=lengths, g=9.81, gradient=("L", "lam0"))
     assert found.values.shape == (2, 15)
@@ -55,7 +55,9 @@ def test_as_single_motions(name: str) -> None:
 
 
 def test_turning_points_and_extremes_of_pendulums() -> None:
-    """In closed form, for swings launched with a speed, and for laps."""
+    """Derivatives of turning points and extremes agree with closed forms, for swings launched with a speed and for
+    laps.
+    """
     g, length, mass = 9.81, 0.8, 1.5
     lam0, v0 = np.array([0.2, 0.7, 1.1, 0.4, -0.9]), np.array([0.0, 1.2, 2.0, 9.0, 8.0])
     cosine = np.cos(lam0) - v0**2 / (2 * g * length)

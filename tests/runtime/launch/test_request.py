@@ -1,4 +1,4 @@
-"""What a launch is refused for, whoever gives it; what may be left out, and in what it may be given."""
+"""Refusals of launches, arguments that may be left out, and the types in which arguments may be given."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -58,7 +58,7 @@ def test_a_place_without_a_curve(tmp_path: Path) -> None:
 
 
 def test_a_sweep_is_refused_for_the_same(circle: ModuleType) -> None:
-    """What holds for all of its launches is said before any is solved."""
+    """A mistake that holds for all launches of a sweep is reported before any is solved."""
     with pytest.raises(InputError, match=r"^contact: must be one of bilateral, above, below, got 'left'"):
         circle.sweep("half_period", lam0=[0.5, 1.0], v0=0, L=1, contact="left")
     with pytest.raises(InputError, match=r"^quantity: must be one of half_period, "):
@@ -76,7 +76,7 @@ def test_digits_that_cannot_be_had(digits: Any, circle: ModuleType) -> None:
 
 
 def said(motion: Any) -> str:
-    """What the commands print of it."""
+    """Return what the commands print about a launch."""
     return "\n".join(show.motion(motion, "lam"))
 
 

@@ -49,7 +49,7 @@ def field(generated_folder: Any) -> Callable[[str], ModuleType]:
 
 
 def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: float, **given: float) -> Any:
-    """What a walk from a launch finds: its end, and the places before and beyond."""
+    """Return the result of a walk from a launch: its end, and the places before and beyond."""
     formulas = module.MODEL
     numbers = formulas.numbers(tuple((formulas.parameters | given).values()))
     functions = bind(formulas, numbers, read_launch(formulas, numbers, LaunchRequest(lam0, v0, direction)))

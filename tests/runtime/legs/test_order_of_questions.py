@@ -1,4 +1,4 @@
-"""What a motion with losses answers does not depend on what it was asked before."""
+"""The answers of a motion with losses do not depend on earlier questions."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -40,7 +40,7 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
 
 
 def asked(motion: Any, end: float) -> dict[str, Callable[[], Any]]:
-    """Questions, each of which computes as much of a motion as it needs."""
+    """Return questions to a motion; each computes as much of the motion as it needs."""
     times = np.linspace(0.0, end, 41)
     return {
         "a time": lambda: motion.state(0.3 * end),

@@ -1,4 +1,4 @@
-"""What a motion without losses answers does not depend on what it was asked before."""
+"""The answers of a motion without losses do not depend on earlier questions."""
 
 import pickle
 from collections.abc import Callable
@@ -36,7 +36,7 @@ MOTIONS: dict[str, tuple[ModuleType | str, dict[str, Any]]] = {
 
 
 def asked(motion: Any) -> dict[str, Callable[[], Any]]:
-    """Questions, each of which computes as much of a motion as it needs."""
+    """Return questions to a motion; each computes as much of the motion as it needs."""
     repeats = motion.kind != "asymptotic"
     early = motion._segment_in_doubles.duration if repeats else 1.0
     times, late = np.linspace(0.0, 0.9 * early, 9), 15.3 * early

@@ -399,7 +399,7 @@ def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
 
 
 def answers(motion: Any) -> list[Any]:
-    """What a motion tells of itself without being asked about a time."""
+    """Return the answers of a motion that do not depend on a time."""
     return [motion.kind, motion.t_end, motion.turning_points, *motion.legs, *motion.events, motion.condition_number]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
+from gqm_sym.runtime.motion.locking import lock_of
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -51,7 +52,7 @@ def eager_switches() -> Iterator[None]:
 
 
 def answers(motion: Any) -> list[Any]:
-    """What is asked of a motion: alone, in a column, and by place."""
+    """Return answers of a motion: for single times, for a column of times, and by place."""
     end = min(float(motion.t_end), 40.0)
     times = np.minimum(TIMES * (end / 40.0), end)
     state = motion.state(times)
@@ -84,9 +85,23 @@ def test_six_threads_are_told_what_one_is(name: str, module_named: ModuleOf) -> 
                 assert given == expected
 
 
+def test_all_threads_get_the_same_lock(module_named: ModuleOf) -> None:
+    """A motion's lock is made when it is first needed, and only once, whoever needs it first."""
+    module = module_named("pendulum")
+    for _ in range(50):
+        motion, start = module.solve(1, L=1), Barrier(THREADS)
+
+        def lock(_: int, motion: Any = motion, start: Barrier = start) -> int:
+            start.wait(60.0)
+            return id(lock_of(motion))
+
+        with ThreadPoolExecutor(THREADS) as pool:
+            assert len(set(pool.map(lock, range(THREADS)))) == 1
+
+
 def test_a_motion_is_copied_while_it_answers(module_named: ModuleOf) -> None:
     """A copy can be taken while a motion's lock is held, and has a lock of its own."""
     motion = module_named("pendulum").solve(1, L=1)
-    with motion._lock, ThreadPoolExecutor(1) as pool:
+    with lock_of(motion), ThreadPoolExecutor(1) as pool:
         for other in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
-            assert pool.submit(other._lock.__enter__).result(60.0)
+            assert pool.submit(lock_of(other).__enter__).result(60.0)

@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 from paths import ROOT
 
-from gqm_sym.errors import renamed
+import generated.pendulum as pendulum
+from gqm_sym.arguments import ChecksArguments
+from gqm_sym.errors import ArgumentError, renamed
 from gqm_sym.runtime.launch import kinds
 from gqm_sym.runtime.launch.speed import Pass1
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
@@ -32,6 +34,37 @@ def test_a_renamed_attribute_says_its_new_name() -> None:
     of_module = renamed({"old": "new"}, "module 'm'")
     with pytest.raises(AttributeError, match="module 'm' has no attribute 'old'; it is called 'new' now"):
         of_module("old")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: m.time_at(1, 2), "motion.time_at: takes only lam without a name, got 2 without one; it takes lam"),
+        (lambda m: m.time_at(), "motion.time_at: 'lam' must be given; it takes lam"),
+        (lambda m: m.lam(1, 2), "motion.lam: takes only t without a name"),
+        (lambda m: m.state(time=1), "motion.state: there is no argument 'time'; .*it takes t"),
+        (lambda m: m.exceedance("vertical"), "motion.exceedance: 'levels' must be given; it takes load, levels"),
+        (lambda m: m.period_to(), "motion.period_to: 'digits' must be given"),
+        (lambda m: m.gradient("period", order=2, by="L"), "motion.gradient: there is no argument 'by'"),
+    ],
+)
+def test_wrong_arguments_of_a_method_are_explained(call: Any, message: str) -> None:
+    """In the words of the package, and not with the names of its classes."""
+    with pytest.raises(ArgumentError, match=f"^{message}"):
+        call(pendulum.solve(-0.37))
+
+
+def test_other_type_errors_pass_unchanged() -> None:
+    """Only a call that does not fit its signature is explained."""
+
+    class Body(ChecksArguments):
+        _called = "body"
+
+        def move(self, by: float) -> None:
+            raise TypeError("from inside")
+
+    with pytest.raises(TypeError, match=r"^from inside$"):
+        Body().move(1.0)
 
 
 @pytest.mark.parametrize("record", [State, Pass1, Event, Leg])

@@ -1,4 +1,4 @@
-"""What one can do with a motion: print and copy it, tables of its states, its energy."""
+"""Uses of a motion: print and copy it, tables of its states, its energy."""
 
 import copy
 import pickle

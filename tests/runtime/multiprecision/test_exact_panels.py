@@ -4,11 +4,13 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 from paths import ROOT
 
 import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.loading import load
+from gqm_sym.runtime.multiprecision.gauss_legendre import legendre_rule
 
 ENERGY, USEFUL = 2e-14, 1e-11
 # Launches that a random run found: from rest, and with little to spare at a crest.
@@ -43,3 +45,16 @@ def test_many_hills_and_a_slow_passage() -> None:
     x = np.linspace(0.3, 0.5, 200_001)
     lowest = (x**2 / 40 + np.cos(8 * x) / 2).min()
     assert motion.v_max.value == pytest.approx(np.sqrt(2 * 9.81 * (start - lowest)), rel=1e-10)
+
+
+@pytest.mark.parametrize(("count", "digits"), [(20, 40), (48, 80), (96, 210)])
+def test_gauss_legendre_rules(count: int, digits: int) -> None:
+    """Rules have all the digits that were asked for: the nodes are zeros, and powers up to 2n - 1 are integrated."""
+    rule = legendre_rule(count, digits)
+    with mp.workdps(digits + 10):
+        tolerance = mpf(10) ** (1 - digits)
+        for power in (0, 2, count, 2 * count - 2):
+            assert abs(2 * mp.fsum(weight * x**power for x, weight, _ in rule) - mpf(2) / (power + 1)) <= tolerance
+        for x, _, last in rule[:: count // 8]:
+            assert abs(mp.legendre(count, x)) <= tolerance * count
+            assert abs(mp.legendre(count - 1, x) - last) <= tolerance

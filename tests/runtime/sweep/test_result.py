@@ -22,7 +22,7 @@ def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def grid(swing: ModuleType) -> Sweep:
-    """Three launches by two lengths, of which one launch is at rest."""
+    """Return a sweep over three launches and two lengths; one launch is at rest."""
     swept: Sweep = swing.sweep("period", [[0.1], [0.2], [0]], L=[1, 2])
     return swept
 

@@ -144,7 +144,7 @@ def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
             turn = -mp.sqrt(1 + root)
 
             def after_turn(u: Any, turn: Any = turn, root: Any = root, g: Any = g) -> Any:
-                """The time per u where x = turn + u**2: V**2 is a polynomial of which all zeros are known."""
+                """Return dt/du for x = turn + u**2; V**2 is a polynomial with known zeros."""
                 x = turn + u**2
                 slope = 4 * (x**3 - x) / 3
                 return mp.sqrt(6 * (1 + slope**2) / (g * (-2 * turn - u**2) * (x**2 - 1 + root)))

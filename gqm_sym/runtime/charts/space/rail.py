@@ -235,7 +235,7 @@ def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tu
             return Pieces(pieces.lengths, anchors, *known), end._replace(lean=leans[-1])
     else:
         raise DeclarationError(
-            f"{where}: its tangent is vertical, or nearly so, where no level is there to measure a roll angle from; "
+            f"{where}: its tangent is vertical, or nearly so, where there is no level to measure a roll angle from; "
             "declare roll='coordinated'"
         )
     return pieces, end

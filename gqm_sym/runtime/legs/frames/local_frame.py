@@ -1,7 +1,8 @@
-"""Small motions about an equilibrium e that is not at 0, with distances from e as places, and the force at these
-places.
+"""Small motions about an equilibrium e that is not at 0, or on a chart, with distances from e as places, and the force
+at these places.
 
 Doubles resolve a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e.
+Along a chart these roundings are no smaller about 0, where it may begin and end.
 So the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance
 from e. Functions of the interface then serve the legs with distances for places: P becomes
 ``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
@@ -29,7 +30,7 @@ from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation, ExactLaw
 from gqm_sym.runtime.legs.advance import DISSIPATION
-from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LOW, V2
+from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LEAST_SIZE, LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
 from gqm_sym.runtime.legs.panels.equation import Forces
@@ -116,12 +117,13 @@ def may_be_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
     nearby.
     """
     place, reach, point = body[BODY_PLACE], body[FIRST_STEP], point_buffer()
-    if dissipation.friction or dissipation.kinked or place == 0.0:
+    size = max(fabs(place), body[LEAST_SIZE])
+    if dissipation.friction or dissipation.kinked or size == 0.0:
         return False
     reach = min(reach, fabs(body[LOW] - place), fabs(body[HIGH] - place))
     for known in breaks:
         reach = min(reach, fabs(known - place))
-    around = min(SMALL_SHARE * fabs(place), RANGE_SHARE * reach)
+    around = min(SMALL_SHARE * size, RANGE_SHARE * reach)
     forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, 1)
     behind = slope_of_v2(forces, place - around, LEAST_V2, 0, point)
     ahead = slope_of_v2(forces, place + around, LEAST_V2, 0, point)
@@ -183,7 +185,9 @@ def _functions() -> tuple[Any, Any]:
     return speed_equation, static_balance
 
 
-def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:
+def frame_near(
+    dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float, least_size: float
+) -> Frame | None:
     """Return the frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
 
     Parameters
@@ -195,6 +199,8 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
         A place as two doubles, and V**2 there.
     reach : float
         The distance from there over which functions are expected to be smooth.
+    least_size : float
+        A size of places below which their roundings do not decrease (`legs.body`).
     """
     middle, size = start[0], reach
     for _ in range(MAX_HALVINGS):
@@ -214,8 +220,10 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     terms, noise = fitted
     low, steepness = moved * size, -float(terms[0])
     away = (start[0] - middle) + (start[1] - low)
+    # The distance from an unstable equilibrium needs more digits than places of that size have.
+    of_places = max(abs(middle), least_size if steepness > 0.0 else 0.0)
     if not steepness or away**2 + 2.0 * start[2] / abs(steepness) > (
-        min(SMALL_SHARE * abs(middle), RANGE_SHARE * size) ** 2
+        min(SMALL_SHARE * of_places, RANGE_SHARE * size) ** 2
     ):
         return None
     speed_equation, static_balance = _functions()

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.panels.breaks import located, within
-from gqm_sym.runtime.legs.panels.equation import slope_at
+from gqm_sym.runtime.legs.panels.equation import EXPM1_Q, slope_at
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT
 
 # The codes of the end of a run:
 #
@@ -35,6 +36,11 @@ NEAR_TURN = 1e-11
 # the place, the body is on its way to an equilibrium at 0. Its run pauses, because places that are counted from a
 # farther origin would lose their digits.
 CLOSE_SHARE = 2.0**-10
+
+# What slows a body down may be a resistance alone, so that no more than a share of the slope of V**2 is left without
+# speed. If it falls to this share where V**2 is smaller by the factor, V**2 vanishes like the square of the distance,
+# and the body never comes to where it does.
+SHARE_AT_REST, SLOWER_FACTOR, SLOWER_SHARE = 1e-6, 2.0**-4, 0.2501
 
 
 class Timed(NamedTuple):
@@ -97,14 +103,16 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
     """Return the end of a run at a place where no panel is possible, with its distance and V**2; it is a turn if one is
     near.
 
-    If a body at rest would move on, the end is not a turn but an equilibrium: V**2 grows with the square of the
-    distance from there, and the body never reaches it.
+    If a body at rest would move on, or nothing but a resistance in proportion to speed acts, the end is not a turn but
+    an equilibrium: V**2 grows with the square of the distance from there, and the body never reaches it.
     """
     if not forces.linear and panel.v2 > 0.0:
         here = march.origin[0] + march.direction * run_length
         place = within(here, panel.span)
-        goes_on = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point) > 0.0
+        at_rest = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point)
+        slower = slope_of_v2(forces, place, SLOWER_FACTOR * panel.v2, panel.contact_sign, point)
         slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+        goes_on = at_rest > 0.0 or (at_rest >= SHARE_AT_REST * slope and slower >= SLOWER_SHARE * slope)
         if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
             return (ASYMPTOTE, run_length, panel.v2) if goes_on else (TURN, run_length - panel.v2 / slope, 0.0)
     return NARROWED, run_length, panel.v2
@@ -121,16 +129,18 @@ def turn_below_noise(forces, march, panel, change, run_length, point):  # type: 
 
 
 @Inner
-def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[no-untyped-def]
+def may_pause(forces, march, route, run_length, speeds, panel, work):  # type: ignore[no-untyped-def]
     """Return whether the run may pause: it is long enough, or approaches an equilibrium at 0 that is far from its
     start.
 
-    ``speeds`` are V**2 and its largest value so far; ``panel`` is the start and the width of the next panel.
+    ``speeds`` are V**2 and its largest value so far; ``panel`` is the start and the width of the next panel. If
+    resistance alone has slowed the body down on its last panel, no turn is near.
     """
     here, (left, step) = fabs(march.origin[0] + march.direction * run_length), panel
     onwards = step * (slope_at(left, march) + march.g * step)
     is_close = not forces.linear and onwards <= here <= CLOSE_SHARE * fabs(march.origin[0])
-    return is_close or (run_length >= route.pause and 2.0 * speeds[0] >= speeds[1])
+    undamped = speeds[0] * (1.0 + work[EXPM1_Q + COUNT])
+    return is_close or (run_length >= route.pause and 2.0 * undamped >= speeds[1])
 
 
 @Inner

@@ -149,7 +149,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             Ahead(ahead.upcoming, ahead.span, inf, True),
             timed if searching else Timed(run_length, v2, nu, change_count),
         )
-        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step))
+        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work)
         what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
         if what != GOES_ON:
             v2 = 0.0 if ends_here else v2

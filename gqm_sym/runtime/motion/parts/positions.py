@@ -1,14 +1,13 @@
 """States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
-from contextlib import AbstractContextManager
 from math import inf
-from threading import RLock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gqm_sym.arguments import ChecksArguments
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number, read_numbers
@@ -26,7 +25,7 @@ from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRid
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
 
 
-class Positions(ABC):
+class Positions(ChecksArguments, ABC):
     """The places and states of a motion.
 
     Attributes
@@ -35,6 +34,7 @@ class Positions(ABC):
         As in `Motion`.
     """
 
+    _called = "motion"
     kind: MotionKind
     direction: int
 
@@ -42,7 +42,6 @@ class Positions(ABC):
         self.problem = problem
         self.kind = kind
         self.direction = direction
-        self._lock: AbstractContextManager[Any] = RLock()
         horizon = problem.launch.t_max
         self._horizon = inf if horizon is None else horizon.value
 

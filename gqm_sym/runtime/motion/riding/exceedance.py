@@ -114,8 +114,8 @@ def _limits(given: Any, sign: int) -> Array:
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     if pairs[0, 0] < 0.0 or (np.diff(pairs[:, 0]) <= 0.0).any() or (sign * np.diff(pairs[:, 1]) > 0.0).any():
         raise InputError(
-            "exceedance: limits: durations must be different and not negative, and what lasts longer must have a "
-            f"limit no further out, got {short(given)}"
+            "exceedance: limits: durations must be different and not negative, and a longer duration must not "
+            f"have a wider limit, got {short(given)}"
         )
     return pairs
 

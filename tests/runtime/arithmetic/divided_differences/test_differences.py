@@ -51,7 +51,7 @@ class Row:
 
     @property
     def second_ulps(self) -> float:
-        """What the second difference is held to."""
+        """Return the tolerance for the second difference, in ulps."""
         return INFLECTED_ULPS if self.name in INFLECTED else SECOND_ULPS
 
     @property
@@ -181,7 +181,7 @@ ROWS = [
 
 
 def spreads(source: random.Random) -> Iterator[float]:
-    """From far below rounding to far apart, most where the closed forms change over."""
+    """Return gaps from far below rounding to far apart, most of them where the closed forms change over."""
     while True:
         yield 10.0 ** source.uniform(-300, -20)
         yield 10.0 ** source.uniform(-20, 0)
@@ -236,7 +236,7 @@ def ulps(actual: float, true: mpf, scale: mpf) -> float:
 
 
 def sensitivity(difference: Callable[..., mpf], *points: mpf) -> mpf:
-    """How much more the result moves than the points, each shifted by a share of itself."""
+    """Return the change of the result per relative change of each point, added up."""
     total, value = mpf(0), difference(*points)
     for k, point in enumerate(points):
         moved = (*points[:k], point * (1 + NUDGE), *points[k + 1 :])
@@ -272,7 +272,7 @@ def second_error(row: Row, points: Points) -> float:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 def test_first_difference_keeps_its_digits(row: Row) -> None:
-    """f[x,y] holds to a few ulps at any gap, of which the gap alone may know the digits."""
+    """f[x,y] is right to a few ulps at any gap, even if only the gap itself, and not x and y, has its digits."""
     with mp.workdps(DIGITS):
         error, points = max((first_error(row, points), points) for points in triples(row))
     assert error <= FIRST_ULPS, f"{row.slug}1{points}: {error:.1f} ulps"

@@ -1,4 +1,4 @@
-"""What sweeps take sines and cosines apart into, about the middle of an orbit, against mpmath."""
+"""The parts into which sweeps split sines and cosines about the middle of an orbit, against mpmath."""
 
 import math
 import random
@@ -40,7 +40,7 @@ def test_second_differences_about_the_middle() -> None:
 
 
 def test_beyond_it_says_so() -> None:
-    """An orbit wider than a turn has no such form."""
+    """An orbit wider than a turn has no such form, and the result is NaN."""
     assert math.isnan(divdiff1_cos_in_square(WIDE, 1.001 * WIDE))
     with mp.workdps(40):
         h, v = (mpf(WIDE) + mpf(0.999 * WIDE)) / 2, (mpf(WIDE) - mpf(0.999 * WIDE)) / 2

@@ -178,7 +178,7 @@ def test_a_curve_of_many_pieces(module_for: Callable[..., ModuleType]) -> None:
 
 
 def test_a_shape_with_a_cosine_of_a_parameter(module_for: Callable[..., ModuleType]) -> None:
-    """What compiled functions read behind the parameters shapes the curve too."""
+    """The values that compiled functions read after the parameters shape the curve too."""
     curve = gqm.Curve.implicit("x**2 + z**2 - 4*cos(alpha)**2", start=(0, "-2*cos(alpha)"), tangent=-1)
     module = module_for(curve, "true_cosine")
     with mp.workdps(DIGITS):

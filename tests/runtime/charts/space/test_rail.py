@@ -206,7 +206,7 @@ LINE = gqm.line(length=1)
     ],
 )
 def test_refused(kind: type[GQMError], declare: Any, message: str) -> None:
-    """What is no piece in space, or no start of one, is told."""
+    """Pieces and starts that are impossible in space are refused."""
     with pytest.raises(kind, match=message):
         declare()
 

@@ -22,7 +22,7 @@ def _power(n: int, phi: mpf) -> mpf:
 
 
 def test_tables() -> None:
-    """The tables against integrals of powers, of which V**2 = y**n - y**(n + 1) is one that vanishes at both turns."""
+    """The tables are those of integrals of powers; V**2 = y**n - y**(n + 1) is one that vanishes at both turns."""
     y, k = SHARES, np.arange(1, whole_leg.TERMS)
     for n in range(1, 16):
         force = n * y ** (n - 1) - (n + 1) * y**n

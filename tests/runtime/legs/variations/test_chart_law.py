@@ -116,6 +116,42 @@ def test_jumps_of_the_force(rail: ModuleType) -> None:
                 assert abs(value - slope) <= TOLERANCE * max(1.0, abs(slope)), name
 
 
+def on_a_slope(lam0: Any, v0: Any, g: Any, mu: Any, t: Any) -> tuple[Any, Any]:
+    """Place and velocity of a body that is thrown up a slope of 3:4, stops and slides down."""
+    rise, hold = g * mpf("0.6"), mu * g * mpf("0.8")
+    up, stop = rise + hold, v0 / (rise + hold)
+    if t < stop:
+        return lam0 + v0 * t - up * t**2 / 2, v0 - up * t
+    down, late = rise - hold, t - stop
+    return lam0 + v0 * stop / 2 - down * late**2 / 2, -down * late
+
+
+def test_a_track_through_points(generated_folder: Path) -> None:
+    """Points on a straight line, whose spline is the line: friction up and down a slope."""
+    points = [(0.8 * s, 0.6 * s) for s in (0.0, 0.7, 1.9, 3.0, 4.4, 5.5, 7.0, 8.0)]
+    model = gqm.derive(gqm.Curve.sampled(points), gqm.Gravity() + gqm.CoulombFriction(mu="1/4"))
+    module = gqm.build(model, name="rough_slope", folder=generated_folder)
+    launch, times = {"lam0": 2.0, "v0": 6.0, "g": 9.81, "mu": 0.25}, (0.3, 0.7, 1.2)
+    motion = module.solve(**launch)
+    found, slopes = motion.sensitivity(times, tuple(launch)), motion.gradient("time_at", lam=2.5)
+    turn = motion.gradient("turning_points")
+    with mp.workdps(40):
+        exact = {name: mpf(value) for name, value in launch.items()}
+        up = exact["g"] * (mpf("0.6") + mpf("0.8") * exact["mu"])
+        for k, name in enumerate(launch):
+            for i, t in enumerate(times):
+                for row, field in enumerate((found.lam, found.v)):
+                    wanted = mp.diff(
+                        lambda x, n=name, t=t, r=row: on_a_slope(**{**exact, n: x}, t=mpf(t))[r], exact[name]
+                    )
+                    assert abs(field[k, i] - wanted) <= TOLERANCE * max(1, abs(wanted)), (name, t)
+        wanted = {"lam0": 1, "v0": exact["v0"] / up, "g": -(exact["v0"] ** 2) / (2 * up * exact["g"])}
+        for name, value in wanted.items():
+            assert abs(turn[name][0] - value) <= TOLERANCE, name
+        # It passes 2.5 on its way up, with v**2 = v0**2 - 2 up d.
+        assert abs(slopes["lam0"] + 1 / mp.sqrt(exact["v0"] ** 2 - up)) <= TOLERANCE
+
+
 def test_points_in_space_have_none(generated_folder: Path) -> None:
     """They are known in doubles only, which one error says."""
     points = [(float(k), 3.0 * np.sin(k / 3.0), 8.0 - 0.4 * k) for k in range(8)]

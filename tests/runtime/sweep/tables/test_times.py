@@ -231,7 +231,7 @@ def test_a_place_far_away_does_not_stop_a_sweep(module_of: Callable[[str], Modul
 
 
 def test_parameters_of_every_launch(bend: ModuleType) -> None:
-    """Parameters of every launch, and one of which no rail can be made: only that one is refused."""
+    """Every launch has its own parameters; one set gives no rail, and only that launch is refused."""
     mass, radius = np.linspace(1.0, 20.0, 12), np.where(np.arange(12) == 5, -1.0, 0.5)
     swept, good = bend.sweep("half_period", 1.0, m=mass, R=radius), np.arange(12) != 5
     assert np.array_equal(swept.values[good], np.full(11, bend.sweep("half_period", 1.0, R=0.5).values))

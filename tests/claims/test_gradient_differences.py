@@ -1,0 +1,56 @@
+"""Gradients of periods by every variable against differences of periods of 45 digits, for each conservative force."""
+
+import inspect
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+from paths import ROOT
+
+from gqm_sym.loading import load
+
+# The step of a difference, whose error is that of its square, and the digits of the periods.
+STEP, DIGITS = Fraction(1, 10**11), 45
+ULP = 2.0**-52
+
+# A module for each force and for each kind of curve, with the places of launch.
+LAUNCHES = {
+    "catenary": (0.5, 2.0),
+    "circle": (-2.0, 2.0),
+    "circle_rotating": (0.5, 1.5),
+    "circle_spring": (-1.5, 2.0),
+    "double_well": (0.4, 1.1),
+    "kepler": (0.5, 1.5),
+    "line_spring": (-2.0, 2.0),
+    "log_spiral": (-0.5, 0.3),
+    "parabola": (-1.0, 1.0),
+    "parabola_rolling": (-0.6, 0.6),
+    "rolling_circle": (-1.5, 1.5),
+    "rotating_parabola": (-0.6, 0.6),
+}
+
+
+@pytest.mark.parametrize("name", LAUNCHES)
+@settings(max_examples=2, deadline=None)
+@given(data=st.data())
+def test_gradients_of_periods(name: str, data: Any) -> None:
+    """They are right to two units in the last place."""
+    module, (low, high) = load(str(ROOT / "generated" / f"{name}.py"), name), LAUNCHES[name]
+    share, speed = data.draw(st.integers(1, 255)), data.draw(st.integers(1, 64))
+    arguments = inspect.signature(module.solve).parameters
+    values = {p: Fraction(str(arguments[p].default)) for p in module.PARAMETERS}
+    values |= {"lam0": Fraction(low) + Fraction(high - low) * Fraction(share, 256), "v0": Fraction(speed, 256)}
+    by = data.draw(st.sampled_from(sorted(values)))
+
+    def period(moved: Fraction) -> mpf:
+        beside = values | {by: values[by] + moved}
+        return mpf(module.solve(**{name: str(value) for name, value in beside.items()}).period_to(DIGITS))
+
+    found = module.solve(**{name: str(value) for name, value in values.items()}).gradient("period", by)[by]
+    with mp.workdps(DIGITS):
+        truth = (period(STEP) - period(-STEP)) / (2 * mpf(STEP.numerator) / STEP.denominator)
+        # Where it vanishes, the difference is 1e-22, the square of the step.
+        assert abs(found - truth) <= 2.0 * ULP * abs(truth) + 1e-20, (by, values)
