@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 11, input a74aedd594f9, body 9bfd8c27c982
+# interface 12, input a74aedd594f9, body b205ae5ef0f2
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -26,15 +26,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas,
-    LaunchRequest, Pass1, atan, cos, divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square,
-    divdiff2_cos, divdiff2_sin, iadd, iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near,
-    speed_squared_from_potential,
+    LaunchRequest, Pass1, atan, cos, cos_of_sum, divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum,
+    divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd, iconst, icos, imul, ipow, isin,
+    place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -289,44 +289,35 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
         L, Omega, g, a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
-        _t0 = sin(theta)
-        _t1 = L*Omega**2
-        out[0, i] = -L*(_t1*(_t0 + sin(a))*divdiff1_sin(a, theta, d)/2 + g*divdiff1_cos(a, theta, d))
+        _t0 = Omega**2
+        out[0, i] = L**2*_t0*divdiff1_cos_of_sum(0, 2, a, d)/2 - L*g*divdiff1_cos_of_sum(0, 1, a, d)
         out[1, i] = L
-        out[2, i] = L*_t0*(-_t1*cos(theta) + g)
+        out[2, i] = L*(-L*_t0*cos(theta) + g)*sin(theta)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (8, n)), carray(out, (2, n))
     for i in range(n):
-        L, Omega, g, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
-        _c5, a, b, da, db = p[9, i], lows[i], highs[i], left[i], right[i]
-        theta = place_from_ends(a, b, da, db)
-        _t0 = divdiff1_cos_in_square(da, db)
-        _t1 = da/2 - db/2
-        _t2 = _t1*divdiff1_sinc_in_square(da, db)
-        _t3 = da*db
-        out[0, i] = -L*(L*Omega**2*(_c1*divdiff1_sin(a, theta, da) + (_c3*_t0 + _c5*_t2)*(_c0 + _c3*(_c4 - _t0*_t3) + _c5*(_c2*_t1 - _t2*_t3)))/2 + g*(-_c3*_t2 + _c5*_t0))
+        L, Omega, g, _c0, _c1, _c2, _c3, da = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], left[i]
+        db = right[i]
+        _t0 = 2*da
+        _t1 = 2*db
+        out[0, i] = L**2*Omega**2*(-_c0*(da - db)*divdiff1_sinc_in_square(_t0, _t1) + _c1*divdiff1_cos_in_square(_t0, _t1)) - L*g*(-_c2*(da/2 - db/2)*divdiff1_sinc_in_square(da, db) + _c3*divdiff1_cos_in_square(da, db))
         out[1, i] = L
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
-        a, b = lows[i], highs[i]
-        _t0 = a/2
-        _t1 = _t0 - b/2
-        _t2 = _t0 + b/2
-        out[0, i] = sin(b)
-        out[1, i] = divdiff1_sin(a, b, -a + b)
-        out[2, i] = sinc_near(-_t1)
-        out[3, i] = sin(_t2)
-        out[4, i] = cos(_t1)
-        out[5, i] = cos(_t2)
+        middle, rest = middles[i], rests[i]
+        out[0, i] = sin_of_sum(0, 2, middle, rest, 0)
+        out[1, i] = cos_of_sum(0, 2, middle, rest, 0)
+        out[2, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[3, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(TIME_INTEGRAND_BATCH)
@@ -407,7 +398,7 @@ MODEL = CompiledModel(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
         integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
-        orbit_rows=6, integrand_rows=4,
+        orbit_rows=4, integrand_rows=4,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

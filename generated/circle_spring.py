@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 11, input bcc7b1afa151, body ee2ae1e0c027
+# interface 12, input bcc7b1afa151, body 7ecaa66b74a6
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -25,14 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, atan,
-    cos, divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd,
-    iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    cos, cos_of_sum, divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sin, divdiff1_sin_of_sum,
+    divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd, iconst, icos, imul, ipow, isin, place_from_ends, sin,
+    sin_of_sum, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -309,11 +310,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (5, n)), carray(out, (3, n))
     for i in range(n):
         L, w, h, g, a, theta, d = p[0, i], p[1, i], p[2, i], p[3, i], starts[i], places[i], offsets[i]
-        _t0 = L*divdiff1_cos(a, theta, d)
+        _t0 = L*divdiff1_cos_of_sum(0, 1, a, d)
         _t1 = w**2
         _t2 = sin(theta)
         _t3 = L*cos(theta)
-        out[0, i] = -_t0*g + _t1*(L**2*(_t2 + sin(a))*divdiff1_sin(a, theta, d) + _t0*(L*cos(a) + _t3 + 2*h))/2
+        out[0, i] = -_t0*g + _t1*(L**2*(_t2 + sin(a))*divdiff1_sin_of_sum(0, 1, a, d) + _t0*(L*cos(a) + _t3 + 2*h))/2
         out[1, i] = L
         out[2, i] = L*_t2*(_t1*_t3 - _t1*(_t3 + h) + g)
 
@@ -339,23 +340,21 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (5, n)), carray(out, (8, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (5, n)), carray(out, (8, n))
     for i in range(n):
-        a, b = lows[i], highs[i]
+        a, b, middle, rest = lows[i], highs[i], middles[i], rests[i]
         _t0 = -a + b
-        _t1 = a/2
-        _t2 = _t1 - b/2
-        _t3 = _t1 + b/2
+        _t1 = a/2 - b/2
         out[0, i] = sin(b)
         out[1, i] = cos(b)
         out[2, i] = divdiff1_cos(a, b, _t0)
         out[3, i] = divdiff1_sin(a, b, _t0)
-        out[4, i] = sinc_near(-_t2)
-        out[5, i] = sin(_t3)
-        out[6, i] = cos(_t2)
-        out[7, i] = cos(_t3)
+        out[4, i] = sinc_near(-_t1)
+        out[5, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[6, i] = cos(_t1)
+        out[7, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(AGM_ARGUMENTS_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 11, input 01e055bdd46f, body 5919f00e572c
+# interface 12, input 01e055bdd46f, body bf6f8221cd33
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -25,14 +25,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_cos, divdiff1_cos_in_square,
-    divdiff1_sinc_in_square, divdiff2_cos, iconst, icos, idiv, imul, isin, place_from_ends, sin,
-    speed_squared_from_potential,
+    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, cos_of_sum, divdiff1_cos,
+    divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iconst, icos, idiv, imul, isin,
+    place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -285,7 +285,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         _t0 = R*g
         _t1 = theta/2
         _t2 = 2*sin(_t1)
-        out[0, i] = _t0*divdiff1_cos(a, theta, d)
+        out[0, i] = _t0*divdiff1_cos_of_sum(0, 1, a, d)
         out[1, i] = R*_t2
         out[2, i] = -_t0*_t2*cos(_t1)
 
@@ -293,23 +293,24 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (7, n)), carray(out, (2, n))
     for i in range(n):
-        R, g, _c0, _c1, a, b, da, db = p[0, i], p[1, i], p[3, i], p[4, i], lows[i], highs[i], left[i], right[i]
-        theta = place_from_ends(a, b, da, db)
-        out[0, i] = R*g*(-_c0*(da/2 - db/2)*divdiff1_sinc_in_square(da, db) + _c1*divdiff1_cos_in_square(da, db))
-        out[1, i] = 2*R*sin(theta/2)
+        R, g, _c0, _c1, middle, rest, da, db = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i], left[i], right[i]
+        _t0 = da/2 - db/2
+        out[0, i] = R*g*(-_c0*_t0*divdiff1_sinc_in_square(da, db) + _c1*divdiff1_cos_in_square(da, db))
+        out[1, i] = 2*R*sin_of_sum(0, 1/2, middle, rest, _t0)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
-        a, b = lows[i], highs[i]
-        _t0 = a/2 + b/2
-        out[0, i] = sin(_t0)
-        out[1, i] = cos(_t0)
+        middle, rest = middles[i], rests[i]
+        out[0, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[1, i] = cos_of_sum(0, 1, middle, rest, 0)
+        out[2, i] = middle
+        out[3, i] = rest
 
 
 @compiled(BOUNDS_BATCH)
@@ -335,7 +336,7 @@ MODEL = CompiledModel(
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,
+        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=4,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 11, input 81dc4ee20e82, body 26cfa8b580ce
+# interface 12, input 81dc4ee20e82, body 8884c2dda3b5
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,14 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas,
-    LaunchRequest, Pass1, atan, cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, iadd,
-    icos, imul, ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    LaunchRequest, Pass1, atan, cos, cos_of_sum, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sin_of_sum,
+    divdiff1_sinc_in_square, divdiff2_sin, iadd, icos, imul, ipow, isin, isqrt, place_from_ends, sin, sin_of_sum,
+    sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -288,7 +289,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         a, b, g, _a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
         _t0 = b*g
         _t1 = cos(theta)
-        out[0, i] = _t0*divdiff1_sin(_a, theta, d)
+        out[0, i] = _t0*divdiff1_sin_of_sum(0, 1, _a, d)
         out[1, i] = sqrt(_t1**2*b**2 + a**2*sin(theta)**2)
         out[2, i] = _t0*_t1
 
@@ -311,18 +312,16 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (4, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
-        _a, _b = lows[i], highs[i]
-        _t0 = _a/2
-        _t1 = -_b/2 + _t0
-        _t2 = _b/2 + _t0
-        out[0, i] = sinc_near(-_t1)
-        out[1, i] = sin(_t2)
-        out[2, i] = cos(_t1)
-        out[3, i] = cos(_t2)
+        _a, _b, middle, rest = lows[i], highs[i], middles[i], rests[i]
+        _t0 = _a/2 - _b/2
+        out[0, i] = sinc_near(-_t0)
+        out[1, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[2, i] = cos(_t0)
+        out[3, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(TIME_INTEGRAND_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 11, input a0162e77d64e, body 84a6ffd40dfb
+# interface 12, input a0162e77d64e, body eff94b9c303d
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,14 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
-    divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iabs, iadd,
-    iconst, icos, imul, ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    cos_of_sum, divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sin, divdiff1_sin_of_sum,
+    divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iabs, iadd, iconst, icos, imul, ipow, isin, isqrt,
+    place_from_ends, sin, sin_of_sum, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -371,7 +372,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         _t8 = cos(_a)
         _t9 = sin(_a)
         _t10 = sqrt(_t5*_t9**2 + (_t8 - ecc)**2)
-        out[0, i] = k*(_t5*(_t3 + _t9)*divdiff1_sin(_a, E, d) + (_t1 + _t8 - 2*ecc)*divdiff1_cos(_a, E, d))/(_t0*_t10*_t7*(_t10 + _t7))
+        out[0, i] = k*(_t5*(_t3 + _t9)*divdiff1_sin_of_sum(0, 1, _a, d) + (_t1 + _t8 - 2*ecc)*divdiff1_cos_of_sum(0, 1, _a, d))/(_t0*_t10*_t7*(_t10 + _t7))
         out[1, i] = a*sqrt(_t1**2*_t5 + _t4)
         out[2, i] = _t0*_t3*k*(_t1*_t5 + _t2)/(a**2*sqrt(_t6)**3)
 
@@ -410,42 +411,41 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (15, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (15, n))
     for i in range(n):
-        a, ecc, _a, b = p[0, i], p[1, i], lows[i], highs[i]
+        a, ecc, _a, b, middle, rest = p[0, i], p[1, i], lows[i], highs[i], middles[i], rests[i]
         _t0 = -_a + b
-        _t1 = _a/2
-        _t2 = _t1 - b/2
-        _t3 = _t1 + b/2
-        _t4 = cos(_a)
-        _t5 = sin(_a)
-        _t6 = 1 - ecc**2
-        _t7 = sqrt(_t5**2*_t6 + (_t4 - ecc)**2)
-        _t8 = cos(b)
-        _t9 = sin(b)
-        _t10 = sqrt(_t6*_t9**2 + (_t8 - ecc)**2)
+        _t1 = _a/2 - b/2
+        _t2 = cos(_a)
+        _t3 = sin(_a)
+        _t4 = 1 - ecc**2
+        _t5 = sqrt(_t3**2*_t4 + (_t2 - ecc)**2)
+        _t6 = cos(b)
+        _t7 = sin(b)
+        _t8 = sqrt(_t4*_t7**2 + (_t6 - ecc)**2)
         out[0, i] = fabs(a)
         out[1, i] = divdiff1_cos(_a, b, _t0)
         out[2, i] = divdiff1_sin(_a, b, _t0)
-        out[3, i] = sinc_near(-_t2)
-        out[4, i] = sin(_t3)
-        out[5, i] = cos(_t2)
-        out[6, i] = cos(_t3)
-        out[7, i] = 1/_t7
-        out[8, i] = _t7
-        out[9, i] = 1/_t10
-        out[10, i] = _t10
-        out[11, i] = _t5
+        out[3, i] = sinc_near(-_t1)
+        out[4, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[5, i] = cos(_t1)
+        out[6, i] = cos_of_sum(0, 1, middle, rest, 0)
+        out[7, i] = 1/_t5
+        out[8, i] = _t5
+        out[9, i] = 1/_t8
+        out[10, i] = _t8
     for i in range(n):
         _a, b = lows[i], highs[i]
-        _t4 = cos(_a)
-        _t8 = cos(b)
-        _t9 = sin(b)
-        out[12, i] = _t9
-        out[13, i] = _t4
-        out[14, i] = _t8
+        _t2 = cos(_a)
+        _t3 = sin(_a)
+        _t6 = cos(b)
+        _t7 = sin(b)
+        out[11, i] = _t3
+        out[12, i] = _t7
+        out[13, i] = _t2
+        out[14, i] = _t6
 
 
 @compiled(TIME_INTEGRAND_BATCH)

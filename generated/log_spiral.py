@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 11, input 8cb1e254c2ba, body d49aeaf6795a
+# interface 12, input 8cb1e254c2ba, body ce2b1053c66b
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,14 +25,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_cos_in_square, divdiff1_exp,
-    divdiff1_sin, divdiff1_sinc_in_square, divdiff2_exp, divdiff2_sin, exp, iadd, iconst, icos, iexp, imul, ipow, isin,
-    isqrt, place_from_ends, sin, speed_squared_from_potential,
+    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, cos_of_sum, divdiff1_cos_in_square,
+    divdiff1_exp, divdiff1_sin, divdiff1_sin_of_sum, divdiff1_sinc_in_square, divdiff2_exp, divdiff2_sin, exp, iadd,
+    iconst, icos, iexp, imul, ipow, isin, isqrt, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -302,7 +302,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         _t0 = b*theta
         _t1 = exp(_t0)
         _t2 = g*r0
-        out[0, i] = _t2*(_t1*divdiff1_sin(a, theta, d) + b*divdiff1_exp(a*b, _t0, b*d)*sin(a))
+        out[0, i] = _t2*(_t1*divdiff1_sin_of_sum(0, 1, a, d) + b*divdiff1_exp(a*b, _t0, b*d)*sin(a))
         out[1, i] = _t1*r0*sqrt(b**2 + 1)
         out[2, i] = _t1*_t2*(b*sin(theta) + cos(theta))
 
@@ -323,17 +323,16 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (5, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (5, n))
     for i in range(n):
-        b, a, _b = p[1, i], lows[i], highs[i]
-        _t0 = _b/2 + a/2
+        b, a, _b, middle, rest = p[1, i], lows[i], highs[i], middles[i], rests[i]
         out[0, i] = sin(a)
         out[1, i] = exp(_b*b)
         out[2, i] = sqrt(b**2 + 1)
-        out[3, i] = sin(_t0)
-        out[4, i] = cos(_t0)
+        out[3, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[4, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(BOUNDS_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 11, input f60615287831, body 17c33b507f2d
+# interface 12, input f60615287831, body 6fec979fd5eb
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -25,14 +25,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, atan,
-    cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, icos, imul, place_from_ends, sin,
-    speed_squared_from_potential,
+    cos, cos_of_sum, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sin_of_sum, divdiff1_sinc_in_square, divdiff2_sin,
+    icos, imul, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -279,7 +279,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     for i in range(n):
         L, g, a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
         _t0 = L*g
-        out[0, i] = _t0*divdiff1_sin(a, theta, d)
+        out[0, i] = _t0*divdiff1_sin_of_sum(0, 1, a, d)
         out[1, i] = L
         out[2, i] = _t0*cos(theta)
 
@@ -295,14 +295,13 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
-        a, b = lows[i], highs[i]
-        _t0 = a/2 + b/2
-        out[0, i] = sin(_t0)
-        out[1, i] = cos(_t0)
+        middle, rest = middles[i], rests[i]
+        out[0, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[1, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(AGM_ARGUMENTS_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 11, input c93b8a64a5a5, body f5816e09c627
+# interface 12, input c93b8a64a5a5, body 436c932fec94
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -25,15 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=11)
+compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2,
     POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions,
-    CompiledModel, ExactFormulas, LaunchRequest, Pass1InSpace, atan, cos, divdiff1_cos_in_square, divdiff1_sin,
-    divdiff1_sinc_in_square, divdiff2_sin, iadd, iconst, icos, idiv, imul, ipow, isqrt, place_from_ends, sin, sinc_near,
-    speed_squared_from_potential,
+    CompiledModel, ExactFormulas, LaunchRequest, Pass1InSpace, atan, cos, cos_of_sum, divdiff1_cos_in_square,
+    divdiff1_sin, divdiff1_sin_of_sum, divdiff1_sinc_in_square, divdiff2_sin, iadd, iconst, icos, idiv, imul, ipow,
+    isqrt, place_from_ends, sin, sin_of_sum, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -340,12 +340,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
     for i in range(n):
         a, g, _a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
-        _t0 = theta/2
-        _t1 = a*g
-        _t2 = cos(_t0)
-        out[0, i] = _t1*divdiff1_sin(_a/2, _t0, d/2)
-        out[1, i] = a*sqrt(_t2**2 + 1)
-        out[2, i] = _t1*_t2
+        _t0 = a*g
+        _t1 = cos(theta/2)
+        out[0, i] = _t0*divdiff1_sin_of_sum(0, 1/2, _a, d)
+        out[1, i] = a*sqrt(_t1**2 + 1)
+        out[2, i] = _t0*_t1
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
@@ -366,18 +365,16 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (4, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
-        _a, b = lows[i], highs[i]
-        _t0 = _a/4
-        _t1 = _t0 - b/4
-        _t2 = _t0 + b/4
-        out[0, i] = sinc_near(-_t1)
-        out[1, i] = sin(_t2)
-        out[2, i] = cos(_t1)
-        out[3, i] = cos(_t2)
+        _a, b, middle, rest = lows[i], highs[i], middles[i], rests[i]
+        _t0 = _a/4 - b/4
+        out[0, i] = sinc_near(-_t0)
+        out[1, i] = sin_of_sum(0, 1/2, middle, rest, 0)
+        out[2, i] = cos(_t0)
+        out[3, i] = cos_of_sum(0, 1/2, middle, rest, 0)
 
 
 @compiled(TIME_INTEGRAND_BATCH)

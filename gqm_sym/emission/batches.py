@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Function, Symbol, cos, expand, sin
+from sympy import Expr, Function, S, Symbol, cos, expand, sin
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.derivation.algebra.rewrite import in_single_waves
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.sharing import hoist
@@ -97,19 +98,43 @@ def _apart(
     return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
+def _of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Expr:
+    """A function of a rate times the mean of some points, by the numbers whose sum this is; others as they are.
+
+    Multiplied by the rate of a wave, the rounding of a place far from zero is much more than that of the sine, and all
+    nodes of an orbit have it in common.
+    """
+    argument = call.args[0]
+    rates = {argument.diff(point) for point in points}
+    if len(rates) > 1 or any(rate.has(point) for rate in rates for point in points):
+        return call
+    rate = rates.pop()
+    phase = expand(argument - rate * sum(points))
+    return Function(f"{call.func.__name__}_of_sum")(phase, len(points) * rate, *sum_of)
+
+
+def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
+    """Write first differences of sines and cosines by a place and the gap to another one, whose sum is not rounded."""
+    names = {"divdiff1_sin", "divdiff1_cos"}
+    return form.replace(
+        lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in names,
+        lambda t: _of_sum(t, (start,), (start, gap)),
+    )
+
+
 def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
     """Return the function for first divided differences of the effective potential, ds and the potential's slopes."""
     model, names, place = lowering.model, lowering.names, lowering.place
     a, d = names.symbol("a"), names.symbol("d")
     starts, places, offsets = (names(name) for name in ("starts", "places", "offsets"))
-    potential = model.effective_potential
+    potential = in_single_waves(model.effective_potential, place)
     differences = Differences(place, (a, place), {(0, 1): d})
     return lowering.function(
         "potential_divdiff1_batch",
         (starts, places, offsets),
         f"U[a, {place}], ds/d{place} and dU/d{place}.",
         inside=[(a, at(starts)), (place, at(places)), (d, at(offsets))],
-        outputs=(differences.first(potential, 0, 1), model.ds, model.effective_potential_slope),
+        outputs=(_from_start(differences.first(potential, 0, 1), a, d), model.ds, model.effective_potential_slope),
         batch=True,
     )
 
@@ -122,9 +147,24 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     a, b, da, db = (names.symbol(s) for s in ("a", "b", "da", "db"))
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
-    forms = _apart((_near(differences.second(model.effective_potential)), model.ds), place, (a, b), (da, db))
+    potential = in_single_waves(model.effective_potential, place)
+    forms = _apart((_near(differences.second(potential)), model.ds), place, (a, b), (da, db))
     outputs, held = hoist(forms, {place, da, db})
     ends = [(a, at(lows)), (b, at(highs))]
+    middle, rest = names.symbol("middle"), names.symbol("rest")
+    middles, rests = names("middles"), names("rests")
+    outputs = [
+        form.replace(
+            lambda t: isinstance(t, (sin, cos)) and t.has(place),
+            lambda t: _of_sum(t, (place,), (middle, rest, (da - db) / 2)),
+        )
+        for form in outputs
+    ]
+    held = [
+        (symbol, _of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
+        for symbol, value in held
+    ]
+    held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]
     behind = len(lowering.order)
     second = lowering.function(
         "potential_divdiff2_batch",
@@ -144,9 +184,9 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
         return (second,)
     orbit = lowering.function(
         "orbit_invariants_batch",
-        (lows, highs),
+        (lows, highs, middles, rests),
         "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters.",
-        inside=ends,
+        inside=[*ends, (middle, at(middles)), (rest, at(rests))],
         outputs=tuple(value for _, value in held),
         batch=True,
     )

@@ -16,9 +16,11 @@ def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     orbits = lowering.model.symmetric_orbits
     if orbits is None:
         return ()
-    times = (
-        (_agm_arguments(lowering, orbits.agm_arguments),) if orbits.agm_arguments else _time_integrand(lowering, orbits)
-    )
+    times: tuple[FunctionIR, ...] = ()
+    if orbits.agm_arguments is not None:
+        times = (_agm_arguments(lowering, orbits.agm_arguments),)
+    elif orbits.time_integrand is not None:
+        times = _time_integrand(lowering, orbits, orbits.time_integrand)
     model = lowering.model
     if orbits.turning_point is None or model.cusp is not None or model.force.radius:
         return times
@@ -52,18 +54,18 @@ def _agm_arguments(lowering: Lowering, squares: tuple[Expr, Expr]) -> FunctionIR
     )
 
 
-def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits) -> tuple[FunctionIR, ...]:
+def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr) -> tuple[FunctionIR, ...]:
     names = lowering.names
     sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
     own = {symbol: names.symbol(symbol.name.removeprefix("_")) for symbol in (HALF, *dict(orbits.invariants))}
     here = own | at_place(own, sine2, cosine2)
-    outputs, calls = hoist([form.xreplace(here) for form in (orbits.time_integrand, orbits.divisor)], {sine2, cosine2})
+    outputs, calls = hoist([form.xreplace(here) for form in (integrand, orbits.divisor)], {sine2, cosine2})
     ends = {own[symbol]: end.xreplace(own) for symbol, end in orbits.invariants}
     used = set().union(*(form.free_symbols for form in outputs))
     held = [*ends.items(), *((symbol, call.xreplace(ends)) for symbol, call in calls)]
     held = [(symbol, value) for symbol, value in held if symbol in used]
     behind = len(lowering.order)
-    integrand = lowering.function(
+    emitted = lowering.function(
         "time_integrand_batch",
         (sine2, cosine2),
         "(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17).",
@@ -73,7 +75,7 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits) -> tuple[Functi
         rows_behind=len(held),
     )
     if not held:
-        return (integrand,)
+        return (emitted,)
     halves = names("halves")
     invariants = lowering.function(
         "integrand_invariants_batch",
@@ -83,4 +85,4 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits) -> tuple[Functi
         outputs=tuple(value for _, value in held),
         batch=True,
     )
-    return integrand, invariants
+    return emitted, invariants

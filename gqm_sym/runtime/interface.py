@@ -63,8 +63,8 @@ function of a batch        arguments                rows of ``out``
 potential_divdiff1_batch   n, a, lam, d, p, out     U[a, lam], ds/dlam, dU/dlam
 potential_divdiff2_batch   n, a, b, da, db, p, out  U[a, lam, b], ds/dlam; NaN where the points lie too far apart for
                                                     the closed form
-orbit_invariants_batch     n, a, b, p, out          terms that are constant along an orbit, which
-                                                    potential_divdiff2_batch reads behind the parameters
+orbit_invariants_batch     n, a, b, middle, rest,   terms that are constant along an orbit, which
+                           p, out                   potential_divdiff2_batch reads behind the parameters
 bounds_batch               n, lo, hi, p, out        lower and upper bound of dU/dlam, then of ds/dlam
 time_integrand_batch       n, sine2, cosine2, p,    (dt/du)**2 [s2], and its divisor: where that is small, digits are
                            out                      lost
@@ -78,10 +78,10 @@ turning_point_batch        n, offset, v2, p, out    half the orbit's width [[lam
 
 ``time_integrand_batch`` may exist for orbits about an axis of symmetry. Their half period is an integral over the angle
 u, where ``sine2`` = sin(u)**2 is the square of a coordinate divided by its largest value, and ``cosine2`` = cos(u)**2.
-``half`` is half of an orbit's width. If that integral is a complete elliptic integral of the first kind, a module has
-``agm_arguments_batch`` instead: pi over the half period is the arithmetic-geometric mean of two numbers. In a well that
-is monotone on either side, the turning point may have a closed form, ``turning_point_batch``, in terms of the launch's
-offset from the axis and its V**2.
+``half`` is half of an orbit's width, and ``middle + rest`` is the middle of both ends in two doubles. If that integral
+is a complete elliptic integral of the first kind, a module has ``agm_arguments_batch`` instead: pi over the half period
+is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side, the turning point may have a
+closed form, ``turning_point_batch``, in terms of the launch's offset from the axis and its V**2.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -91,7 +91,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 11
+INTERFACE = 12
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -108,7 +108,7 @@ SEPARATED_TERMS = POTENTIAL_DIVDIFF1
 POTENTIAL_DIVDIFF1_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF2_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
 BOUNDS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
-ORBIT_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
+ORBIT_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
 TIME_INTEGRAND_BATCH = types.void(types.intp, REAL, REAL, MANY, MANY)
 INTEGRAND_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
 AGM_ARGUMENTS_BATCH = types.void(types.intp, MANY, MANY, MANY)

@@ -9,8 +9,8 @@ from typing import Any
 _NAMES_BY_HOME = {
     "arithmetic.divided_differences.first": (
         "divdiff1_abs divdiff1_acos divdiff1_acosh divdiff1_asin divdiff1_asinh divdiff1_atan divdiff1_atanh "
-        "divdiff1_cos divdiff1_cosh divdiff1_exp divdiff1_ipow divdiff1_log divdiff1_rpow divdiff1_sin "
-        "divdiff1_sinh divdiff1_tan divdiff1_tanh"
+        "divdiff1_cos divdiff1_cos_of_sum divdiff1_cosh divdiff1_exp divdiff1_ipow divdiff1_log divdiff1_rpow "
+        "divdiff1_sin divdiff1_sin_of_sum divdiff1_sinh divdiff1_tan divdiff1_tanh"
     ),
     "arithmetic.divided_differences.second": (
         "divdiff2_abs divdiff2_acos divdiff2_acosh divdiff2_asin divdiff2_asinh divdiff2_atan divdiff2_atanh "
@@ -21,7 +21,7 @@ _NAMES_BY_HOME = {
         "divdiff2_cosh_near divdiff2_exp divdiff2_sin divdiff2_sin_near divdiff2_sinh divdiff2_sinh_near "
         "divdiff2_tan divdiff2_tanh sinc_near"
     ),
-    "arithmetic.elementary": "atan cos cosh exp sin sinh",
+    "arithmetic.elementary": "atan cos cos_of_sum cosh exp sin sin_of_sum sinh",
     "arithmetic.intervals": (
         "iabs iacos iacosh iadd iasin iasinh iatan iatanh iconst icos icosh idiv iexp iinv ilog imul ipi "
         "ipoint ipow irpow isin isinh isqrt itan itanh"

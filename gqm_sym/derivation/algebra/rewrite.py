@@ -10,6 +10,7 @@ from itertools import combinations
 from math import prod
 
 import sympy as sp
+from sympy.simplify.fu import TR8
 
 from gqm_sym.budgets import spend
 from gqm_sym.derivation.algebra.algebra import Algebra, Fraction, Polynomial
@@ -26,6 +27,9 @@ MAX_EXPANDED = 16
 
 # The largest number of factors that are tried together as one multiple angle.
 MAX_MERGED = 5
+
+# Waves up to which products of sines and cosines are written as sums.
+MAX_WAVES = 8
 Power = tuple[sp.Expr, int]
 """A factor and its exponent."""
 
@@ -81,6 +85,29 @@ def multiplied_out(expression: sp.Expr) -> sp.Expr:
     if terms > MAX_EXPANDED * MAX_EXPANDED or sp.count_ops(expression) > MAX_TIDIED:
         return expression
     return shortest([expression, tidy(without_waves(sp.expand_mul(expression)))])
+
+
+def in_single_waves(expression: sp.Expr, place: sp.Symbol) -> sp.Expr:
+    """Write products of sines and cosines, whose arguments are linear in a place, as sums of such waves.
+
+    The second divided difference of a product has three terms, which may cancel, and that of a wave has one. Forms of
+    other functions of the place, or of too many waves, are left as they are.
+    """
+
+    def is_wave(factor: sp.Expr) -> bool:
+        base, power = factor.as_base_exp()
+        linear = isinstance(base, (sp.sin, sp.cos)) and not base.args[0].diff(place).has(place)
+        return bool(linear and power.is_Integer and power.is_positive)
+
+    if sp.count_ops(expression) > MAX_TIDIED:
+        return expression
+    waves = []
+    for term in sp.Add.make_args(sp.expand_mul(expression)):
+        fixed, moving = term.as_independent(place, as_Add=False)
+        if moving != 1 and not all(map(is_wave, sp.Mul.make_args(moving))):
+            return expression
+        waves += sp.Add.make_args(sp.expand_mul(fixed * TR8(moving)))
+    return sp.Add(*waves) if len(waves) <= MAX_WAVES else expression
 
 
 def without_poles(expression: sp.Expr) -> sp.Expr:

@@ -25,6 +25,9 @@ MIN_GROWTH = sp.Rational(1, 4)
 # A sine or cosine is written in powers of the slowest one if its rate is at most this multiple of the slowest rate.
 MAX_MULTIPLE = 8
 
+# The highest degree of a polynomial in the square of a sine that is evaluated: of higher ones the powers cancel.
+MAX_DEGREE = 4
+
 
 def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(f"_{name}", real=True)
@@ -52,7 +55,8 @@ class SymmetricOrbits:
     Attributes
     ----------
     time_integrand
-        (dt/du)**2 in the symbols of this module and the run-time parameters.
+        (dt/du)**2 in the symbols of this module and the run-time parameters. None where its terms cancel, so that
+        second divided differences have more digits.
     divisor
         The divisor of ``time_integrand``. Next to a barrier it nearly vanishes at some places, and digits are lost.
     invariants
@@ -67,7 +71,7 @@ class SymmetricOrbits:
         the time is not a complete elliptic integral of the first kind.
     """
 
-    time_integrand: sp.Expr
+    time_integrand: sp.Expr | None
     divisor: sp.Expr
     invariants: tuple[tuple[sp.Symbol, sp.Expr], ...]
     turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None
@@ -142,13 +146,16 @@ def symmetric_orbits(
         (SINE_SQUARED, waves.sine(rate * HALF / 2) ** 2),
         (COSINE_FOURTH, cosine**4),
     )
+    degrees = [_degree(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
+    cancels = waves.sign < 0 and any(MAX_DEGREE < degree < inf for degree in degrees)
+    times = None if cancels else integrand, divisor, invariants
     square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
     if square is None:
-        return _with_agm(integrand, divisor, invariants, None)
+        return _with_agm(*times, None)
     turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
     if waves.sign < 0:
         turn, share = 4 * sp.atan(sp.sqrt(square) / (1 + sp.sqrt(1 - square))) / abs(rate), square
-    return _with_agm(integrand, divisor, invariants, (turn, growth, share))
+    return _with_agm(*times, (turn, growth, share))
 
 
 def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) -> tuple[sp.Expr | None, sp.Expr]:
@@ -203,12 +210,14 @@ def _degree(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
 
 
 def _with_agm(
-    integrand: sp.Expr,
+    integrand: sp.Expr | None,
     divisor: sp.Expr,
     invariants: tuple[tuple[sp.Symbol, sp.Expr], ...],
     turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
 ) -> SymmetricOrbits:
     """Return the record, with the arguments of the arithmetic-geometric mean if there are any."""
+    if integrand is None:
+        return SymmetricOrbits(None, divisor, invariants, turning_point, None)
     sine2, cosine2 = _symbol("sine2"), _symbol("cosine2")
     inverse = 1 / integrand.xreplace(at_place({}, sine2, cosine2))
     arguments = None

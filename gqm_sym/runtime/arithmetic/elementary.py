@@ -12,6 +12,7 @@ the others their limits.
 
 from math import fabs, factorial, inf, pi
 
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, from_bits, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
@@ -134,6 +135,33 @@ def sin(x):  # type: ignore[no-untyped-def]
 def cos(x):  # type: ignore[no-untyped-def]
     """Return the cosine."""
     turns, r, over = reduced(x)
+    value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
+    return choose((turns + 1) & 2 == 2, -value, value)
+
+
+@Inlined
+def reduced_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
+    """The same as `reduced` gives of ``phase + rate*(middle + rest + offset)``, in which no rounding counts."""
+    place, place_low = two_sum(middle, offset)
+    way = rate * place
+    total, total_low = two_sum(phase, way)
+    turns, r, over = reduced(total)
+    r, r_low = two_sum(r, fma(rate, rest + place_low, fma(rate, place, -way)) + total_low)
+    return turns, r, over - r_low
+
+
+@Inlined
+def sin_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
+    """The sine of ``phase + rate*(middle + rest + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
+    value = choose(turns & 1 == 1, cosine_kernel(r, over), sine_kernel(r, over))
+    return choose(turns & 2 == 2, -value, value)
+
+
+@Inlined
+def cos_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
+    """The cosine of ``phase + rate*(middle + rest + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
     value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
     return choose((turns + 1) & 2 == 2, -value, value)
 

@@ -30,8 +30,8 @@ from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # The trapezoidal rule has converged if two successive changes have shrunk by this factor and the next one would be
-# smaller than this share of the value, or if the last change is rounding only and the one before was below the third
-# number.
+# smaller than a share of the value, which is the second number if all digits are wanted, or if the last change is
+# rounding only and the one before was below the third number.
 MAX_RATIO, MAX_NEXT_CHANGE, MAX_CHANGE_BEFORE = 1e-3, 1e-27, 1e-20
 
 # The number of places that are evaluated together at the ends: both turning points, the launch, and the launch again to
@@ -216,7 +216,7 @@ def add_nodes(integrand, nodes, first, stop, total):  # type: ignore[no-untyped-
 
 
 @Inner
-def mean_by_trapezoid(integrand, nodes, ends):  # type: ignore[no-untyped-def]
+def mean_by_trapezoid(integrand, nodes, ends, tolerance):  # type: ignore[no-untyped-def]
     """Return the mean of the integrand with its error by the trapezoidal rule; NaN if that does not converge."""
     total, before, value, value_low = ends, inf, inf, 0.0
     for level in range(len(LEVELS) - 1):
@@ -225,7 +225,7 @@ def mean_by_trapezoid(integrand, nodes, ends):  # type: ignore[no-untyped-def]
         high, low, rounding = total[0] / n, total[1] / n, total[2] / n
         change = fabs(add(high, low, -value, -value_low)[0]) if level > 0 else inf
         following = change * change / before
-        if change <= MAX_RATIO * before and before < inf and following <= MAX_NEXT_CHANGE * high:
+        if change <= MAX_RATIO * before and before < inf and following <= tolerance * high:
             return high, low, rounding + following
         if change <= rounding and before <= MAX_CHANGE_BEFORE * high:
             return high, low, rounding + change
@@ -337,7 +337,7 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
 
 
 @Inner
-def find_orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
+def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance):  # type: ignore[no-untyped-def]
     """Return the duration and the turning points of an orbit, which are NaN if they are not found.
 
     Parameters
@@ -356,6 +356,8 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: 
         0 for a libration, else the sign of ds/dt on a lap.
     nodes : (4, n) array
         The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`), or none if the duration is not wanted.
+    tolerance : float
+        The relative error of the trapezoidal rule that is small enough.
 
     Returns
     -------
@@ -383,7 +385,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: 
         width = (direction * scale[0], direction * scale[1])
     mean = (nan, nan, nan)
     if nodes.shape[1] > 0:
-        mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends)
+        mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends, tolerance)
     high, low = multiply(mean[0], mean[1], scale[0], scale[1])
     duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
     low_error, high_error = errors[0] + UNIT * fabs(start[0]), errors[1] + UNIT * fabs(end[0])
@@ -400,7 +402,8 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
     """Return what `find_orbit_time` returns."""
     address, operations, parts, registers = tape
     tape = (address, uncounted(operations), parts, registers)
-    return find_orbit_time(tape, uncounted(work), uncounted(p), launch, offsets, direction, uncounted(nodes))
+    work, p, nodes = uncounted(work), uncounted(p), uncounted(nodes)
+    return find_orbit_time(tape, work, p, launch, offsets, direction, nodes, MAX_NEXT_CHANGE)
 
 
 class Orbit(NamedTuple):

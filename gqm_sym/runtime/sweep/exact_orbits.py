@@ -29,8 +29,9 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
 
-# The largest error of a turning point, as a share of the orbit's width.
-MAX_TURN_ERROR = 2.0**-54
+# The largest error of a turning point, as a share of the orbit's width, and of the rule for the time, as a share of it:
+# the answer is rounded to a double.
+MAX_TURN_ERROR, MAX_RULE_ERROR = 2.0**-54, 1e-19
 
 
 @entry(
@@ -74,7 +75,8 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         for row in range(p.shape[1]):
             p[0, row] = element(columns, PARAMETERS + row, k)
         launch = element(columns, LAM0, k), 0.0, element(columns, V0, k), 0.0
-        found = find_orbit_time(tape, work, p, launch, (low, high), direction, lap if circulates else half)
+        rule = lap if circulates else half
+        found = find_orbit_time(tape, work, p, launch, (low, high), direction, rule, MAX_RULE_ERROR)
         duration, lower, upper, _ = found
         if quantity == TURNING_POINTS:
             values[k, 0], values[k, 1] = lower[0], upper[0]

@@ -213,3 +213,12 @@ def test_half_periods_have_settled(track: str, z: str, places: list[float], modu
         with mp.workdps(60):
             truth = by_heights(model, mpf(place))
         assert abs(mpf(float(value)) - truth) <= 4 * np.spacing(float(truth))
+
+
+def test_high_powers_of_a_square_are_not_evaluated() -> None:
+    """Of three times a rate, and of its square in ds: they cancel, and second differences of waves do not."""
+    curve = gqm.Curve.parametric(x="sin(2*t)", z="-cos(t) - cos(3*t)/2", parameter="t", period="2*pi")
+    orbits = gqm.derive(curve, GRAVITY).symmetric_orbits
+    assert orbits is not None
+    assert orbits.time_integrand is None
+    assert orbits.agm_arguments is None

@@ -16,6 +16,8 @@ ULPS = 1.0
 DIGITS = 60
 # Roundings of the argument that a sine of a very large one may stand for: worst measured 5.
 LARGE = 8
+# Below this the rounding of the last sum of the argument's low parts counts, which is 2**-106 of the argument.
+SMALL_SINE = 1e-12
 COUNT = 500
 
 FUNCTIONS: dict[str, Callable[[mpf], mpf]] = {"sin": mp.sin, "cos": mp.cos}
@@ -47,6 +49,19 @@ def test_error_is_below_one_last_place(name: str, kind: str) -> None:
             truth = FUNCTIONS[name](mpf(x))
             error = abs(mpf(getattr(elementary, name)(x)) - truth) / mpf(np.spacing(abs(float(truth))))
             assert error <= ULPS, x
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_no_rounding_of_a_sum_counts(name: str) -> None:
+    """Of a phase and a rate times a place in two doubles and an offset: the sine is that of the exact sum."""
+    source = random.Random(name)
+    with mp.workdps(DIGITS):
+        for _ in range(COUNT):
+            phase, rate, middle, offset = (source.uniform(-size, size) for size in (3.0, 9.0, 20.0, 2.0))
+            rest = source.uniform(-0.5, 0.5) * np.spacing(middle)
+            truth = FUNCTIONS[name](phase + mpf(rate) * (mpf(middle) + rest + offset))
+            found = getattr(elementary, f"{name}_of_sum")(phase, rate, middle, rest, offset)
+            assert abs(mpf(found) - truth) <= ULPS * np.spacing(max(abs(float(truth)), SMALL_SINE))
 
 
 GROWING: dict[str, Callable[[mpf], mpf]] = {"exp": mp.exp, "sinh": mp.sinh, "cosh": mp.cosh}

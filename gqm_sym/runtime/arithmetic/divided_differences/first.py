@@ -10,7 +10,7 @@ from math import atan2 as angle
 from math import pow as power
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import cos, cosh, exp, expm1_below, sin, sinh
+from gqm_sym.runtime.arithmetic.elementary import cos, cos_of_sum, cosh, exp, expm1_below, sin, sin_of_sum, sinh
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
@@ -65,6 +65,18 @@ def divdiff1_cos(x, y, h):  # type: ignore[no-untyped-def]
     """cos[x,y] = -sin((x+y)/2) sinc(h/2); near a zero of the sine the rounding of x + y counts."""
     middle, rest = two_sum(x, y)
     return -(sin(0.5 * middle) + 0.5 * rest * cos(0.5 * middle)) * sinc(0.5 * h)
+
+
+@Inlined
+def divdiff1_sin_of_sum(phase, rate, start, gap):  # type: ignore[no-untyped-def]
+    """sin[x,y] with x = phase + rate*start and y = x + rate*gap; no rounding of x or y counts."""
+    return cos_of_sum(phase, rate, start, 0.0, 0.5 * gap) * sinc(0.5 * rate * gap)
+
+
+@Inlined
+def divdiff1_cos_of_sum(phase, rate, start, gap):  # type: ignore[no-untyped-def]
+    """cos[x,y], as for the sine."""
+    return -sin_of_sum(phase, rate, start, 0.0, 0.5 * gap) * sinc(0.5 * rate * gap)
 
 
 @Inner

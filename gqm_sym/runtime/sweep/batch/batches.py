@@ -157,7 +157,7 @@ def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[n
         if ahead:
             start_search(fns, n, rows, p, domain, monotone, scratch.work)
         else:
-            start_search_behind(n, rows)
+            start_search_behind(fns, n, rows, p, monotone, scratch.work)
         search(fns, n, rows, p, scratch.work)
         classify(n, rows)
         if ahead and contains(rows[TRIAL, :n], FOUND):

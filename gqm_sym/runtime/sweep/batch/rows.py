@@ -32,7 +32,7 @@ AXIS_NUMBER          how many such distances that axis is from the one that is k
 ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
 ==================== ==================================================================== ======================
 
-The quadrature needs only the rows before TIME_ROWS, and for librations only those before LIBRATION_ROWS.
+The quadrature needs only the rows before TIME_ROWS.
 """
 
 from typing import NamedTuple
@@ -51,7 +51,7 @@ INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, 
 END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(9, 15)
 LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(15, 20)
 ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(20, 26)
-TIME_ROWS, LIBRATION_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, LAUNCH_PLACE, OFFSET_LOW
+TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
 CLOSED = -1.0

@@ -7,6 +7,7 @@ from math import fabs, inf, nan, pi, sqrt
 
 import numpy as np
 
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.calls import (
     call_agm_arguments_batch,
     call_integrand_invariants_batch,
@@ -39,7 +40,6 @@ from gqm_sym.runtime.sweep.batch.rows import (
     INDEX,
     LAUNCH_PLACE,
     LAUNCH_V2,
-    LIBRATION_ROWS,
     OFFSET_HIGH,
     OFFSET_LOW,
     SUM,
@@ -54,7 +54,7 @@ from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
 AXIS_LIBRATION, AGM_LIBRATION = 2, 3
 
 # For each kind except the last, the number of rows of a batch that the trapezoidal rule needs.
-NEEDED_ROWS = (LIBRATION_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
+NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
 
 # The squares of cosine and sine at the nodes. Share 0 is one end of the orbit, share 1/2 its axis of symmetry.
 COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
@@ -63,9 +63,10 @@ COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 
 # The ratio of the smallest to the largest regular factor of V**2 above which roundings of the turning points, or of the
-# energy of a lap, do not matter. In even wells both turning points may be near a hilltop, so the factor at these is
-# used, unless they are exact, as those of a launch from rest are.
-MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.25, 0.1, 0.5
+# energy of a lap, do not matter: for librations from rest, one turning point of which is exact, for other librations,
+# and for laps. In even wells both turning points may be near a hilltop, so the factor at these is used, unless they are
+# exact, as those of a launch from rest are.
+MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.15, 0.25, 0.1, 0.5
 
 # The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
 # MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
@@ -157,26 +158,35 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
     more = 0 if kind == CIRCULATION else scratch.invariant_counts[kind // AXIS_LIBRATION]
     if more:
         p, halves = params[: count * n].reshape(count, n), scratch.work[0, :n]
+        middles, rests = scratch.work[1, :n], scratch.work[2, :n]
         invariants = params[count * n : (count + more) * n].reshape(more, n)
         if kind == AXIS_LIBRATION:
             for j in range(n):
                 halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
             call_integrand_invariants_batch(fns.integrand_invariants, n, halves, p, invariants)
         else:
-            call_orbit_invariants_batch(fns.orbit_invariants, n, rows[END_LOW, :n], rows[END_HIGH, :n], p, invariants)
+            for j in range(n):
+                total, lost = two_sum(rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j])
+                middles[j], rest = two_sum(rows[LAUNCH_PLACE, j], 0.5 * total)
+                rests[j] = rest + 0.5 * lost
+            ends = rows[END_LOW, :n], rows[END_HIGH, :n]
+            call_orbit_invariants_batch(fns.orbit_invariants, n, ends[0], ends[1], middles, rests, p, invariants)
     return count + more
 
 
 @Inner
-def judge_level(rows, n, nodes, least, verdict):  # type: ignore[no-untyped-def]
-    """Set each orbit's time by a level of the rule, and the verdict on it; ``least`` is the smallest ratio of factors
-    that doubles permit.
+def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
+    """Set each orbit's time by a level of the rule, and the verdict on it.
+
+    ``ratios`` are the smallest ratios of factors that doubles permit, for a launch from rest and for another one.
     """
+    from_rest, thrown = ratios
     for j in range(n):
         value, before = rows[SUM, j] / nodes, rows[CHANGE, j]
         change = fabs(value - rows[VALUE, j]) / value
         rows[VALUE, j], rows[CHANGE, j] = value, change
         high, at_turn = rows[FACTOR_HIGH, j], rows[FACTOR_AT_TURN, j]
+        least = choose(rows[LAUNCH_V2, j] == 0.0, from_rest, thrown)
         clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > MIN_EVEN_RATIO * high)
         verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
 
@@ -208,7 +218,8 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
         rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
         rows[FACTOR_AT_TURN, j] = inf
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD and kind != CIRCULATION else 1.0
-    least = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
+    from_rest = MIN_REST_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
+    thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
@@ -229,7 +240,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
                     rows[VALUE, j] += share * rates[j]
         for j in range(n):
             rows[SUM, j] += more[j]
-        judge_level(rows, n, nodes, least, work[0, :n])
+        judge_level(rows, n, nodes, (from_rest, thrown), work[0, :n])
         if begin > 0:
             continuing = answer_level(rows, n, factor, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:

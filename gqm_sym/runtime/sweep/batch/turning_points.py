@@ -110,6 +110,28 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
 
 
 @Inner
+def stop_at_hills(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
+    """Let searches that would begin at a mirror image begin at the axis of symmetry if V**2 < 0 there.
+
+    The image has the same V**2, and belongs to another orbit then. ``axes`` has the distances of the axes from the
+    launches, and those of other searches, which stay as they are, have TRIAL there.
+    """
+    offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    start, w0, direction, trial = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        rows[SEARCH_DIRECTION, :n],
+        rows[TRIAL, :n],
+    )
+    for j in range(n):
+        offsets[j] = direction[j] * axes[j]
+        places[j] = start[j] + offsets[j]
+    call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
+    for j in range(n):
+        trial[j] = choose(w0[j] - 2.0 * offsets[j] * out[0, j] < 0.0, axes[j], trial[j])
+
+
+@Inner
 def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead of each launch. A body at rest starts in the direction of the force.
 
@@ -137,6 +159,7 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
     none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    axes = work[5, :n]
     for j in range(n):
         undecided[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), 1.0, 0.0)
     if contains(undecided, 1.0):
@@ -170,10 +193,13 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
         state[j] = choose(decided & (zero[j] <= length[j]) & (state[j] == SEEKING), FOUND, state[j])
         axis[j], next_axis[j] = choose(known, axis[j], first), step
         number[j] = choose(known | (step == 0.0), 0.0, direction[j] * passed)
+        axes[j] = choose((w0[j] == 0.0) & (first > 0.0) & (first < length[j]), first, trial[j])
+    if not monotone and contains(state, SEEKING):
+        stop_at_hills(fns, n, rows, p, axes, work)
 
 
 @Inner
-def start_search_behind(n, rows):  # type: ignore[no-untyped-def]
+def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-untyped-def]
     """Set up the search behind each launch; a launch from rest needs none.
 
     The zero ahead is stored as an offset in END_LOW. AXIS_DISTANCE becomes the offset of the last axis before it; the
@@ -194,7 +220,7 @@ def start_search_behind(n, rows):  # type: ignore[no-untyped-def]
         rows[END_LOW, :n],
         rows[LAUNCH_V2, :n],
     )
-    behind = rows[ZERO_BEHIND, :n]
+    behind, axes = rows[ZERO_BEHIND, :n], work[5, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
         passed = choose(step > 0.0, whole_below((ahead - axis[j]) / step), 0.0)
@@ -203,10 +229,13 @@ def start_search_behind(n, rows):  # type: ignore[no-untyped-def]
         length[j] = choose(length_behind[j] == CLOSED, length[j] - ahead, length_behind[j])
         mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
         trial[j] = choose(mirrored < length[j], mirrored, length[j])
+        axes[j] = choose((last < 0.0) & (-last < length[j]), -last, trial[j])
     for j in range(n):
         known = behind[j] == behind[j]
         direction[j], zero[j] = -direction[j], choose(known, behind[j], 0.0)
         state[j] = choose((w0[j] > 0.0) & (behind[j] != behind[j]), SEEKING, FOUND)
+    if not monotone and contains(state, SEEKING):
+        stop_at_hills(fns, n, rows, p, axes, work)
 
 
 @Inner

@@ -203,6 +203,22 @@ def test_released_beside_the_top(module_of: ModuleOf) -> None:
             assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
+# Half periods of batches: twice the distance from 1 to the next double, relative.
+TWO_ULPS = 2.0 * 2.0**-52
+
+
+def test_half_periods_on_a_curve_of_several_waves(tmp_path: Path) -> None:
+    """Far from zero too: to the last places those of solving, which are correctly rounded, and most are in batches."""
+    curve = gqm.Curve.polar("cos(4*t)", parameter="t", period="2*pi")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="several_waves", folder=tmp_path)
+    wells = [(4.1, 4.6), (-2.2, -1.7), (0.3, 0.6)]
+    lam0 = np.concatenate([np.random.default_rng(5).uniform(*well, 8) for well in wells])
+    swept = module.sweep("half_period", lam0)
+    truth = np.array([module.solve(place).half_period for place in lam0.tolist()])
+    assert (swept.route == quantities.BATCH).mean() > 0.7
+    assert swept.values == pytest.approx(truth, rel=TWO_ULPS, abs=0.0)
+
+
 def test_wells_about_neighbouring_axes_differ(tmp_path: Path) -> None:
     """Swings about both poles of a circle, also of the centre of a rolling body: each has the time of its own well."""
     law = gqm.Potential("G*z - k*z**2") + gqm.Rolling(radius="rho")
