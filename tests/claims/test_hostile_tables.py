@@ -85,7 +85,7 @@ def test_a_table_without_end(read: Callable[[], object], tmp_path: Path) -> None
             read()
         table.unlink()
     table.mkdir()
-    with confined(), pytest.raises(SpecFileError, match=r"no plain file|cannot be read"):
+    with confined(), pytest.raises(SpecFileError, match=r"not a plain file|cannot be read"):
         read()
 
 

@@ -10,6 +10,7 @@ from math import inf, nan, prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import GQMError, InputError, SolutionError
@@ -20,7 +21,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import BoundTape, record
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
-from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
+from gqm_sym.runtime.launch.request import MAX_LAPS, ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.legs.answers import Track
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -127,12 +128,20 @@ def sweep(
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
             if chosen is not None:
                 answers.put(chosen, some)
+    if domain:
+        answers.status[np.broadcast_to(_too_far(columns[0], domain[2]).ravel(), size)] = quantities.UNDECIDED
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
         values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
         answers.route[k] = quantities.SOLVE
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
+
+
+def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
+    """Return which launches `solve` refuses because doubles cannot tell places apart so many laps away."""
+    found: NDArray[np.bool_] = np.abs(lam0) > MAX_LAPS * np.where(period > 0.0, period, inf)
+    return found
 
 
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:

@@ -41,7 +41,7 @@ def test_near_start_is_moved_onto_the_curve() -> None:
         ("x**2 + z**2 + 1", (1.0, 0.0), "not on the curve, and no point of the curve was found near it"),
         ("x**2 - z**2", (0.0, 0.0), r"start: \(0\.0, 0\.0\) is a singular point: grad F vanishes there"),
         ("(x**2 + z**2 - 1)**2", (1.0, 0.0), "is a singular point"),
-        ("x**2 + z**2 - 1", (math.nan, 0.0), "no finite point"),
+        ("x**2 + z**2 - 1", (math.nan, 0.0), "not a finite point"),
     ],
     ids=["off the curve", "no curve", "node", "square", "nan"],
 )
