@@ -100,7 +100,7 @@ def test_a_table_that_changes_meanwhile(kind: str, here: Path, monkeypatch: pyte
     """It is looked at again once it is open, and nothing waits for a pipe."""
     if kind == "a pipe":
         os.mkfifo("pipe")
-        monkeypatch.setattr(beside, "path_beside", lambda *_, **__: here / "pipe")
+        monkeypatch.setattr(beside, "companion_path", lambda *_, **__: here / "pipe")
         message = "'a.csv': is not a plain file; give a CSV file"
     else:
 

@@ -122,19 +122,19 @@ class _Sum:
         ds: sp.Expr,
         lam: sp.Symbol,
     ) -> None:
-        rest = sp.expand(form)
+        remainder = sp.expand(form)
         self.lam = lam
         self.known, self.unknown = sp.S.Zero, sp.S.Zero
         known_rate = sp.S.Zero
         for piece, (rate, whole) in table.items():
-            coefficient = rest.coeff(piece)
-            rest -= sp.expand(coefficient * piece)
+            coefficient = remainder.coeff(piece)
+            remainder -= sp.expand(coefficient * piece)
             if whole is None or lam in coefficient.free_symbols:
                 self.unknown += coefficient * rate
             else:
                 self.known += coefficient * whole
                 known_rate += coefficient * rate
-        self.unknown += sp.factor_terms(rest).xreplace({SIGMA: ds})
+        self.unknown += sp.factor_terms(remainder).xreplace({SIGMA: ds})
         self.rate = tidy(known_rate + self.unknown)
 
     def antiderivative(self) -> sp.Expr | None:

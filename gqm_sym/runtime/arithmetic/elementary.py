@@ -119,8 +119,8 @@ def cosine_kernel(r, over):  # type: ignore[no-untyped-def]
     """cos(r - over), ``|r|`` <= pi/4."""
     z = r * r
     lead = fma(-0.5, z, 1.0)
-    rest = fma(r, over, fma(-0.5, z, 1.0 - lead))
-    return lead + fma(z * z, polynomial(COSINE, z), rest)
+    low = fma(r, over, fma(-0.5, z, 1.0 - lead))
+    return lead + fma(z * z, polynomial(COSINE, z), low)
 
 
 @Inlined
@@ -140,28 +140,28 @@ def cos(x):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def reduced_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The same as `reduced` gives of ``phase + rate*(middle + rest + offset)``, in which no rounding counts."""
+def reduced_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """The same as `reduced` gives of ``phase + rate*(middle + middle_low + offset)``, in which no rounding counts."""
     place, place_low = two_sum(middle, offset)
-    way = rate * place
-    total, total_low = two_sum(phase, way)
+    product = rate * place
+    total, total_low = two_sum(phase, product)
     turns, r, over = reduced(total)
-    r, r_low = two_sum(r, fma(rate, rest + place_low, fma(rate, place, -way)) + total_low)
+    r, r_low = two_sum(r, fma(rate, middle_low + place_low, fma(rate, place, -product)) + total_low)
     return turns, r, over - r_low
 
 
 @Inlined
-def sin_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The sine of ``phase + rate*(middle + rest + offset)``."""
-    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
+def sin_of_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """The sine of ``phase + rate*(middle + middle_low + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, middle_low, offset)
     value = choose(turns & 1 == 1, cosine_kernel(r, over), sine_kernel(r, over))
     return choose(turns & 2 == 2, -value, value)
 
 
 @Inlined
-def cos_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The cosine of ``phase + rate*(middle + rest + offset)``."""
-    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
+def cos_of_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """The cosine of ``phase + rate*(middle + middle_low + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, middle_low, offset)
     value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
     return choose((turns + 1) & 2 == 2, -value, value)
 

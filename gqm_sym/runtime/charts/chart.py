@@ -48,7 +48,7 @@ ROW_ROUNDINGS, MAGNIFIED = 3.0, 2.0**20
 CORNER_ROUNDINGS = 4.0
 
 # The distance from a corner at which its two tangents are read, as a share of the curve's length.
-_BESIDE_CORNER = 2.0**-40
+_CORNER_DISTANCE_SHARE = 2.0**-40
 
 # The number of places on each piece among which the search for the nearest point begins.
 _SAMPLES = 8
@@ -152,7 +152,7 @@ class Chart:
         """Return the sign of the tangent's turn at each corner: 1 where the curve bends to the left."""
         if not self.corners.size:
             return self.corners
-        off = _BESIDE_CORNER * (self.high - self.low)
+        off = _CORNER_DISTANCE_SHARE * (self.high - self.low)
         before, after = self.points(np.append(self.corners - off, self.corners + off))[2].reshape(2, -1)
         signs: Array = np.sign(after - before)
         return signs

@@ -12,7 +12,7 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
@@ -132,8 +132,8 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
         For each result the mean as two doubles, a bound on its rounding error, and the mean of the absolute values.
     """
     address, operations, first, count, outputs = program
-    program = (address, uncounted(operations), first, count, uncounted(outputs))
-    return fill_means_of(program, uncounted(work), uncounted(inputs), uncounted(nodes), uncounted(found))
+    program = (address, borrowed(operations), first, count, borrowed(outputs))
+    return fill_means_of(program, borrowed(work), borrowed(inputs), borrowed(nodes), borrowed(found))
 
 
 @Inner

@@ -16,7 +16,7 @@ from gqm_sym.runtime.launch.formulas import Formulas
 
 
 @contextmanager
-def asked_for(name: str) -> Iterator[None]:
+def requested_quantity(name: str) -> Iterator[None]:
     """Name the requested quantity in errors about gradients."""
     try:
         yield
@@ -119,7 +119,7 @@ class OrbitDerivatives(ABC):
         return self.ends
 
     @property
-    def launch_moves(self) -> Array:
+    def launch_changes(self) -> Array:
         """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
@@ -161,6 +161,6 @@ class OrbitDerivatives(ABC):
         """The number of half periods, or of laps, in a period."""
         return 1.0 if self.direction else 2.0
 
-    def without_shift(self, moved: Array, lam: Array) -> Array:
+    def relative_change(self, moved: Array, lam: Array) -> Array:
         """Convert the change of a place's parameter to the change of the place relative to the points of the curve."""
         return moved

@@ -60,7 +60,7 @@ class Program(NamedTuple):
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
-class Local(NamedTuple):
+class LocalMotion(NamedTuple):
     """A motion at a place: half of V**2 and ds/dlam, each with its derivatives by the place and by all variables.
 
     Attributes
@@ -123,12 +123,12 @@ class Source(NamedTuple):
         found: TapeNumber = (v0 * v0 / 2 + energy) + (potential(op, lam0, p) - potential(op, lam, p))
         return found
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at a place that does not depend on the variables."""
         half, ds = self.half(op, lam), op.number(self.formulas.ds(op, lam, op.values[: self.parameters]))
         half_slope, *half_partials = gradient(op, half, [lam, *op.values[: self.variables]])
         ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[: self.parameters]])
-        return Local(half, half_slope, half_partials, ds, ds_slope, ds_partials)
+        return LocalMotion(half, half_slope, half_partials, ds, ds_slope, ds_partials)
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
@@ -156,7 +156,7 @@ class AnySource(Protocol):
     def coordinates(self) -> int:
         """The number of coordinates of a place."""
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at a place."""
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
@@ -231,11 +231,11 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     rates, powers = [rate], [power]
     by_launch = [op.number(0)] * LAUNCH_VARIABLES
     for k, by in enumerate(gradient(op, inertia, op.values[:n])):
-        low, high, stretch = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
+        low, high, strain = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
         moved = low + (high - low) * share
         # The small change of V**2 is computed as a whole first, because its parts are large near the turning points.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
-        longer = (high - low) / width + (stretch + ds_slope * moved) / ds
+        longer = (high - low) / width + (strain + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:

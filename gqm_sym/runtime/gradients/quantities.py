@@ -112,7 +112,7 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
             everything = (*motion.problem.formulas.parameters, "lam0", "v0")
-            moved = derivatives.without_shift(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
+            moved = derivatives.relative_change(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
     (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total

@@ -167,7 +167,7 @@ class OrbitSensitivity:
         series, found = self._series(still[PHASE] / self._scale), np.empty((STATE_ROWS, variables, 1))
         path = derivatives.at_places(still[PLACE])
         fill_changes(still, orbit, series, path.rows, self._scale, found)
-        orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_moves
+        orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_changes
         orbit[LAUNCH_DELAY] = self._launch_delay(
             motion, path, self._scale * series[1, 1 : 1 + variables, 0], found[:, :, 0]
         )
@@ -188,7 +188,7 @@ class OrbitSensitivity:
             The changes of the state there at a fixed phase angle (`fill_changes`).
         """
         given, direction, ds = motion.problem.launch, motion.direction, path.ds[0, 0]
-        v0, moves = given.v0.value, self._derivatives.launch_moves
+        v0, moves = given.v0.value, self._derivatives.launch_changes
         if self._derivatives.direction:
             circulating: Array = direction * ds / v0 * moves
             return circulating

@@ -194,7 +194,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
 
     def lost(*arguments: Any) -> int:
         arguments[-1][:], arguments[-1][:, leg_record.END] = 0.0, 0.5
-        return ends.SPENT
+        return ends.END_TOO_MANY_PANELS
 
     motion = slope.solve(lam0=0, mu=0.1)
     monkeypatch.setattr(answers, "drive", lost)

@@ -14,8 +14,8 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     X,
     Z,
     fill_points,
-    nearly_add,
     piece_of,
+    sloppy_add,
 )
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
@@ -42,7 +42,7 @@ def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
                     bend[i] = fma(bend[i], u[i], term)
                 else:
                     s, s_low = multiply(bend[i], bend_low[i], u[i], u[RULE + i])
-                    bend[i], bend_low[i] = nearly_add(s, s_low, term, term_low)
+                    bend[i], bend_low[i] = sloppy_add(s, s_low, term, term_low)
 
 
 @Inner

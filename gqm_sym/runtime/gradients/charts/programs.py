@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
-from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Local, Program, assemble
+from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, LocalMotion, Program, assemble
 
 # The number of coordinates of a point (x, z, their derivatives by u, and the curvature), and that of a displacement.
 POINT, DISPLACEMENT = 5, 2
@@ -77,7 +77,7 @@ class ChartSource(NamedTuple):
         speed = op.sqrt(dx * dx + dz * dz)
         return [(k, (z * dx - x * dz) / speed) for k, (x, z) in zip(self.shaping, moves, strict=True)]
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at the point with the given coordinates."""
         n, end = self.variables, self.variables + self.point
         v0, energy = op.values[n - LAUNCH_VARIABLES + 1 : n]
@@ -87,10 +87,10 @@ class ChartSource(NamedTuple):
         for k, shift in zip(self.shaping, op.values[end : self.inputs], strict=True):
             by_parameters[k] = by_parameters[k] - launch_slope * shift
         half, one, zero = (v0 * v0 / 2 + energy) + (launched - value), op.number(1), op.number(0)
-        stretches = [zero] * self.parameters
+        strains = [zero] * self.parameters
         for k, across in self._displacements(op, op.places[1:]):
-            stretches[k] = -(op.places[POINT] * across)
-        return Local(half, -slope, [*by_parameters, launch_slope, v0, one], one, zero, stretches)
+            strains[k] = -(op.places[POINT] * across)
+        return LocalMotion(half, -slope, [*by_parameters, launch_slope, v0, one], one, zero, strains)
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
@@ -110,12 +110,12 @@ def chart_circulation_program(source: ChartSource) -> Program:
     rate = op.values[-1] / op.sqrt(2 * here.half)
     power = 2 * rate * here.half * inertia
     rates, powers = [rate], [power]
-    stretches = [*here.ds_partials, *[op.number(0)] * LAUNCH_VARIABLES]
+    strains = [*here.ds_partials, *[op.number(0)] * LAUNCH_VARIABLES]
     by_inertia = gradient(op, inertia, op.values[: source.variables])
-    for stretch, change, by in zip(stretches, here.half_partials, by_inertia, strict=True):
+    for strain, change, by in zip(strains, here.half_partials, by_inertia, strict=True):
         faster = change / (2 * here.half)
-        rates.append(rate * (stretch - faster))
-        powers.append(power * (stretch + faster + by / inertia))
+        rates.append(rate * (strain - faster))
+        powers.append(power * (strain + faster + by / inertia))
     return assemble(op, [*rates, *powers, *here.ds_partials])
 
 

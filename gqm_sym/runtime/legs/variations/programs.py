@@ -108,9 +108,9 @@ class _ChartPoint:
         self.x, self.z = x, z
         self.load = op.number(forces.law.static_normal_load(op, *point, self.p))
         self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
-        self.stretches = [op.number(0)] * forces.parameters
+        self.strains = [op.number(0)] * forces.parameters
         for k, moved in self._displacements():
-            self.stretches[k] = (dx * moved[2] + dz * moved[3]) / square
+            self.strains[k] = (dx * moved[2] + dz * moved[3]) / square
 
     def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
         """Return, for each parameter that shapes the curve, the displacement with its derivatives by u."""
@@ -138,10 +138,12 @@ def chart_law_program(forces: ChartForces) -> Program:
     The derivatives are by the place, by W and by the parameters. If arc lengths grow, so does the change of W over
     them.
     """
-    at = _ChartPoint(forces)
-    along, by_w, by_parameters = at.partials(at.slope)
-    by_parameters = [part + at.slope * stretch for part, stretch in zip(by_parameters, at.stretches, strict=True)]
-    return assemble(at.op, [*at.stretches, at.slope, along, by_w, *by_parameters])
+    chart_point = _ChartPoint(forces)
+    along, by_w, by_parameters = chart_point.partials(chart_point.slope)
+    by_parameters = [
+        part + chart_point.slope * strain for part, strain in zip(by_parameters, chart_point.strains, strict=True)
+    ]
+    return assemble(chart_point.op, [*chart_point.strains, chart_point.slope, along, by_w, *by_parameters])
 
 
 @lru_cache(maxsize=64)
@@ -149,21 +151,21 @@ def chart_load_program(forces: ChartForces) -> Program:
     """Return the program of the slope of the contact force per mass along a motion, and of its derivatives by the place
     and by W.
     """
-    at = _ChartPoint(forces)
-    along, by_w, _ = at.partials(at.curvature * at.w + at.load)
-    load_slope = along + by_w * at.slope
-    return assemble(at.op, [load_slope, *at.partials(load_slope)[:2]])
+    chart_point = _ChartPoint(forces)
+    along, by_w, _ = chart_point.partials(chart_point.curvature * chart_point.w + chart_point.load)
+    load_slope = along + by_w * chart_point.slope
+    return assemble(chart_point.op, [load_slope, *chart_point.partials(load_slope)[:2]])
 
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
     """Return the program of states at a point, as `gradients.programs.path_program`."""
-    at = _ChartPoint(forces)
-    op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
-    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load, op.number(0)):
+    chart_point = _ChartPoint(forces)
+    op, m, outputs = chart_point.op, chart_point.p[forces.mass], list[TapeNumber]()
+    for quantity in (chart_point.x, chart_point.z, None, m * chart_point.curvature, m * chart_point.load, op.number(0)):
         if quantity is None:
-            outputs += [op.number(1), *at.stretches, op.number(0)]
+            outputs += [op.number(1), *chart_point.strains, op.number(0)]
         else:
-            along, _, by_parameters = at.partials(quantity)
+            along, _, by_parameters = chart_point.partials(quantity)
             outputs += [quantity, *by_parameters, along]
     return assemble(op, outputs)

@@ -13,7 +13,7 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
-from gqm_sym.runtime.double_double.orbit_time import Bounded
+from gqm_sym.runtime.double_double.orbit_time import BoundedNumber
 from gqm_sym.runtime.launch.formulas import _chart_with
 from gqm_sym.runtime.motion import timing
 
@@ -91,7 +91,7 @@ def test_a_launch_by_coordinates(ring: ModuleType) -> None:
         assert orbit is not None
         top = 2 * mp.asin(mp.sqrt(mp.sin(angle / 2) ** 2 + mpf(1) / 16 / mpf(G)))
         for bounded, truth in ((orbit.low, -top), (orbit.high, top)):
-            assert isinstance(bounded, Bounded)
+            assert isinstance(bounded, BoundedNumber)
             assert abs(mpf(bounded.high) + mpf(bounded.low) - truth) <= bounded.error <= 1e-26
         assert motion.turning_points == (float(top), float(-top))
 

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from numpy.polynomial import chebyshev, legendre
 
 import generated.cubic_coulomb as cubic_coulomb
-from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
+from gqm_sym.runtime.compiled.registers import LANES, borrowed, copied, on_stack, over_rows
 from gqm_sym.runtime.legs import driver
 from gqm_sym.runtime.legs.leg_reading import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 from gqm_sym.runtime.legs.panels.polynomials import (
@@ -145,7 +145,7 @@ def _in_registers(line, other, c):  # type: ignore[no-untyped-def]
     _weighed(line, 5, 40, WIDTH + 9, c)
     _root(line, 70, 5)
     room = _room()
-    _copy(room, 3, uncounted(line), 70)
+    _copy(room, 3, borrowed(line), 70)
     _copy(other, 1, room, 3)
 
 
