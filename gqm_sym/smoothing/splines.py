@@ -185,8 +185,8 @@ class Smoother:
         """Return the spline for a weight."""
         factor = self._factor(weight)
         coefficients = self._solved(factor, self._sums)
-        # The derivative of the matrix by log(weight) is its roughness part, and the trace of its solution is the
-        # derivative of log(det).
+        # The derivative of the matrix with respect to log(weight) is its roughness part, and the trace of its solution
+        # is the derivative of log(det).
         more, less = (np.log(self._factor(weight * np.exp(step))[-1]).sum() for step in (STEP, -STEP))
         change = coefficients - self._reference
         gained = float((change * (self._product @ change - 2.0 * self._left)).sum())

@@ -283,7 +283,7 @@ class Algebra:
     # Derivatives
 
     def derivative(self, polynomial: Polynomial) -> Fraction:
-        """Return the derivative of a polynomial by the variable."""
+        """Return the derivative of a polynomial with respect to the variable."""
         total = Fraction(self.ring.zero, self.one)
         for place, name in enumerate(self.names):
             part = polynomial.diff(self.generators[place])

@@ -52,7 +52,7 @@ class Forces:
 
 
 def potential_gradient(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
-    """Return the derivatives of the potential by x, y and z along a curve, and the potential itself."""
+    """Return the derivatives of the potential with respect to x, y and z along a curve, and the potential itself."""
     # The force is found before the coordinates are inserted, because the curve's own symbols may be called x or z.
     axes = (X, Y, Z)
     written = (*(differentiate(kernel.potential, axis) for axis in axes), kernel.potential)

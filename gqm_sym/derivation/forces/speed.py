@@ -138,7 +138,7 @@ class _Sum:
         self.rate = tidy(known_rate + self.unknown)
 
     def antiderivative(self) -> sp.Expr | None:
-        """Return an antiderivative by λ, or None if no elementary one was found."""
+        """Return an antiderivative with respect to λ, or None if no elementary one was found."""
         found = particular_solution(self.unknown, sp.S.Zero, self.lam, _SIGNS)
         return None if found is None else self.known + found
 

@@ -107,7 +107,8 @@ def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
         x and z at the anchor, as two doubles each.
     piece : (11, POINTS) array
         Rows 0 and 1 are offsets from the anchor. The others are filled: tangent (2, 3), curvature (4), sum of the
-        magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative by arc length (8), places (9, 10).
+        magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative with respect to arc length (8),
+        places (9, 10).
     """
     sign = curve.sign
     offsets, x, z = piece, piece[9], piece[10]

@@ -18,7 +18,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import ONE_OVER_LOG2, QUARTER, ROUND, TWO_OVER_PI, power_of_two
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI, ONE_OVER_LOG2, ROUND, TWO_OVER_PI, power_of_two
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.uncompiled import fma as plain_fma
@@ -162,7 +162,7 @@ def sine_and_cosine(x, x_low):  # type: ignore[no-untyped-def]
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
     turns = bits(shifted)
-    r, r_low = remainder(x, x_low, k, QUARTER)
+    r, r_low = remainder(x, x_low, k, HALF_PI)
     z, z_low = multiply(r, r_low, r, r_low)
     f, f_low = series(SINE, z, z_low, polynomial(SINE_TAIL, z))
     f, f_low = multiply(f, f_low, z, z_low)

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER, atan
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI, atan
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
@@ -329,7 +329,7 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
             is_thrown, of_launch = False, error + of_part
         if not is_last:
             # The upper turning point is at the angle pi itself.
-            angle = (times[0, k], 2.0 * QUARTER[1] if times[0, k] == 2.0 * QUARTER[0] else 0.0)
+            angle = (times[0, k], 2.0 * HALF_PI[1] if times[0, k] == 2.0 * HALF_PI[0] else 0.0)
             part, part_low, of_part = time_between(integrand, kind, last_angle, angle, rule)
             high, low = add(high, low, part, part_low)
             times[1, k], times[2, k], last_angle, error = high, low, angle, error + of_part
@@ -374,7 +374,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
         start, end = (work[place], work[place + LOW]), (work[place + 1], work[place + LOW + 1])
         width = add(end[0], end[1], -start[0], -start[1])
         ends = mean_at_ends(work, registers, width)
-        scale = multiply(width[0], width[1], 2.0 * QUARTER[0], 2.0 * QUARTER[1])
+        scale = multiply(width[0], width[1], 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])
     else:
         for i in range(ENDS):
             at = place + i

@@ -71,7 +71,7 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     for i in range(n):
         phi, low = multiply(reach[0], reach[1], nodes[i], 0.0)
         phi, low = add(middle[0], middle[1], phi, low)
-        # The share of the segment at each node, and its derivative by phi.
+        # The share of the segment at each node, and its derivative with respect to phi.
         rows[0, i], rows[1, i], rows[2, i], rows[3, i] = phi, low, 1.0, 0.0
         if kind == TURN_TURN:
             s, s_low, c, c_low = sine_and_cosine(0.5 * phi, 0.5 * low)

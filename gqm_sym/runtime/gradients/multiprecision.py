@@ -30,9 +30,8 @@ UNDECIDED = (
 # derivatives lose as many again.
 DIGITS, DIGIT_FACTORS, AGREEMENT = 60, (1, 2, 4), 1e-19
 
-# With this number of nodes, changes must be below the second number; otherwise the largest number of nodes will not
-# suffice.
-SLOW = (256, 1e-2)
+# From this number of nodes on, changes must be below MAX_CHANGE; otherwise the largest number of nodes will not suffice.
+NODES_BEFORE_CHECK, MAX_CHANGE = 256, 1e-2
 
 # A number counts as zero if it vanishes to this share of the digits.
 ZERO_DIGITS = 0.6
@@ -157,7 +156,7 @@ class MultiprecisionOrbit:
                     change <= MAX_RATIO * before < np.inf and change**2 / before <= MAX_NEXT_CHANGE
                 ):
                     return means, sizes, n
-                if n >= SLOW[0] and change > SLOW[1]:
+                if n >= NODES_BEFORE_CHECK and change > MAX_CHANGE:
                     break
                 before = change
             last = means

@@ -58,7 +58,7 @@ SeriesOf = Callable[[Array], Array]
 
 
 class OrbitDerivatives(ABC):
-    """A libration or circulation with derivatives by all variables.
+    """A libration or circulation with derivatives with respect to all variables.
 
     The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
 
@@ -105,8 +105,8 @@ class OrbitDerivatives(ABC):
 
     @abstractmethod
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
-        variables.
+        """Return half of V**2, or the contact force, at places, with two derivatives with respect to the place and
+        those with respect to all variables.
         """
 
     @abstractmethod

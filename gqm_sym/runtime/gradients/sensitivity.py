@@ -131,7 +131,7 @@ def points_of(found: Any, lam: Array, v: Array) -> Array:
 
 
 class OrbitSensitivity:
-    """The derivatives of the states of one orbit by all variables.
+    """The derivatives of the states of one orbit with respect to all variables.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ class OrbitSensitivity:
         return delay
 
     def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
-        """Return the derivatives of lam, s, x, z, v, N and y at times by some of the variables.
+        """Return the derivatives of lam, s, x, z, v, N and y at times with respect to some of the variables.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class OrbitSensitivity:
         return found
 
     def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
-        """Return the derivatives of lam alone, by all variables, given ds/dlam."""
+        """Return the derivatives of lam alone, with respect to all variables, given ds/dlam."""
         orbit, share = self._orbit(motion, phi)[:, :, None], points[PHASE] / self._scale
         times = self._scale * self._series(share)[1, 1 : 1 + orbit.shape[1]]
         delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times

@@ -347,8 +347,8 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     Returns
     -------
     int
-        END_REST if the body comes to rest, one of the codes of `runs.ends` for the end of the run, END_OUT_OF_DOMAIN or END_OVERFLOW; END_TOO_MANY_PANELS
-        if the body could not be followed.
+        END_REST if the body comes to rest, one of the codes of `runs.ends` for the end of the run, END_OUT_OF_DOMAIN or
+        END_OVERFLOW; END_TOO_MANY_PANELS if the body could not be followed.
     """
     found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]

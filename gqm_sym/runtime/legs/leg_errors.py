@@ -80,8 +80,8 @@ PLACE_ROUNDINGS, TIME_ROUNDINGS = 1.0, 6.0
 
 
 def _slopes() -> Array:
-    """Return the matrix that maps values at a panel's nodes to the derivative by the share of the panel, a row for each
-    node.
+    """Return the matrix that maps values at a panel's nodes to the derivative with respect to the share of the panel, a
+    row for each node.
     """
     degree, x = np.arange(COUNT), 2.0 * SHARES - 1.0
     angle = np.arccos(np.clip(x, -1.0, 1.0))
@@ -120,8 +120,8 @@ class RunHalf(NamedTuple):
     Attributes
     ----------
     by_place, by_v2 : float
-        The derivatives of the time by the place where the panels begin, at a given distance from there, and by V**2
-        there.
+        The derivatives of the time with respect to the place where the panels begin, at a given distance from there,
+        and V**2 there.
     damping : float
         The factor by which resistance reduces a change of V**2.
     gained : float

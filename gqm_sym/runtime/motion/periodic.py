@@ -104,7 +104,7 @@ class PeriodicMotion(PeriodicTimes):
     @property
     @locked
     def period_slope(self) -> float:
-        """dT/dE, the derivative of the period by the energy per mass, in s3/m2."""
+        """dT/dE, the derivative of the period with respect to the energy per mass, in s3/m2."""
         formulas = self.problem.formulas
         inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
         with requested_quantity("period_slope"):

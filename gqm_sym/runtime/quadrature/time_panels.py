@@ -329,7 +329,7 @@ def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(VECTOR, MATRIX, VECTOR))
 def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
-    """Return the derivatives by phi of the panels' Legendre series at phase angles."""
+    """Return the derivatives with respect to phi of the panels' Legendre series at phase angles."""
     out, series = np.empty(phi.size), np.empty(terms.shape[1])
     for i in range(phi.size):
         k = panel_of(edges, phi[i])

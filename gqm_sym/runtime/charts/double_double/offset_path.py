@@ -28,7 +28,7 @@ stacked_bends = on_stack(4 * RULE)
 
 @Inner
 def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
-    """Fill the second derivatives of x and z by u at places on a piece, two doubles each."""
+    """Fill the second derivatives of x and z with respect to u at places on a piece, two doubles each."""
     k = piece_of(curve, number)
     precise, count = curve.counts[k, 0], curve.counts[k, 1]
     for row in range(2):
@@ -55,7 +55,7 @@ def fill_path(curve, number, n, u, points):  # type: ignore[no-untyped-def]
     Returns
     -------
     (float, float)
-        Bounds on the errors of the coordinates, and of their derivatives by u.
+        Bounds on the errors of the coordinates, and of their derivatives with respect to u.
     """
     fill_points(curve, number, n, u, points)
     k, (h, h_low) = piece_of(curve, number), curve.offset

@@ -18,7 +18,7 @@ from numpy.polynomial.chebyshev import cheb2poly
 from numpy.polynomial.legendre import legval
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, two_sum
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
@@ -50,7 +50,7 @@ MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
+# Columns of the points that `fill_points` fills: x, z and their derivatives with respect to u, two doubles each.
 # `offset_path.fill_path` adds the length of the path over that of the curve.
 X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
 
@@ -67,7 +67,7 @@ class TrueCurve(NamedTuple):
     counts : (n, 2) array of int
         The number of powers that need two doubles, and the number of all powers.
     errors : (n, 2) array
-        Bounds on the errors of the coordinates, and on those of their derivatives by u.
+        Bounds on the errors of the coordinates, and on those of their derivatives with respect to u.
     lengths : (n, 3) array
         Arc length as two doubles, and a bound on its error.
     edges : (n+1,) array
@@ -187,7 +187,7 @@ def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
 
 @Inner
 def speed_at(curve, number, place):  # type: ignore[no-untyped-def]
-    """Return the derivative of arc length by u at a place, as a double."""
+    """Return the derivative of arc length with respect to u at a place, as a double."""
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = place
     fill_points(curve, number, 1, u, points)
@@ -277,7 +277,7 @@ def chebyshev_tables():  # type: ignore[no-untyped-def]
     for j in range(NODES):
         for k in range(NODES):
             quarters = (j * (2 * k + 1)) % (4 * NODES) / NODES
-            _, _, c, c_low = sine_and_cosine(*multiply(quarters, 0.0, QUARTER[0], QUARTER[1]))
+            _, _, c, c_low = sine_and_cosine(*multiply(quarters, 0.0, HALF_PI[0], HALF_PI[1]))
             share = (1.0 if j == 0 else 2.0) / NODES
             fit[0, j, k], fit[1, j, k] = share * c, share * c_low
             if j == 1:

@@ -49,8 +49,8 @@ def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def
 
 @Inner
 def energy_at(path, number, place):  # type: ignore[no-untyped-def]
-    """Return the potential (two doubles, error) at a place on a piece, its derivative by u, and the derivative of arc
-    length by u.
+    """Return the potential (two doubles, error) at a place on a piece, its derivative with respect to u, and the
+    derivative of arc length with respect to u.
 
     The potential is that on the body's path; the arc length is that of the curve.
     """

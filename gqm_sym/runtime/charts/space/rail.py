@@ -42,7 +42,8 @@ REFINEMENTS, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
 # The matrix that maps values at the nodes to those of the derivative.
 DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
 
-# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
+# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these with respect to
+# arc length.
 CURVE_ROWS = 13
 Long = Any  # an array of the longest floats
 

@@ -100,7 +100,7 @@ def source_along(problem: Problem) -> ChartSource:
 
 
 class ChartOrbitDerivatives(OrbitDerivatives):
-    """A libration or circulation along a chart, with derivatives by all variables.
+    """A libration or circulation along a chart, with derivatives with respect to all variables.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def fill_places(curve, number, lengths, places):  # type: ignore[no-untyped-def]
 
 @entry(types.void(TRUE_CURVE, MATRIX, MATRIX), checked=False)
 def fill_coordinates(curve, places, rows):  # type: ignore[no-untyped-def]
-    """Fill x, z and their derivatives by u, two doubles each, at places."""
+    """Fill x, z and their derivatives with respect to u, two doubles each, at places."""
     curve, u, points = unshared(curve), stacked_places(), stacked_points()
     for i in range(places.shape[1]):
         u[0], u[RULE] = places[1, i], places[2, i]
@@ -178,8 +178,8 @@ class ShapedPieces:
         return shifts
 
     def path(self, places: Array, orders: int = 4) -> Array:
-        """Return the coordinates in doubles with all derivatives by u below an order, and the displacements with two
-        derivatives.
+        """Return the coordinates in doubles with all derivatives with respect to u below an order, and the
+        displacements with two derivatives.
         """
         if places.size:
             self._make(int(places[0].min()), int(places[0].max()))
@@ -238,7 +238,9 @@ def _quotient(before: Array, after: Array, step: float) -> Array:
 
 
 def _derivatives(terms: Array, places: Array, count: int) -> Array:
-    """Return coordinates at places and their derivatives by u, beginning with order 0, from coefficients in doubles."""
+    """Return coordinates at places and their derivatives with respect to u, beginning with order 0, from coefficients
+    in doubles.
+    """
     chosen, u = terms[places[0].astype(np.int64) % len(terms)], places[1]
     rows, powers = [], np.vander(u, NODES, increasing=True)
     for _ in range(count):

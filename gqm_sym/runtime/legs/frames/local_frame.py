@@ -242,7 +242,8 @@ def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array
     frame : Frame
         The frame to the accuracy of doubles.
     at_rest : callable
-        The force on a body at rest, and its derivative by the place, at places that are given as two doubles each.
+        The force on a body at rest, and its derivative with respect to the place, at places that are given as two
+        doubles each.
     """
     place, low, size = (float(frame.p[k]) for k in (PLACE, PLACE_LOW, RANGE))
     force, slope = at_rest(np.array([place]), np.array([low]))

@@ -164,7 +164,8 @@ def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
 
 
 def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
-    """Return the derivatives of a quantity of a motion by all variables; for turning points, a column for each.
+    """Return the derivatives of a quantity of a motion with respect to all variables; for turning points, a column for
+    each.
 
     Parameters
     ----------

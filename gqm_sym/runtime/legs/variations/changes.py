@@ -105,7 +105,9 @@ class Changes:
         return self.law.count + 2
 
     def by_all(self, rows: Array) -> Array:
-        """Extend derivatives by the run-time parameters to derivatives by all variables, where the others are zero."""
+        """Extend derivatives with respect to the run-time parameters to derivatives with respect to all variables,
+        where the others are zero.
+        """
         return np.concatenate([rows, np.zeros((2, *rows.shape[1:]))])
 
     @property

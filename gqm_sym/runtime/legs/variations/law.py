@@ -37,8 +37,8 @@ class LawRows(NamedTuple):
     Attributes
     ----------
     matrix : (2 * k + 5, n) array
-        ds/dlam, its derivative by the place and those by the k run-time parameters, then F = dW/dlam and its
-        derivatives by the place, by W and by the parameters.
+        ds/dlam, its derivative with respect to the place and those with respect to the k run-time parameters, then F =
+        dW/dlam and its derivatives with respect to the place, W and the parameters.
     """
 
     matrix: Array
@@ -51,7 +51,7 @@ class LawRows(NamedTuple):
 
     @property
     def force(self) -> Array:
-        """F and its derivatives by the place and by W: a row for each."""
+        """F and its derivatives with respect to the place and W: a row for each."""
         first = (len(self.matrix) - 1) // 2
         force: Array = self.matrix[first : first + 3]
         return force
@@ -97,7 +97,7 @@ class Law(ABC):
     @property
     @abstractmethod
     def launch_changes(self) -> Array:
-        """The derivatives of the label of the launch by each variable."""
+        """The derivatives of the label of the launch with respect to each variable."""
 
     @property
     @abstractmethod
@@ -110,8 +110,8 @@ class Law(ABC):
 
     @abstractmethod
     def loads(self, states: Array) -> Array:
-        """Return the slope of the contact force per mass along the motion, and its derivatives by the place and by
-        W.
+        """Return the slope of the contact force per mass along the motion, and its derivatives with respect to the
+        place and W.
         """
 
     @abstractmethod
@@ -214,7 +214,7 @@ class FormulaLaw(Law):
         return force[0], ROUNDING_RATIO * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
     def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """Return the force dW/dlam on a body at rest, without friction, and its derivative by the place.
+        """Return the force dW/dlam on a body at rest, without friction, and its derivative with respect to the place.
 
         Places are given as two doubles each.
         """
