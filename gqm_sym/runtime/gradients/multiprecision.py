@@ -30,7 +30,7 @@ UNDECIDED = (
 # derivatives lose as many again.
 DIGITS, DIGIT_FACTORS, AGREEMENT = 60, (1, 2, 4), 1e-19
 
-# From this number of nodes on, changes must be below MAX_CHANGE; otherwise the largest number of nodes will not suffice.
+# With so many nodes or more, changes must be below MAX_CHANGE; otherwise the largest number of nodes will not suffice.
 NODES_BEFORE_CHECK, MAX_CHANGE = 256, 1e-2
 
 # A number counts as zero if it vanishes to this share of the digits.
