@@ -129,6 +129,8 @@ class CompiledModel(Formulas):
             self.refuse("pass1", unknown)
         p = self.numbers(parameters)
         launch = read_launch(self, p, request)
+        if lam is None:
+            raise InputError(f"lam: not given; pass one place or many, as values of {self.parameter}")
         f = bind(self, p, launch)
         if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
             places, low_parts, shape = flat_doubles(lam), NO_LOW_PARTS, lam.shape

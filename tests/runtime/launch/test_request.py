@@ -9,7 +9,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.cli import show
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import GQMError, InputError, SolutionError
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +42,22 @@ def test_what_a_launch_is_refused_for(given: dict[str, Any], message: str, circl
     """Each with its name, what is wrong, and what would be right."""
     with pytest.raises(InputError, match=f"^{message}"):
         circle.solve(**({"lam0": 1, "L": 1} | given))
+
+
+@pytest.mark.parametrize(
+    ("called", "given", "message"),
+    [
+        ("pass1", {}, "lam0: not given; it is the value of lam to launch from"),
+        ("pass1", {"lam0": 1}, "lam: not given; pass one place or many, as values of lam"),
+        ("solve", {}, "lam0: not given; it is the value of lam to launch from"),
+        ("sweep", {}, "quantity: must be one of half_period, .* got None"),
+        ("sweep", {"quantity": "period"}, r"lam0: has no default and was not given; pass lam0=\.\.\."),
+    ],
+)
+def test_a_call_without_what_it_needs(called: str, given: dict[str, Any], message: str, circle: ModuleType) -> None:
+    """The message says what is missing."""
+    with pytest.raises(GQMError, match=f"^{message}"):
+        getattr(circle, called)(**given, L=1)
 
 
 def test_a_place_beyond_the_domain(arch: ModuleType) -> None:
