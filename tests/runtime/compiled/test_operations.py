@@ -74,7 +74,7 @@ def _results(run: Any) -> np.ndarray:
 
 
 def test_python_gives_the_bits_of_each_operation() -> None:
-    """Those of vector registers, of tables and of arrays by their address among them."""
+    """Python gives the same bits for operations of vector registers, of tables and of arrays by their address."""
     signature = types.void(VECTOR, VECTOR, types.int64[:, ::1], MATRIX)
     compiled = jit.COMPILER.entry(everything, signature, nogil=False, checked=True)
     plain = PlainEntry(everything, signature.args, Trial(1e9))

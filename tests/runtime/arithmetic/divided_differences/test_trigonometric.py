@@ -1,4 +1,4 @@
-"""The parts into which sweeps split sines and cosines about the middle of an orbit, against mpmath."""
+"""The parts into which sweeps split sines and cosines about the middle of an orbit agree with mpmath."""
 
 import math
 import random
@@ -17,7 +17,7 @@ EVEN, ODD, SINC = 1.5e-16, 8e-17, 3e-16
 
 
 def pairs(count: int) -> list[tuple[float, float]]:
-    """Gaps to both ends of orbits of all sizes."""
+    """Draw gaps to both ends of orbits of all sizes."""
     draw = random.Random(4)
     found = []
     for _ in range(count):
@@ -28,7 +28,7 @@ def pairs(count: int) -> list[tuple[float, float]]:
 
 
 def test_second_differences_about_the_middle() -> None:
-    """Cos and sin over -h, v, h, from the gaps alone."""
+    """Second differences of cos and sin over -h, v, h are right from the gaps alone."""
     for h1, h2 in pairs(2000):
         with mp.workdps(80):
             h, v = (mpf(h1) + mpf(h2)) / 2, (mpf(h1) - mpf(h2)) / 2
@@ -39,7 +39,7 @@ def test_second_differences_about_the_middle() -> None:
             assert abs(sinc_near(float(h)) - mp.sinc(mpf(float(h)))) <= SINC
 
 
-def test_beyond_it_says_so() -> None:
+def test_wider_than_a_turn_it_is_nan() -> None:
     """An orbit wider than a turn has no such form, and the result is NaN."""
     assert math.isnan(divdiff1_cos_in_square(MAX_WAVE_SPAN, 1.001 * MAX_WAVE_SPAN))
     with mp.workdps(40):
