@@ -183,7 +183,7 @@ def case(request: pytest.FixtureRequest, generated_folder: Path) -> tuple[Case, 
 
 
 def near(actual: float, truth: mpf, size: mpf) -> None:
-    """Return whether a number agrees with the true one, in roundings of the size of its parts."""
+    """Check a number against the true one, in roundings of the size of its parts."""
     allowed = ROUNDINGS * mpf(2) ** -53 * (size + abs(truth))
     assert abs(mpf(float(actual)) - truth) <= allowed, (actual, mp.nstr(truth, 20))
 

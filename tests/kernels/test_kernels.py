@@ -112,7 +112,7 @@ def test_only_kernels_add():
     ],
 )
 def test_the_force_along_a_curve_is_minus_the_gradient(kernel: Kernel, potential):
-    """A = F·t and n₀ = -F·n with F = -∇U, on z = sinh(x), by SymPy's own derivatives."""
+    """On z = sinh(x), A is F·t and n₀ is -F·n with F = -∇U, by SymPy's own derivatives."""
     model = derive(Curve.graph("sinh(x)"), kernel)
     place = {x: sp.Rational(7, 10), Omega: 2, k: 3, g: sp.Rational(981, 100)}
     push = [-sp.diff(potential, along).subs(z, sp.sinh(x)).subs(place).evalf(40) for along in (x, z)]

@@ -24,7 +24,7 @@ def value(text: str) -> Fraction | tuple[Fraction, Fraction]:
 
 
 def less_its_digits(count: int) -> str:
-    """Return the text of pi less its first digits: the first of so many decimals and all after them remain."""
+    """Return the text of pi less its first ``count`` decimals, of which a number below 10**-count remains."""
     with mp.workdps(count + 20):
         digits = str(int(mp.pi * mp.mpf(10) ** count))
     terms = ["pi"]

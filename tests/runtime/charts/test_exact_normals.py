@@ -304,7 +304,7 @@ def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
         by_gauss = partial(mp.quad, method="gauss-legendre")
 
         def fall(w: mpf) -> mpf:
-            """Return the time down the parabola from w**2 behind the launch, with V**2 = g*(1 - u**2)."""
+            """Return the integrand of the time down the parabola at u = 1 - w**2, where V**2 = g*(1 - u**2)."""
             return 2 * mp.sqrt((1 + (1 - w * w) ** 2) / (g * (2 - w * w)))
 
         def height(low: mpf, high: mpf) -> mpf:
