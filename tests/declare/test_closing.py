@@ -110,7 +110,7 @@ def test_what_run_time_values_decide_is_not_refused():
         gqm.derive(curve, gqm.Gravity(), parameters={"R": 5, "r": 2})
 
 
-def test_a_file_is_told_too(tmp_path):
+def test_a_message_about_a_file_has_its_place(tmp_path):
     """The message for a mistake in a file gives line and column."""
     path = tmp_path / "ring.yaml"
     path.write_text(

@@ -80,7 +80,7 @@ def test_the_domain_may_end_there(text, side, tmp_path):
     assert end.t == pytest.approx(float(time), rel=1e-9)
 
 
-def test_a_file_is_told_the_place_too(tmp_path):
+def test_a_file_has_the_place_in_its_message(tmp_path):
     """In a file a corner is reported as one of its mistakes."""
     path = tmp_path / "vee.yaml"
     path.write_text("name: vee\ncurve: {graph: {z: abs(x)}}\nkernel: {gravity: {}}\n")
