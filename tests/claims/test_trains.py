@@ -376,7 +376,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
 
 @pytest.mark.parametrize("in_space", [True, False])
 def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
-    """A short train moves like a body with friction in the limit; at a length of a nanometre both motions are the same."""
+    """A short train moves like a body with friction in the limit; at a length of a nanometre both move alike."""
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
     name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
