@@ -13,7 +13,8 @@ import gqm_sym as gqm
 from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, ParameterError
 from gqm_sym.specfile import read_spec
 
-# Roundings of coordinates, as a share of the largest; half periods of closed rails, in units in the last place.
+# The tolerances: roundings of coordinates, as a share of the largest, and half periods of closed rails, in units in the
+# last place.
 ROUNDING = 4e-16
 MAX_ULPS = 2.0
 
