@@ -79,7 +79,7 @@ def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) 
         for axis in (aside, np.cross(tangent[:, :3], aside)):
             ratios.append(((bend[:, :3] - true) * axis).sum(axis=1) / report.curvature_error)
         off = np.abs(np.remainder(place[:, 3] - roll(u) + np.pi, 2.0 * np.pi) - np.pi)
-        assert off.max() < 0.1 * scatter + 1e-4  # the roll is smoothed as much as the coordinates are, though it has no scatter
+        assert off.max() < 0.1 * scatter + 1e-4  # the roll is smoothed like the coordinates
     size = np.abs(np.concatenate(ratios))
     assert np.mean(size < 1.0) > 0.68
     assert np.mean(size < 2.0) > 0.95

@@ -96,7 +96,7 @@ def test_down_a_cubic(place: str, passage: Callable[..., Any]) -> None:
     with mp.workdps(30):
 
         def time(start: mpf, stop: mpf, w0: mpf) -> mpf:
-            def rate(u: mpf) -> mpf:  # the substitution for the root, which is right from a turn and does no harm elsewhere
+            def rate(u: mpf) -> mpf:  # the substitution for the root is right from a turn, and harmless elsewhere
                 x = start + (stop - start) * u**2
                 return mp.sqrt((1 + 9 * x**4) / abs(w0 + 2 * G * (-1 - x**3))) * 2 * abs(stop - start) * u
 
