@@ -34,7 +34,7 @@ class FollowedMotion(Motion):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "dissipative", problem.launch.direction)
         self._driver = Driver(problem, self._horizon)
-        self._go_on()
+        self._follow_next()
         self.direction = int(self._driver.runs[0].record[HEADING]) if self._driver.runs else 0
 
     # -- what `Motion` needs ------------------------------------------------------------------
@@ -97,7 +97,7 @@ class FollowedMotion(Motion):
             settled = driver.at[TURNS] >= (1.0 if self.problem.w0 == 0.0 else 2.0)
             if found or driver.ending or settled or driver.elapsed >= self._horizon:
                 return found
-            self._go_on()
+            self._follow_next()
 
     # -- leg after leg ------------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class FollowedMotion(Motion):
         ends = self._driver.ending not in ("", "asymptote")
         return min(self._horizon, self._driver.elapsed if ends else inf)
 
-    def _go_on(self) -> None:
+    def _follow_next(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         driver = self._driver
         driver.go_on()
@@ -149,20 +149,20 @@ class FollowedMotion(Motion):
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
         while not self._driver.ending and self._driver.elapsed < reach:
-            self._go_on()
+            self._follow_next()
 
     def _follow_amply(self, enough: float) -> None:
         """Follow the motion until there are enough pieces, or as far as it can be followed."""
         with suppress(SolutionError, BudgetError):  # the error is raised when the failed part is requested
             while len(self._pieces) < enough and not self._driver.ending and self._driver.elapsed < self._horizon:
-                self._go_on()
+                self._follow_next()
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
             self._follow(self._horizon)
         while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
-            self._go_on()
+            self._follow_next()
 
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""
