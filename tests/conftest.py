@@ -1,4 +1,4 @@
-"""Fixtures of the whole suite: generated modules and motions, each made once a session."""
+"""Fixtures of the whole suite give generated modules and motions, each made once in a session."""
 
 import gc
 import os
@@ -49,7 +49,7 @@ def generated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def module_of(generated_folder: Path) -> Callable[[str], ModuleType]:
-    """Give the generated module of a track under gravity, by the track's name."""
+    """Return the generated module of a track under gravity, by the track's name."""
     import gqm_sym as gqm
 
     built: dict[str, ModuleType] = {}
@@ -80,7 +80,7 @@ def build(generated_folder: Path) -> Callable[..., ModuleType]:
 
 @pytest.fixture(scope="session")
 def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any]:
-    """Give the motion of a problem, solved once."""
+    """Return the motion of a problem, solved once."""
     solved: dict[str, Any] = {}
 
     def motion(problem: Problem) -> Any:
@@ -93,5 +93,5 @@ def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any
 
 @pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS)
 def problem(request: pytest.FixtureRequest) -> Problem:
-    """Each problem of the table in turn."""
+    """Return each problem of the table in turn."""
     return request.param

@@ -127,8 +127,8 @@ def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
 
 
 def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
-    """Return the same function for a piece of a rail in space, with the derivatives of its coordinates by arc
-    length.
+    """Return the same function for a piece of a rail in space, with the derivatives of its coordinates with respect to
+    arc length.
     """
     shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
     tangent = (shape.dxds, shape.dyds, shape.dzds)
@@ -160,7 +160,7 @@ def _exact_segment(lowering: Lowering, curve: Curve, name: str, *, in_space: boo
     rows = (curve.x, curve.y, curve.z) if in_space else (curve.x, curve.z)
     rows = (*rows, *(differentiate(row, place) for row in rows))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
-    doc = f"{named} and their derivatives by its own parameter."
+    doc = f"{named} and their derivatives with respect to its own parameter."
     return lowering.exact_function(name, doc, outputs, (lowering.place,))
 
 

@@ -248,7 +248,7 @@ class _ModelLowering(Lowering):
             return ()
         outputs = (potential, *(differentiate(potential, coordinate) for coordinate in places))
         named = "x, y and z" if self.model.curve.in_space else "x and z"
-        doc = f"U, so that V**2 + 2*U is constant, and its derivatives by {named} (paper, eq. 13)."
+        doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
         return (self.exact_function("effective_potential", doc, outputs, places),)
 
     def domain(self) -> ExactIR:

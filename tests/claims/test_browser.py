@@ -1,4 +1,4 @@
-"""Reports in a real browser: formulas laid out, figures drawn, nothing fetched, nothing to complain of."""
+"""A real browser lays out the formulas of a report and draws its figures; it fetches nothing and reports no errors."""
 
 import json
 import os
@@ -61,7 +61,7 @@ def browse(page: Path, *options: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module", params=["pendulum", "circle_coulomb"])
 def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of an example, with all of it in one file."""
+    """Return the report of an example, all of it in one file."""
     path = tmp_path_factory.mktemp("report") / f"{request.param}.html"
     assert tool.main(["report", str(CURVES / f"{request.param}.yaml"), "-o", str(path)]) == 0
     return path
@@ -78,7 +78,9 @@ def measured(page: Path, text: str) -> tuple[dict[str, Any], str]:
 
 
 def test_the_page_is_laid_out(page: Path) -> None:
-    """Fractions are taller than letters, figures have their size, nothing sticks out, is fetched or complained of."""
+    """Fractions are taller than letters, figures have their size, nothing exceeds the page or is fetched, and there are
+    no error messages.
+    """
     text = page.read_text(encoding="utf-8")
     seen, said = measured(page, text)
     assert seen["fetched"] == []
@@ -92,7 +94,7 @@ def test_the_page_is_laid_out(page: Path) -> None:
 
 
 def test_what_is_wrong_would_be_seen(tmp_path: Path) -> None:
-    """A page that fetches something and fails is caught doing so."""
+    """The check detects a page that fetches something and fails."""
     text = "<html><body><img src='http://127.0.0.1:9/x.png'/><script>nothing()</script></body></html>"
     seen, said = measured(tmp_path / "bad.html", text)
     assert seen["fetched"] == ["http://127.0.0.1:9/x.png"]
@@ -100,7 +102,7 @@ def test_what_is_wrong_would_be_seen(tmp_path: Path) -> None:
 
 
 def test_the_picture_has_the_figures(page: Path) -> None:
-    """Both colours of the curves are somewhere in it."""
+    """Both colours of the curves occur in the picture."""
     import matplotlib.image
 
     picture = page.with_name("page.png")

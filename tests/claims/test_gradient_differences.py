@@ -1,4 +1,6 @@
-"""Gradients of periods by every variable against differences of periods of 45 digits, for each conservative force."""
+"""Gradients of periods with respect to every variable agree with differences of periods of 45 digits, for each
+conservative force.
+"""
 
 import inspect
 from fractions import Fraction
@@ -37,7 +39,7 @@ LAUNCHES = {
 @settings(max_examples=2, deadline=None)
 @given(data=st.data())
 def test_gradients_of_periods(name: str, data: Any) -> None:
-    """They are right to two units in the last place."""
+    """Gradients of periods are right to two units in the last place."""
     module, (low, high) = load(str(ROOT / "generated" / f"{name}.py"), name), LAUNCHES[name]
     share, speed = data.draw(st.integers(1, 255)), data.draw(st.integers(1, 64))
     arguments = inspect.signature(module.solve).parameters

@@ -1,4 +1,4 @@
-"""The Python reference is complete: everything that is exported stands there, and its docstring says what it takes."""
+"""The Python reference is complete: it has everything that is exported, and each docstring describes the arguments."""
 
 import inspect
 import re

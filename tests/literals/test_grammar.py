@@ -19,7 +19,7 @@ VALUES = {"x": Fraction(3, 7), "L": Fraction(-5, 2), "a_1": Fraction(11)}
 
 
 class Rationals:
-    """A small algebra of its own: Fractions, with values for three names."""
+    """A small algebra of fractions, with values for three names."""
 
     def number(self, value):
         return value
@@ -248,7 +248,7 @@ def test_hostile_text_gives_a_tree_or_one_clear_error(text):
 
 
 def _spelled(children):
-    """Texts of sums, products and powers with every parenthesis written, and their meaning."""
+    """Yield texts of sums, products and powers with every parenthesis written, and their meaning."""
     pair = st.tuples(children, children)
     return st.one_of(
         pair.map(lambda p: (f"({p[0][0]} + {p[1][0]})", p[0][1] + p[1][1])),
@@ -306,7 +306,7 @@ def test_limits_themselves_are_allowed():
 
 
 def test_columns_point_into_the_text():
-    """A node must remember where it stood, for those who report more about it later."""
+    """A node must remember its column, for later messages about it."""
     tree = parse("1 + sin(x)/0.5", where="t")
     found = {
         getattr(node, "id", getattr(node, "value", None)): node.col_offset
@@ -316,7 +316,7 @@ def test_columns_point_into_the_text():
     assert found == {Fraction(1): 0, "x": 8, Fraction(1, 2): 11}
 
 
-def test_trouble_in_an_algebra_is_told_with_its_column():
+def test_an_error_in_an_algebra_has_its_column():
     """A refusal by an algebra must be reported at the operand that caused it."""
     with pytest.raises(ExpressionError, match="t: column 10: "):
         evaluate(parse("1 + 2/(x - x)", where="t"), Rationals(), where="t")

@@ -1,8 +1,8 @@
-"""One table of conservative motions with known answers, for every test that wants a truth.
+"""One table has conservative motions with known answers, for every test that needs reference values.
 
-A track is a curve as a user declares it; a problem is a launch on a track with what must come out,
-where that is known from, and what makes it hard. Numbers stay text: they are exact. The truths are
-read from the files in ``data/`` (their README says who made them).
+A track is a curve as a user declares it; a problem is a launch on a track with the expected results, their source, and
+what makes it hard. Numbers are kept as text, which is exact. The reference values are read from the files in ``data/``
+(their README says who made them).
 """
 
 import json
@@ -19,7 +19,7 @@ DIGITS = 50
 
 
 def number(text: str | float) -> mpf:
-    """Exactly what a number says, to 50 digits."""
+    """Return exactly what a number says, to 50 digits."""
     with mp.workdps(DIGITS):
         if isinstance(text, float):
             return mpf(text)
@@ -28,7 +28,7 @@ def number(text: str | float) -> mpf:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """A curve as it is declared, and spelled out once more for the oracle."""
+    """A curve as it is declared, and in formulas for `naive`."""
 
     name: str
     x: str
@@ -40,7 +40,7 @@ class Track:
     family: str | None = None
 
     def declare(self) -> Any:
-        """Declare it through the public interface: by family, as a graph or parametrically."""
+        """Declare the curve through the public interface: by family, as a graph or parametrically."""
         import gqm_sym as gqm
 
         if self.family is not None:
@@ -54,7 +54,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Position:
-    """Where the body is at a time after launch; ``v`` is the signed ds/dt."""
+    """The place of the body at a time after launch; ``v`` is the signed ds/dt."""
 
     t: str
     lam: str
@@ -97,13 +97,13 @@ class Problem:
 
     @property
     def launch(self) -> dict[str, Any]:
-        """Arguments of ``module.solve``."""
+        """Return the arguments of ``module.solve``."""
         start = {"lam0": self.lam0, "v0": self.v0, "direction": self.direction}
         return start | dict(self.parameters)
 
     @property
     def period(self) -> float:
-        """The period, infinite where there is none."""
+        """Return the period, which is infinite if there is none."""
         if self.half_period is not None:
             return 2 * float(self.half_period)
         return math.inf if self.loop_time is None else float(self.loop_time)
@@ -237,7 +237,7 @@ def _read(name: str) -> Any:
 
 
 def _met(points: list[str], lam0: float, v0: str, direction: int) -> tuple[str, ...]:
-    """Turning points in the order met: a launch from rest is at the first of them."""
+    """Return turning points in the order in which they are met; a launch from rest is at the first of them."""
     if float(v0) == 0:
         return tuple(sorted(points, key=lambda point: abs(float(point) - lam0)))
     return tuple(sorted(points, key=float, reverse=direction > 0))
@@ -341,7 +341,7 @@ PROBLEMS = {problem.slug: problem for problem in (*_paper(), *_corpus(), *_close
 
 
 def where(**wanted: Any) -> list[Problem]:
-    """Give the problems whose fields have the wanted values; True and False ask for filled ones."""
+    """Return the problems whose fields have the given values; True and False ask for filled and empty ones."""
 
     def fits(problem: Problem) -> bool:
         return all(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.arithmetic import UNIT, split
@@ -23,7 +23,7 @@ from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW
 from gqm_sym.runtime.interface import ExactFormulas
 
 # pi and e as two doubles each.
-PI, E = (2.0 * QUARTER[0], 2.0 * QUARTER[1]), (2.718281828459045, 1.4456468917292502e-16)
+PI, E = (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), (2.718281828459045, 1.4456468917292502e-16)
 
 # In place of a register that does not exist.
 NOWHERE = -1
@@ -46,7 +46,7 @@ class Tape(NamedTuple):
         The positions in the work space of the registers of the first run-time parameter, the place, the effective
         potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative if there is none). For a
         function of coordinates (`record_by_coordinates`): the first run-time parameter, x (z and y follow), the
-        function, and its derivatives by x, z and y (negative in a plane).
+        function, and its derivatives with respect to x, z and y (negative in a plane).
     """
 
     operations: NDArray[np.int64]
@@ -343,7 +343,7 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
 @lru_cache(maxsize=64)
 def record_by_coordinates(function: Callable[..., Any], parameters: int, dimension: int = 2) -> Recorded | None:
     """Return the tape of a function ``f(op, x, z, p)``, or ``f(op, x, y, z, p)`` in space, that gives a value and its
-    derivatives by the coordinates.
+    derivatives with respect to the coordinates.
 
     It is None if it is too long.
     """

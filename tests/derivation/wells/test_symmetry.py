@@ -1,4 +1,4 @@
-"""Places of symmetry: that forms are even about them, and that slopes which are said to vanish only there do."""
+"""Forms are even about places of symmetry, and slopes that are said to vanish only there do."""
 
 import pytest
 import sympy as sp
@@ -24,7 +24,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_symmetry(name: str) -> None:
-    """The places are the textbook's, and numbers agree."""
+    """The places are those of textbooks, and numerical values agree."""
     curve, place, step, monotone = CASES[name]
     model = gqm.derive(curve, gqm.Gravity())
     found = model.symmetry

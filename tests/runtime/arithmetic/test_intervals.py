@@ -1,4 +1,4 @@
-"""Intervals hold what they must, are tight where signs depend on it, and are never NaN."""
+"""Intervals contain what they must, are tight where signs depend on it, and are never NaN."""
 
 import math
 from collections.abc import Callable
@@ -51,7 +51,7 @@ def holds(interval: Interval, true: mpf) -> bool:
 
 
 def drawn(data: st.DataObject, low: float, high: float) -> tuple[Interval, float]:
-    """An interval and a number in it, often close to each other or to the ends of the domain."""
+    """Draw an interval and a number in it, often close to each other or to the ends of the domain."""
     narrow = st.floats(max(low, -10.0), min(high, 10.0))
     lo, hi = sorted(data.draw(st.tuples(*[narrow | st.floats(low, high)] * 2)))
     inside = st.just(lo) if lo == hi else st.floats(lo, hi) | st.sampled_from([lo, hi])
@@ -184,12 +184,12 @@ def test_signs_and_extrema_are_exact(
     ],
 )
 def test_gaps_in_the_domain_prove_nothing(operation: Callable[..., Interval], arguments: list[Any]) -> None:
-    """Partly outside the domain, or across a pole, anything is possible."""
+    """An interval partly outside the domain, or across a pole, gives bounds without information."""
     assert operation(*arguments) == ALL
 
 
 def test_pole_at_an_end_bounds_one_side() -> None:
-    """Towards a pole from one side the values go to one infinity."""
+    """At a pole at one end of an interval the values go to one infinity."""
     assert intervals.idiv((1.0, 2.0), (0.0, 4.0)) == (pytest.approx(0.25), math.inf)
     assert intervals.idiv((1.0, 2.0), (-4.0, 0.0)) == (-math.inf, pytest.approx(-0.25))
     assert intervals.ilog((0.0, 1.0)) == (-math.inf, 0.0)
@@ -204,7 +204,7 @@ def test_overflow_is_no_infinite_lower_bound() -> None:
 
 
 def test_rounded_constants_hold_what_they_stand_for() -> None:
-    """The float next to 1/10 and to pi hold these two."""
+    """The enclosures of constants rounded to floats contain 1/10 and pi."""
     lo, hi = intervals.ipoint(0.1)
     assert Fraction(lo) < Fraction(1, 10) < Fraction(hi)
     with mp.workdps(DIGITS):

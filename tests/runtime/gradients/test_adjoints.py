@@ -1,4 +1,4 @@
-"""Derivatives recorded on a tape against mpmath's own, for every function that a formula may contain."""
+"""Derivatives recorded on a tape agree with mpmath's own, for every function that a formula may contain."""
 
 from typing import Any
 
@@ -30,7 +30,9 @@ PARAMETER = 1.4375
 
 
 def found(formula: Any, order: int) -> np.ndarray:
-    """First derivatives by place and parameter, or second derivatives by the place and either."""
+    """Return first derivatives with respect to place and parameter, or second ones with respect to the place and
+    either.
+    """
     op = Recorder(1)
     result = formula(op, op.place, op.values[0])
     for _ in range(order - 1):

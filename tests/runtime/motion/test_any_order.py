@@ -59,7 +59,7 @@ def asked(motion: Any) -> dict[str, Callable[[], Any]]:
 
 @pytest.mark.parametrize("name", [name for name in MOTIONS if name != "down a chain"])
 def test_any_order(name: str, module_of: ModuleOf) -> None:
-    """Each question alone, of a motion that was asked nothing else, has the same digits, and so has a copy's answer."""
+    """Each question alone, of a motion that was asked nothing else, gives the same digits, and so does a copy."""
     track, launch = MOTIONS[name]
     module = module_of(track) if isinstance(track, str) else track
     names = list(asked(module.solve(**launch)))
@@ -76,7 +76,7 @@ def test_any_order(name: str, module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("name", [name for name in MOTIONS if name != "towards the top"])
 def test_legs_follow_one_another(name: str, module_of: ModuleOf) -> None:
-    """From the launch to the end of the period, none before the other, from the very first question on."""
+    """Legs follow each other from the launch to the end of the period, in order, from the first question on."""
     track, launch = MOTIONS[name]
     motion = (module_of(track) if isinstance(track, str) else track).solve(**launch)
     legs = motion.legs

@@ -1,4 +1,4 @@
-"""Motions that many threads read at once give each of them what one thread alone is given."""
+"""Motions that many threads read at once answer each of them as they answer one thread alone."""
 
 import copy
 import pickle
@@ -36,7 +36,7 @@ LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
 
 @pytest.fixture(scope="module")
 def module_named(generated_folder: Path) -> ModuleOf:
-    """Give a committed module, or that of the waves z = sin(x)."""
+    """Return a committed module, or that of the waves z = sin(x)."""
     waves = gqm.Curve.graph("sin(x)", parameter="x")
     sine = gqm.build(gqm.derive(waves, gqm.Gravity()), name="waves", folder=generated_folder)
     return lambda name: sine if name == "waves" else import_module(f"generated.{name}")
@@ -44,7 +44,7 @@ def module_named(generated_folder: Path) -> ModuleOf:
 
 @pytest.fixture(autouse=True)
 def eager_switches() -> Iterator[None]:
-    """Let threads take turns as often as the interpreter can."""
+    """Let threads alternate as often as the interpreter can."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     yield
@@ -66,8 +66,8 @@ def answers(motion: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", LAUNCHES)
-def test_six_threads_are_told_what_one_is(name: str, module_named: ModuleOf) -> None:
-    """Each of them begins at another question, and all begin at once."""
+def test_six_threads_get_the_answers_of_one(name: str, module_named: ModuleOf) -> None:
+    """Six threads begin at the same time, each with another question, and get the same answers."""
     track, launch = LAUNCHES[name]
     module = module_named(track)
     expected = answers(module.solve(**launch))

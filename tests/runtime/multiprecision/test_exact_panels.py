@@ -1,4 +1,4 @@
-"""Slow passages over crests, which extended precision lays panels for."""
+"""Extended precision lays panels over slow passages of hilltops."""
 
 from types import ModuleType
 
@@ -19,13 +19,13 @@ LAUNCHES = ((5.725266733964419, 0.0, -1), (5.754549511786295, 0.4324830663458707
 
 @pytest.fixture(scope="module")
 def planes() -> ModuleType:
-    """The example of the repository."""
+    """Return the example of the repository."""
     return load(ROOT / "generated" / "planes.py", "planes")
 
 
 @pytest.mark.parametrize(("lam0", "v0", "direction"), LAUNCHES)
 def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, planes: ModuleType) -> None:
-    """V**2 along the motion is that of the height lost, and the bound on places is of some use."""
+    """V**2 along the motion is that of the height lost, and the bound on places is useful."""
     motion = planes.solve(lam0, v0, direction)
     t = np.linspace(0.0, min(motion.t_end, 10.0), 300)[1:-1]
     state, start = motion.state(t), planes.pass1(lam0, lam0, v0, direction)
@@ -35,7 +35,9 @@ def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, plan
 
 
 def test_many_hills_and_a_slow_passage() -> None:
-    """After 400 panels the rest of the way was left to one, on which nothing was right; or the launch was refused."""
+    """After 400 panels the rest of the orbit was left to one, on which nothing was right, or the launch was refused;
+    now it is right.
+    """
     module = transient(gqm.derive(gqm.Curve.graph("x**2/40 + cos(8*x)/2", parameter="x"), gqm.Gravity()))
     # A millimetre above the twelfth crest.
     motion = module.solve(10.063448508143175)
@@ -49,7 +51,7 @@ def test_many_hills_and_a_slow_passage() -> None:
 
 @pytest.mark.parametrize(("count", "digits"), [(20, 40), (48, 80), (96, 210)])
 def test_gauss_legendre_rules(count: int, digits: int) -> None:
-    """Rules have all the digits that were asked for: the nodes are zeros, and powers up to 2n - 1 are integrated."""
+    """Rules have all requested digits: the nodes are zeros, and powers up to 2n - 1 are integrated exactly."""
     rule = legendre_rule(count, digits)
     with mp.workdps(digits + 10):
         tolerance = mpf(10) ** (1 - digits)

@@ -42,24 +42,25 @@ RADIUS, MAX_TURN, TERMS = 4.0, 2.0, 36
 
 # The number of parts of a piece is multiplied by one of these, the first for which the last coefficients of its roll
 # angle are below MAX_TAIL.
-FINER, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
+REFINEMENTS, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
 # The matrix that maps values at the nodes to those of the derivative.
 DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
 
 # The largest number of pieces of a chart for which the rail is computed in double-double arithmetic, in about a second.
 MAX_TRUE_PIECES = 10_000
 
-# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
+# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these with respect to
+# arc length.
 CURVE_ROWS = 13
 Long = Any  # an array of the longest floats
 
 
-class Pen(NamedTuple):
+class Pose(NamedTuple):
     """The end of a piece: its coordinates, the frame in rows, and the roll angle of a banked rail."""
 
     place: Long
     frame: Long
-    lean: Long = 0.0
+    roll_angle: Long = 0.0
 
 
 class Pieces(NamedTuple):
@@ -124,8 +125,8 @@ class SpaceRail:
         """
         numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
         given_start = np.array([float(number) for number in islice(numbers, 6 * self.placed)], dtype=np.longdouble)
-        pen = _start(given_start) if self.placed else None
-        start, parts, joints = pen, [], [0.0]
+        pose = _start(given_start) if self.placed else None
+        start, parts, joints = pose, [], [0.0]
         for count, kind in enumerate(self.pieces, start=1):
             where = f"piecewise: piece {count} ({kind})"
             given = [float(number) for number in islice(numbers, PIECE_NUMBERS[kind])]
@@ -133,25 +134,27 @@ class SpaceRail:
                 if self.banked:
                     raise DeclarationError(f"{where}: has no roll of its own; declare the roll by a formula in s")
                 part, begin, end = _curve(next(segments), np.array(p), given, where)
-                if pen is not None:
+                if pose is not None:
                     length = joints[-1] + float(part.lengths.sum())
-                    _check_joint(pen, begin, length, f"{where}: begins", "the piece before it ends")
+                    _check_joint(pose, begin, length, f"{where}: begins", "the piece before it ends")
             else:
-                assert pen is not None
-                begin = pen
-                part, end = _piece(*_rates(kind, given, where), pen, where, self.banked)
-            start, pen = start or begin, end
+                assert pose is not None
+                begin = pose
+                part, end = _piece(*_rates(kind, given, where), pose, where, self.banked)
+            start, pose = start or begin, end
             parts.append(part)
             joints.append(joints[-1] + float(part.lengths.sum()))
             if sum(one.lengths.size for one in parts) > MAX_PIECES:
                 raise BudgetError(f"chart: {where}: {MAX_PIECES} pieces reach no farther; let the rail turn less")
         assert start is not None
-        assert pen is not None
+        assert pose is not None
         if self.closed:
-            _check_joint(pen, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
-            if self.banked and not abs(np.sin(0.5 * (pen.lean - start.lean))) <= MAX_MISMATCH:
-                leans = f"{float(pen.lean)!r} rad at its end, and {float(start.lean)!r} rad at its start"
-                raise DeclarationError(f"piecewise: closed: the rail leans by {leans}; let it roll back")
+            _check_joint(pose, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
+            if self.banked and not abs(np.sin(0.5 * (pose.roll_angle - start.roll_angle))) <= MAX_MISMATCH:
+                roll_angles = (
+                    f"{float(pose.roll_angle)!r} rad at its end, and {float(start.roll_angle)!r} rad at its start"
+                )
+                raise DeclarationError(f"piecewise: closed: the rail leans by {roll_angles}; let it roll back")
         places, lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
         which = np.repeat(np.arange(len(parts)), [part.lengths.size for part in parts])
         edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
@@ -181,18 +184,18 @@ class SpaceRail:
         return TruePieces(chart, rail.sample, in_space=True)
 
 
-def _start(numbers: Long) -> Pen:
+def _start(numbers: Long) -> Pose:
     """Return the start of a rail, given by x, y and z, heading, climb and roll."""
     frame = np.array(starting_frame(np.cos, np.sin, *numbers[3:]), dtype=np.longdouble)
-    return Pen(numbers[:3], frame, numbers[5])
+    return Pose(numbers[:3], frame, numbers[5])
 
 
-def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
+def _check_joint(end: Pose, begin: Pose, length: float, who: str, whom: str) -> None:
     """Refuse a joint at which the place or the tangent jumps."""
     gap = float(np.sqrt(((begin.place - end.place) ** 2).sum()))
     turn = float(np.sqrt(((begin.frame[0] - end.frame[0]) ** 2).sum()))
     if not (gap <= MAX_MISMATCH * length and turn <= MAX_MISMATCH):
-        place, other = (tuple(pen.place.astype(float).tolist()) for pen in (begin, end))
+        place, other = (tuple(pose.place.astype(float).tolist()) for pose in (begin, end))
         raise DeclarationError(
             f"{who} at {place!r}, {gap:.3g} m and {turn:.3g} rad off where {whom}: {other!r}; "
             f"both must match within {MAX_MISMATCH:g} of the rail's length and {MAX_MISMATCH:g} rad"
@@ -216,10 +219,10 @@ def _rates(kind: str, given: list[float], where: str) -> tuple[Long, Long]:
     return length, rates
 
 
-def _piece(length: Long, rates: Long, pen: Pen, where: str, banked: bool) -> tuple[Pieces, Pen]:
+def _piece(length: Long, rates: Long, pose: Pose, where: str, banked: bool) -> tuple[Pieces, Pose]:
     """Return a piece with given rates, in enough parts to resolve its roll angle too, and its right end."""
-    for finer in FINER if banked else FINER[:1]:
-        pieces, end, spin, leaning = _turned(length, rates, pen, where, finer)
+    for finer in REFINEMENTS if banked else REFINEMENTS[:1]:
+        pieces, end, spin, end_roll = _turned(length, rates, pose, where, finer)
         if not banked:
             break
         with np.errstate(all="ignore"):
@@ -228,15 +231,15 @@ def _piece(length: Long, rates: Long, pen: Pen, where: str, banked: bool) -> tup
             # The frame rolls; and where a climbing track turns, the horizontal direction turns about the tangent.
             slopes = spin + up * change
         half = 0.5 * pieces.lengths[:, None]
-        leans = np.cumsum(np.append(pen.lean, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
+        roll_angles = np.cumsum(np.append(pose.roll_angle, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
         # Beyond a vertical tangent, the roll angle is measured from another horizontal direction.
-        off = np.abs(np.sin(0.5 * (leans[1:] - leaning))).max()
+        off = np.abs(np.sin(0.5 * (roll_angles[1:] - end_roll))).max()
         if np.abs(half * (slopes @ FIT[-2:].T)).max() <= MAX_TAIL and off <= MAX_MISMATCH:
             bends = slopes @ DERIVATIVE / half
             rows = (slopes, bends, bends @ DERIVATIVE / half)
             known = (np.append(row, roll[:, None], axis=1) for row, roll in zip(pieces[3:], rows, strict=True))
-            anchors = np.column_stack([pieces.anchors, leans[:-1]])
-            return Pieces(pieces.places, pieces.lengths, anchors, *known), end._replace(lean=leans[-1])
+            anchors = np.column_stack([pieces.anchors, roll_angles[:-1]])
+            return Pieces(pieces.places, pieces.lengths, anchors, *known), end._replace(roll_angle=roll_angles[-1])
     else:
         raise DeclarationError(
             f"{where}: its tangent is vertical, or nearly so, where there is no level to measure a roll angle from; "
@@ -245,7 +248,7 @@ def _piece(length: Long, rates: Long, pen: Pen, where: str, banked: bool) -> tup
     return pieces, end
 
 
-def _turned(length: Long, rates: Long, pen: Pen, where: str, finer: int) -> tuple[Pieces, Pen, Array, Long]:
+def _turned(length: Long, rates: Long, pose: Pose, where: str, finer: int) -> tuple[Pieces, Pose, Array, Long]:
     """Return a piece with given rates, its right end, the roll rate at the nodes, and the roll angles at the ends of
     its parts.
     """
@@ -272,11 +275,11 @@ def _turned(length: Long, rates: Long, pen: Pen, where: str, finer: int) -> tupl
         series.append(total / (k + 1))
     frames = np.empty((count + 1, 3, 3), dtype=np.longdouble)
     passed: Long = sum(series)
-    frames[0] = pen.frame
+    frames[0] = pose.frame
     for k in range(count):
         frames[k + 1] = passed[k] @ frames[k]
     gained: Long = step * sum(term[:, 0] / (k + 1) for k, term in enumerate(series))
-    gains = np.concatenate([pen.place[None], np.einsum("ki,kij->kj", gained, frames[:-1])])
+    gains = np.concatenate([pose.place[None], np.einsum("ki,kij->kj", gained, frames[:-1])])
     places = np.cumsum(gains, axis=0)
     shares = 0.5 * (1.0 + np.asarray(NODES, dtype=np.longdouble))
     at_nodes: Long = sum(term[:, None] * (shares**k)[:, None, None] for k, term in enumerate(series))
@@ -293,7 +296,7 @@ def _turned(length: Long, rates: Long, pen: Pen, where: str, finer: int) -> tupl
     pieces = Pieces(own, np.full(count, float(step)), places[:-1], *rows)
     across, along = -frames[1:, 0, 1], frames[1:, 0, 0]
     left, upright = (frames[1:, row, 0] * across + frames[1:, row, 1] * along for row in (1, 2))
-    return pieces, Pen(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
+    return pieces, Pose(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
 
 
 def _on_parts(length: Long, rates: Long, count: int) -> Long:
@@ -316,7 +319,7 @@ def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
     return out
 
 
-def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Pieces, Pen, Pen]:
+def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Pieces, Pose, Pose]:
     """Return a curve with formulas, and both its ends."""
     low, high = ends
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
@@ -328,7 +331,7 @@ def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Piece
 
     found = divided(rows, np.array([low, high]), 3, where=where)
     at_ends = rows(np.array([low, high]), np.zeros((2, 1)))[:, :, 0].T
-    begin, end = (Pen(row[:3], np.array(level_frame(np.hypot, row[4:7]))) for row in at_ends.astype(np.longdouble))
+    begin, end = (Pose(row[:3], np.array(level_frame(np.hypot, row[4:7]))) for row in at_ends.astype(np.longdouble))
     values = np.moveaxis(found.at_nodes, 0, 1)
     anchors = found.at_edges[:3].T.astype(np.longdouble)
     shares = (found.places - low) / (high - low)

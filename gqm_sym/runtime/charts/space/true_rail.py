@@ -28,7 +28,7 @@ MIN_LEVEL = 1e-9
 TERMS = 56
 # The derivatives of the frame's rows t, l and u: for each product the row, the other row, the rate and the sign.
 TURNS = np.array([(0, 1, 0, 1), (0, 2, 1, 1), (1, 0, 0, -1), (1, 2, 2, -1), (2, 0, 1, -1), (2, 1, 2, 1)])
-# The rows of a pen: those of the frame, then the place.
+# The rows of a pose: those of the frame, then the place.
 PLACE = 3
 # The coordinates in the order of `pieces.Samples`: x, z, y.
 IN_SAMPLES = (0, 2, 1)
@@ -55,12 +55,12 @@ def rates_of(kind: str, given: Any) -> tuple[Any, tuple[Sequence[Any], Sequence[
 
 def starting_frame(cosine: Any, sine: Any, heading: Any, climb: Any, roll: Any) -> list[list[Any]]:
     """Return the rows t, l and u of a frame, which leans to the left by the roll angle, with given functions."""
-    c, s, level, rise, upright, lean = (f(angle) for angle in (heading, climb, roll) for f in (cosine, sine))
+    c, s, level, rise, roll_cosine, roll_sine = (f(angle) for angle in (heading, climb, roll) for f in (cosine, sine))
     left, up = (-s, c, 0), (-rise * c, -rise * s, level)
     return [
         [level * c, level * s, rise],
-        [upright * a - lean * b for a, b in zip(left, up, strict=True)],
-        [upright * b + lean * a for a, b in zip(left, up, strict=True)],
+        [roll_cosine * a - roll_sine * b for a, b in zip(left, up, strict=True)],
+        [roll_cosine * b + roll_sine * a for a, b in zip(left, up, strict=True)],
     ]
 
 
@@ -86,9 +86,9 @@ def shift_rates(whole, part, scaled):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_series(scaled, step, pen, series):  # type: ignore[no-untyped-def]
-    """Fill the Taylor coefficients of the pen in powers of the share of a part that has been passed."""
-    series[0], series[1:] = pen, 0.0
+def fill_series(scaled, step, pose, series):  # type: ignore[no-untyped-def]
+    """Fill the Taylor coefficients of the pose in powers of the share of a part that has been passed."""
+    series[0], series[1:] = pose, 0.0
     for n in range(TERMS):
         for turn in range(TURNS.shape[0]):
             row, other, rate, sign = TURNS[turn]
@@ -110,7 +110,7 @@ def fill_series(scaled, step, pen, series):  # type: ignore[no-untyped-def]
 
 @Inner
 def value_of_series(series, row, axis, share, share_low):  # type: ignore[no-untyped-def]
-    """Return a component of the pen where a share of a part has been passed, as two doubles."""
+    """Return a component of the pose where a share of a part has been passed, as two doubles."""
     high, low = 0.0, 0.0
     for n in range(TERMS, -1, -1):
         high, low = multiply(high, low, share, share_low)
@@ -119,8 +119,8 @@ def value_of_series(series, row, axis, share, share_low):  # type: ignore[no-unt
 
 
 @entry(types.void(types.float64[:, :, ::1], VECTOR, types.float64[:, :, ::1], types.float64[:, :, :, ::1], MATRIX))
-def fill_parts(rates, step, pen, samples, nodes):  # type: ignore[no-untyped-def]
-    """Fill the coordinates x, z and y on the n equal parts of a piece, and move the pen to its right end.
+def fill_parts(rates, step, pose, samples, nodes):  # type: ignore[no-untyped-def]
+    """Fill the coordinates x, z and y on the n equal parts of a piece, and move the pose to its right end.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def fill_parts(rates, step, pen, samples, nodes):  # type: ignore[no-untyped-def
         Coefficients of yaw, pitch and roll in powers of the distance from the beginning, two doubles each.
     step : (2,) array
         The length of a part, as two doubles.
-    pen : (4, 3, 2) array
+    pose : (4, 3, 2) array
         The frame's rows and the place at the left end, two doubles each.
     samples : (n, 3, 2, NODES) array
         Filled.
@@ -143,7 +143,7 @@ def fill_parts(rates, step, pen, samples, nodes):  # type: ignore[no-untyped-def
             power, power_low = multiply(power, power_low, step[0], step[1])
     for part in range(samples.shape[0]):
         shift_rates(whole, part, scaled)
-        fill_series(scaled, step, pen, series)
+        fill_series(scaled, step, pose, series)
         for column in range(3):
             axis = IN_SAMPLES[column]
             for i in range(NODES):
@@ -153,7 +153,7 @@ def fill_parts(rates, step, pen, samples, nodes):  # type: ignore[no-untyped-def
                 )
         for row in range(4):
             for axis in range(3):
-                pen[row, axis] = value_of_series(series, row, axis, 1.0, 0.0)
+                pose[row, axis] = value_of_series(series, row, axis, 1.0, 0.0)
 
 
 class TrueRail:
@@ -190,10 +190,10 @@ class TrueRail:
         self._origins = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
         counts = np.bincount(chart.origins[:, 0].astype(np.int64)).tolist()
         given = (context.mpf(number) for number in numbers(context, self._p))
-        pen, passed = np.zeros((4, 3, 2)), 0
+        pose, passed = np.zeros((4, 3, 2)), 0
         if placed:
             place, angles = [*islice(given, 3)], [*islice(given, 3)]
-            pen = _pairs([*starting_frame(context.cos, context.sin, *angles), place])
+            pose = _pairs([*starting_frame(context.cos, context.sin, *angles), place])
         self._parts: list[Array | Callable[[Any], tuple[Any, ...]]] = []
         for kind, count in zip(kinds, counts, strict=True):
             own = [*islice(given, PIECE_NUMBERS[kind])]
@@ -202,7 +202,7 @@ class TrueRail:
                 at = self._curve(next(following), *own)
                 *place, dx, dy, dz = at(context.mpf(1))
                 size = context.sqrt(dx * dx + dy * dy + dz * dz)
-                pen = _pairs([*level_frame(context.hypot, [dx / size, dy / size, dz / size]), place])
+                pose = _pairs([*level_frame(context.hypot, [dx / size, dy / size, dz / size]), place])
                 self._parts.append(at)
                 continue
             length, rates = rates_of(kind, own)
@@ -211,7 +211,7 @@ class TrueRail:
                 for j, term in enumerate(terms):
                     row[j] = two_doubles(term)
             samples = np.empty((count, 3, 2, NODES))
-            fill_parts(coefficients, np.array(two_doubles(length / count)), pen, samples, sample_places())
+            fill_parts(coefficients, np.array(two_doubles(length / count)), pose, samples, sample_places())
             self._parts.append(samples)
         self._error = ROUNDINGS * UNIT * (1.0 + passed) * float(np.abs(chart.edges[[0, -1]]).max())
 
