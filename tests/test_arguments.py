@@ -125,7 +125,7 @@ CIRCLE, DRAG = (import_module(f"generated.{name}") for name in ("circle", "circl
 SWUNG = np.linspace(0.0, 3.0, 12)
 DIPS = {"t": SWUNG, "lam": 0.8 * np.cos(3.0 * SWUNG)}
 
-# Made when they are first needed; the same for all calls.
+# These are made when they are first needed, and are the same for all calls.
 MOTIONS = {
     "libration": lambda: CIRCLE.solve(1, L=1),
     "circulation": lambda: CIRCLE.solve(0, 8, L=1),
@@ -201,7 +201,7 @@ LAUNCHED = {
     "minimise limits": lambda v: gqm.design.minimise("period", None, FORCE, free={}, limits=v, lam0=1),
 }
 
-# Together with these, what raised errors of Python's, NumPy's or pandas' own.
+# Together with these, they raised errors of Python's, NumPy's or pandas' own.
 HOSTILE = (
     *THINGS[:-10],
     *("pi", "30 deg", "5 kg", "1/0", "sqrt(-1)", "1e400", 1e308, 1e-320, 10**400, Fraction(1, 3), Decimal("NaN")),

@@ -98,7 +98,7 @@ def test_a_budget_is_its_threads_own() -> None:
     assert done == [None]
 
 
-# The stage, the launch it belongs to, and what is asked of the motion (None: the motion itself).
+# A row has the stage, its launch, and what is asked of the motion (None: the motion itself).
 ASKED: dict[str, tuple[str, str, Callable[[Any], object] | None]] = {
     "an equilibrium": ("search for turning points", "pi/2 - 1e-30", None),
     "a time": ("quadrature", "pi/2 - 1e-6", lambda motion: motion.lam(1e9)),

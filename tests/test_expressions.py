@@ -15,7 +15,7 @@ from gqm_sym.errors import ExpressionError, GQMError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_name, is_real_at, name_or_value, read_expression
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=20)
 
 x, y, theta, L = sp.symbols("x y theta L", real=True)

@@ -132,7 +132,7 @@ def test_words_are_in_order() -> None:
     assert words() == sorted(words(), key=str.lower)
 
 
-# What ARCHITECTURE.md presupposes. A word that is no longer used there leaves this list.
+# ARCHITECTURE.md presupposes these words. A word that is no longer used there is removed from this list.
 TERMS = """arithmetic-geometric mean, axis of symmetry, batch, body, chart, divided difference, double-double,
 effective potential, emission, facade, Fourier series, Gauss-Legendre rule, gradient, hilltop, integrating factor,
 interface, interval bounds, lane, launch, leg, lowering, multiprecision, Newton's method, node, normal, orbit, panel,

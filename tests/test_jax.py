@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 
-# Relative, of values and derivatives.
+# The relative tolerance of values and derivatives.
 CLOSE = 1e-14
 
 

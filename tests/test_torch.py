@@ -14,7 +14,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import GQMError, SolutionError
 from gqm_sym.loading import load
 
-# Relative, of values and derivatives.
+# The relative tolerance of values and derivatives.
 CLOSE = 1e-14
 
 

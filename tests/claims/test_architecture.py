@@ -53,7 +53,7 @@ LAYERS = (
     {"errors"},
 )
 
-# A motion is drawn and converted by what lies above it, as pandas and xarray do it: these imports alone go upwards.
+# As in pandas and xarray, a motion has methods for what lies above it: these imports alone go upwards.
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
     ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
@@ -65,13 +65,13 @@ PRESENTATION_HOOKS = {
     ("runtime/sweep/result.py", "gqm_sym.export.datasets"),  # Sweep.to_pandas, Sweep.to_xarray
 }
 
-# Not above the runtime though it lies in a layer above it: they know it by name only.
+# These units are not above the runtime, though they lie in a layer above it, because they know it by name only.
 KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters", "expressions"}
 
-# No folder of the package holds more files than a reader takes in at a glance.
+# No folder of the package holds more files than a reader can survey.
 MAX_FILES = 16
 
-# Files of the runtime without a test file of their name in their room, and the tests that would fail with them.
+# These files of the runtime have no test file of their name in their room; the tests named would fail with them.
 DIFFERENCES = "runtime/arithmetic/divided_differences/test_differences.py"
 TESTED_THROUGH = {
     "arithmetic/clenshaw.py": "runtime/motion/test_sampler.py",
@@ -202,7 +202,7 @@ TESTED_THROUGH = {
     "vocabulary.py": DIFFERENCES,
 }
 
-# Packages that only some parts import.
+# Only some parts import these packages.
 ONLY_IN = {
     "distributed": {"runtime"},
     "jax": {"jax"},
@@ -237,7 +237,7 @@ ONLY_IN = {
     "xarray": {"cli", "export", "studies"},
 }
 
-# Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
+# These are imported when exact digits, splines, pictures, datasets or units are asked for, never when a module loads.
 ONLY_INSIDE_FUNCTIONS = {
     *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "torch", "xarray"),
 }

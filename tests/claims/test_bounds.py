@@ -17,10 +17,10 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 
 G = mpf("9.81")
-# Shares of the phase angle from the launch to the turning point.
+# Places are tested at these shares of the phase angle from the launch to the turning point.
 SHARES = (0.003, 0.05, 0.3, 0.7, 0.95, 1.0)
 
-# Curve, force, effective potential, ds/dlam, and the top of the barrier.
+# A row has the curve, the force, the effective potential, ds/dlam, and the top of the barrier.
 WELLS: dict[str, tuple[Any, Any, Callable[[Any], Any], Callable[[Any], Any], float]] = {
     "potential": (
         gqm.Curve.graph("u**2/2", parameter="u"),

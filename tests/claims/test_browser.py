@@ -18,7 +18,7 @@ from gqm_sym.cli import tool
 CURVES = ROOT / "curves"
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), "")
-# The browser itself is to ask nobody for anything.
+# The browser itself must not use the network.
 QUIET = (
     "--no-first-run",
     "--disable-background-networking",
@@ -28,7 +28,7 @@ QUIET = (
 
 pytestmark = pytest.mark.skipif(not BROWSER, reason=f"no browser: none of {', '.join(NAMES)} is installed")
 
-# Into a copy of the page: its own layout, as the page's title.
+# This script is added to a copy of the page, and writes the page's layout into its title.
 MEASURE = """<script>
 addEventListener("load", () => {
 const box = (element) => { const b = element.getBoundingClientRect(); return [b.width, b.height]; };

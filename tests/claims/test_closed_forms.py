@@ -16,9 +16,9 @@ import gqm_sym as gqm
 from gqm_sym.derivation.forces.particular_solution import particular_solution
 
 DIGITS = 30
-# Of mpmath's quadrature, of the largest W on the way.
+# The tolerance of mpmath's quadrature, relative to the largest W on the way.
 AGREED = mpf(10) ** -25
-# Of the runtime's march in doubles, of the largest V².
+# The tolerance of the runtime in doubles, relative to the largest V².
 MARCHED = 4e-15
 
 

@@ -17,18 +17,19 @@ from problems import DIGITS, number
 
 import gqm_sym as gqm
 
-# Half periods and periods are the doubles nearest to the truth. Worst measured: 0.49.
+# Half periods and periods are the doubles nearest to the true values. Worst measured: 0.49.
 NEAREST = 0.51
-# Of the motion's extent or its largest speed, to thousands of periods; worst measured: 1.7e-15 (speeds), else 1.0e-15.
+# The tolerance relative to the motion's extent or its largest speed, up to thousands of periods. Worst measured:
+# 1.7e-15 (speeds), otherwise 1.0e-15.
 POSITION = 2e-15
-# V**2, N and so on of the largest of their kind; worst measured: 2.5e-16.
+# The tolerance of V**2, N and so on relative to the largest of their kind. Worst measured: 2.5e-16.
 SAMPLE = 1e-15
-# Turning points, of the extent, and the time to the first; worst measured: 8e-17 and 5e-17.
+# The tolerance of turning points relative to the extent, and of the time to the first. Worst measured: 8e-17 and 5e-17.
 TURNING = 2.3e-16
 TIME = 2.3e-16
 
-# Of where the planet is, which after thousands of turns is a large angle; and of the largest V**2 and N.
-# Worst measured: 3.4e-16 and 5.5e-16.
+# The tolerance of a planet's place, which after thousands of turns is a large angle, and of V**2 and N relative to the
+# largest. Worst measured: 3.4e-16 and 5.5e-16.
 KEPLER_POSITION = 1e-15
 KEPLER_FIELD = 2e-15
 
@@ -283,7 +284,7 @@ def test_a_sum_of_forces_is_the_potential_written_out(
     ours, theirs = MODELS[summed](), MODELS[written]()
     for form in ("speed_squared", "normal_force", "tangential_acceleration", "kappa"):
         difference = getattr(ours, form) - getattr(theirs, form)
-        for k in (1, 2, 3):  # at places where no term is special, for such forms are equal if they are so there
+        for k in (1, 2, 3):  # Such forms are equal if they are equal at places where no term is special.
             values = {
                 symbol: sp.Rational(7 + 3 * i, 11 + k)
                 for i, symbol in enumerate(sorted(difference.free_symbols, key=str))
@@ -339,7 +340,7 @@ def test_through_the_centre_nothing_is_nan(generated_folder: Path) -> None:
     motion = module.solve("1", k="2")
     assert motion.kind == "transit"
     assert motion.direction == -1
-    # r'' = -k/r**2 from rest at r0 = sqrt(5)/2: it takes pi/2*sqrt(r0**3/(2*k)).
+    # From rest at r0 = sqrt(5)/2, r'' = -k/r**2 takes pi/2*sqrt(r0**3/(2*k)).
     with mp.workdps(DIGITS):
         fall = mp.pi / 2 * mp.sqrt((mp.sqrt(5) / 2) ** 3 / 4)
         half = motion.state(float(fall) / 2)

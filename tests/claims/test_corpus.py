@@ -16,19 +16,20 @@ from paths import DATA
 
 import gqm_sym as gqm
 
-# Of the scale of each: turning points and times; what pass1 fills; a position at any t, also after 1000 periods.
+# The tolerances, relative to the scale of each: turning points and times; what pass1 fills; a position at any t, also
+# after 1000 periods.
 TURNING = 1e-14
 PERIOD_ULPS = 2.0
 TIME = 1e-14
 SAMPLE = 1e-13
 POSITION = 8e-15
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 ORBIT_POINTS = 401
 
-# Solved from their YAML files too; of the others the text of the module is compared.
+# These are solved from their YAML files too; for the others the text of the module is compared.
 SOLVED_FROM_YAML = ("Cardioid", "Lissajous curves", "Parabola")
 
 Expected = dict[str, Any]
@@ -242,7 +243,7 @@ def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module:
     motion, expect, of = famous_motion(famous), famous.expect, scale(famous)
     assert motion.kind == "libration"
     met = list(zip(expect["turning_points"], expect["turning_points_xz"], strict=True))
-    # A launch from rest is at the first of them, and falls in the direction of the other.
+    # A launch from rest is at the first turning point, and the body moves in the direction of the other.
     if (famous.launch["direction"] > 0) is not (famous.launch["v0"] == "0"):
         met.reverse()
     assert len(motion.turning_points) == 2

@@ -19,18 +19,19 @@ from problems import TRACKS, Track
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 
-# Half periods: nearly all within 1 unit in the last place, all within 2. Worst measured: 0.5.
+# The tolerances of half periods: nearly all are within 1 unit in the last place, all within 2. Worst measured: 0.5.
 MOST_ULPS, MOST_SHARE = 1.0, 0.95
 ALL_ULPS = 2.0
 
-# Positions at any time, of their scales (MATHS, section 7). A short arc far from the origin has coordinates that are
-# rounded to more than that of its extent: to so many units in the last place of the coordinate and of the parameter.
+# The tolerances of positions at any time, relative to their scales (MATHS, section 7). The coordinates of a short arc
+# far from the origin are rounded to more than that of its extent: to so many units in the last place of the coordinate
+# and of the parameter.
 POSITION = 8e-15
 COORDINATE_ULPS = 2.0
 
 TURNING_POINT_ULPS = 1.0
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 OWN = (

@@ -24,9 +24,9 @@ CASES = {case["id"]: case for case in json.loads((DATA / "paper_cases.json").rea
 LOSING = [case for case in CASES if case.startswith(("example2", "table2_3", "table2_4", "table2_5"))]
 KINDS = {"turning_point": "turn", "N_zero_crossing": "contact-sign", "final_rest": "rest"}
 
-# What the work asks for; of a place relative to the leg it ends, of V**2 and N relative to their largest.
+# The tolerance of places relative to the leg that they end, and of V**2 and N relative to their largest value.
 ASKED = 1e-13
-# Of closed forms: a few roundings of a time or place, times what the number of legs and slow tops amplify.
+# The tolerance of closed forms: a few roundings of a time or place, times the amplification by many legs and slow tops.
 FEW = 2e-14
 G = 9.81
 
@@ -128,7 +128,7 @@ def test_work_of_friction_is_the_energy_lost(name: str, build: Build) -> None:
     lost, work = [], []
     for leg in motion.legs:
         if abs(leg.lam_end) > 3.0:
-            continue  # runs away for ever
+            continue  # the body moves away for ever
         half = 0.5 * (leg.t_end - leg.t_start)
         state = motion.state(leg.t_start + half * (1.0 + nodes))
         work.append(half * float(weights @ (mu * np.abs(state.normal_force * state.v))))
@@ -143,17 +143,17 @@ def test_ten_thousand_legs(dragged: ModuleType) -> None:
     """With drag alone the motion has no end; leg 10000 ends at the place of the closed form of V**2, as exactly as leg
     1.
     """
-    # Each leg from where the one before it ended: along them roundings add up as in any start that is not exact.
+    # Each leg is compared from the end of the one before, because roundings add up as in any start that is not exact.
     count = 10000
     motion = dragged.solve(lam0=1, c="0.01")
     assert motion.t_end == math.inf
     motion.lam(10000.0)
-    assert [leg.end for leg in motion.legs] == ["turn"]  # whatever has been asked for
+    assert [leg.end for leg in motion.legs] == ["turn"]  # whatever was asked before
     turns = dragged.solve(lam0=1, c="0.01", t_max=10000).turning_points
     with mp.workdps(25):
         k, worst = mpf("0.02"), mpf(0)
         for before, turn in list(pairwise(turns[: count + 1]))[::7]:
-            # On a leg from -a to b: e^(k th) (k sin th - cos th) is the same at both ends.
+            # On a leg from -a to b, e^(k th) (k sin th - cos th) is the same at both ends.
             amplitude = abs(mpf(before))
             start = mp.exp(-k * amplitude) * (-k * mp.sin(amplitude) - mp.cos(amplitude))
             b = abs(mpf(turn))
@@ -176,7 +176,7 @@ def test_laps_then_libration_then_rest(rubbed: ModuleType) -> None:
     assert turns[0] > 4.0 * math.pi
     last = motion.legs[-1].lam_end
     assert abs(last - 2.0 * math.pi * round(last / (2.0 * math.pi))) <= math.atan(0.1)
-    # While N > 0: W' = -2 g sin - 2 mu (W + g cos), whose solution is elementary.
+    # While N > 0, W' = -2 g sin - 2 mu (W + g cos) has an elementary solution.
     with mp.workdps(30):
         mu, g, place = mpf("0.1"), mpf("9.81"), mpf(12)
         k = 2 * mu
@@ -272,7 +272,7 @@ def test_drag_on_straight_tracks(build: Build) -> None:
     assert motion.lam(t) == pytest.approx(10.0 * np.log1p(0.3 * t), rel=FEW)
     assert motion.state(t).v == pytest.approx(3.0 / (1.0 + 0.3 * t), rel=FEW)
     assert motion.time_at(20) == pytest.approx(math.expm1(2.0) / 0.3, rel=FEW)
-    # A run through many powers of ten of V**2 had a table that was no better than its whole width.
+    # A run over many powers of ten of V**2 had a table with errors as large as its width.
     late = np.logspace(-1, 6, 8)
     assert np.all(motion.error_bound(late) <= 1e-14 * (10.0 + motion.lam(late)))
     slope = build("slope_dragged", gqm.Curve.graph("-x/2", parameter="x"), gqm.QuadraticDrag(b="c"))
@@ -307,7 +307,7 @@ def test_slow_launch_on_a_bend_keeps_its_digits(v0: str, rubbed: ModuleType) -> 
         w = lambda x: part(x) + rest * mp.exp(k * x)  # noqa: E731
         behind = mp.sqrt(start / (2 * g * mp.sin(1) - k * (start + g * mp.cos(1))))
         for place in (0.999, 0.9, 0.25):
-            # With 1 - x = y (y + 2 behind) what is integrated is smooth.
+            # With 1 - x = y (y + 2 behind) the integrand is smooth.
             stop = mp.sqrt(behind**2 + (1 - mpf(place))) - behind
             pace = lambda y: 2 * (y + behind) / mp.sqrt(w(1 - y * (y + 2 * behind)))  # noqa: E731
             assert motion.time_at(place) == pytest.approx(float(mp.quad(pace, [0, stop])), rel=FEW)

@@ -63,7 +63,7 @@ def test_from_end_to_end(launch: dict[str, Any], build: Build) -> None:
     assert motion.kind == "libration"
     low, high = sorted(motion.turning_points)
     assert (low, high) == pytest.approx((0.0, math.pi + 1.0), abs=1e-15)
-    # In extended precision the turn is a rounding beyond the lip (-1.7e-54), where the track has no value.
+    # In extended precision the turn is a rounding (1.7e-54) beyond the end of the track, where the track has no value.
     assert 0.0 <= low < high <= motion.problem.high
     places = motion.lam(np.linspace(0.0, motion.period, 9))
     assert motion.problem.low <= places.min() < places.max() <= motion.problem.high
@@ -188,7 +188,7 @@ def test_floats_of_points_mean_their_binary_values() -> None:
     assert gqm.Curve.sampled([(2**60, 0), (0, 2**60 + 1)], kind="linear").definition.points.endswith(str(2**60 + 1))
 
 
-# What is given for a number: extremes, and what is none.
+# These values are given for numbers: extreme ones, and some that are no numbers.
 ODD: tuple[Any, ...] = (
     *(5e-324, 1e-320, 1e17, -1e17, 1e155, 1e300, math.nan, math.inf, -math.inf, True, np.bool_(True), 10**400, 1j),
     *("", "x", "1e400", "nan", "1/0", "(-1)**(1/2)", "0.25 ", b"1", Fraction(1, 3), Decimal("0.1"), Decimal("NaN")),

@@ -165,7 +165,7 @@ def test_two_at_once_keep_their_own_code(
         if waiting:
             waiting.clear()
             for index in cache.rglob("*.nbi"):
-                index.unlink()  # as if the other had looked before it was written
+                index.unlink()  # the same happens as if the other process had looked before it was written
             with monkeypatch.context() as patch:
                 patch.setattr(jit, "stamp_for", lambda _: "another")
                 assert function(5.0)(1.0) == 6.0
@@ -237,7 +237,7 @@ write_module(text, path)
 load(path, "small").effective_potential.compile()
 print("compiled")
 """
-# As gqm-gen writes them, with one function instead of seven.
+# The file is written as by gqm-gen, with one function instead of seven.
 SMALL = f"""from numba import carray
 
 from gqm_sym.runtime import compiler
@@ -330,7 +330,7 @@ def test_interrupted_while_deriving(yaml: Path) -> None:
 
 
 RING = "name: ring\ncurve: {implicit: {F: x**2 + z**2 - 1, start: [0, -1]}}\nkernel: {gravity: {}}\n"
-# What is interrupted, the how-manieth call of it (a module is written first), and the command.
+# A row has what is interrupted, in which call of it (a module is written first), and the command.
 STAGES = {
     "a chart": ("gqm_sym.runtime.launch.formulas.Formulas.charted", 1, ["solve", "ring.yaml"]),
     "a figure": ("os.fsync", 2, ["plot", "ring.yaml", "ring.svg"]),

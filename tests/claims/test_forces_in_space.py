@@ -14,7 +14,7 @@ from gqm_sym.errors import DeclarationError, LaunchError, SolutionError
 Build = Callable[[str, Any, Any], ModuleType]
 Vector = np.ndarray[Any, np.dtype[np.float64]]
 
-# DOP853 at its tightest is right to some 1e-12 over a few seconds.
+# With its tightest tolerances DOP853 is right to some 1e-12 over a few seconds.
 INTEGRATED = 3e-11
 
 
@@ -90,7 +90,7 @@ def test_a_frame_that_turns(mu: float, build: Build) -> None:
     numbers = {"mu": mu} if mu else {}
     motion, newton = module.solve(-2, 4, t_max=30, **numbers), Newton(viviani, 1.5, mu)
     turn = motion.legs[0].t_end
-    # DOP853 cannot pass the jump of friction at a turn; without friction it is asked far beyond.
+    # DOP853 cannot pass the jump of friction at a turn; without friction it is asked for times far beyond.
     times = np.array([0.1, 0.4, 0.7, 0.95]) * (turn if mu else motion.period)
     truth, state = newton.follow(-2.0, 4.0, times).y, motion.state(times)
     contact = np.array([newton.forces(*column[:2])[0] for column in truth.T])
@@ -130,7 +130,7 @@ def test_a_hoop_that_turns_is_the_planar_one(build: Build) -> None:
     assert model.speed_squared == flat.speed_squared
     hoop = build("turning_hoop", model.curve, force).solve("1/2", 1)
     state = hoop.state(np.linspace(0.0, hoop.period, 7))
-    # In the plane V**2 + (4*sin(u) - ...) balances; across it 2*Omega*V*dx/ds.
+    # In the plane V**2 + (4*sin(u) - ...) balances; across it the force is 2*Omega*V*dx/ds.
     sideways = 2.0 * 2.0 * state.v * np.cos(state.lam)
     in_plane = state.v2 + 9.81 * np.cos(state.lam) + 4.0 * np.sin(state.lam) ** 2
     assert state.normal_force == pytest.approx(np.hypot(in_plane, sideways), rel=4e-15)

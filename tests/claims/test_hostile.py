@@ -71,7 +71,7 @@ def witness(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 RUNS = "open('pwned', 'w')"
-# What would run, or reach further than arithmetic.
+# These texts would run code, or reach further than arithmetic.
 CODE = {
     "import": "__import__('os').system('touch pwned')",
     "attributes": "().__class__.__base__.__subclasses__()",
@@ -93,7 +93,7 @@ CODE = {
     "a name of SymPy's": "Symbol('x').func",
     "a private name": "_x + __class__",
 }
-# What would take all time or memory.
+# These texts would take all time or memory.
 GIANTS = {
     "a tower": "9**9**9**9",
     "a tower of names": "x**9**9**9**9",
@@ -111,7 +111,7 @@ GIANTS = {
     "angles": "h*x + " + "+".join(f"cos({k}*pi/9973)" for k in range(200)),
     "signs of sums": "h*x + " + "+".join(f"abs(sqrt(2)-{k}/7)" for k in range(200)),
 }
-# What is not what it looks like.
+# These texts are not what they look like.
 LOOKS = {
     "Cyrillic": "\u0445**2",
     "Greek": "\u03c7*h",
@@ -145,7 +145,7 @@ def test_no_expression_does_harm(
             refused = str(error)
     assert refused or attack in GIANTS
     assert not witness.exists()
-    # What took too long may take less the second time: SymPy remembers.
+    # A text that took too long may take less time when repeated, because SymPy caches results.
     if refused and "not done after" not in refused:
         assert gen.main(["-o", str(path.parent / "out"), str(path)]) == 2
         assert [entry.name for entry in path.parent.iterdir()] == ["a.yaml"]
@@ -366,7 +366,7 @@ def test_no_file_takes_long(text: str, start: int, cut: int, yaml: Callable[[str
         gqm.read_spec(path)
 
 
-# What grows when it is derived or emitted, though it is short when it is read.
+# These expressions are short when read, and grow when they are derived or emitted.
 GROWING = {
     "a chain": "sin(" * 24 + "x" + ")" * 24,
     "kinks": "abs(" * 20 + "x" + ")-1" * 20,

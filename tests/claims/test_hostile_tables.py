@@ -131,7 +131,7 @@ def test_a_rail_that_winds_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
         once.chart(())
 
 
-# Of a sine from 0 to 10: sqrt(2) E(10, 1/2), by mpmath.
+# The length of a sine from 0 to 10 is sqrt(2) E(10, 1/2), by mpmath.
 LENGTH = 12.252585234704537
 
 

@@ -68,7 +68,7 @@ def test_positions_keep_the_energy(problem: Problem) -> None:
         with mp.workdps(50):
             lam = number(row.lam)
             kept = point(problem, TRACKS[problem.track], lam).v2
-            # The digits of lam are counted from its first, however many laps it has gone round.
+            # The error of lam is relative to all of lam, however many laps it counts.
             assert abs(number(row.v) ** 2 - kept) <= AGREEMENT * max(1, kept, abs(lam))
 
 

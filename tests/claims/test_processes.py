@@ -11,7 +11,7 @@ from paths import ROOT
 
 CURVES = sorted(path.stem for path in (ROOT / "curves").glob("*.yaml"))
 
-# Before anything else runs, make the named packages impossible to import.
+# This code runs first and makes the named packages impossible to import.
 BLOCK = """
 import sys
 

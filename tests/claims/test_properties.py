@@ -13,17 +13,17 @@ ModuleOf = Callable[[str], ModuleType]
 
 # Two half periods that must be the same number come from different roundings of the same inputs.
 SAME_ULPS = 4.0
-# Half periods against closed forms, at amplitudes where the separatrix is not close.
+# The tolerance of half periods against closed forms, at amplitudes away from the separatrix.
 CLOSED_FORM_ULPS = 4.0
-# Positions of the scale: one evaluation, and a comparison of two.
+# The tolerances of positions relative to their scale: for one evaluation, and for a comparison of two.
 POSITION = 1e-14
 TWO_POSITIONS = 4e-14
-# Energy per unit mass, of the largest kinetic energy.
+# The tolerance of the energy per unit mass, relative to the largest kinetic energy.
 ENERGY = 1e-14
 
 lengths = st.floats(0.1, 10.0)
 gravities = st.floats(0.5, 30.0)
-# Small swings are drawn by their exponent: there W loses its digits if anything is subtracted.
+# Small swings are drawn by their exponent, because W loses its digits there if anything is subtracted.
 small = st.floats(-8.0, -1.0).map(lambda exponent: 10.0**exponent)
 amplitudes = st.one_of(small, st.floats(0.1, 3.0))
 fractions = st.floats(0.0, 1.0)
@@ -90,7 +90,7 @@ def test_stopped_and_sent_back_it_returns(module_of: ModuleOf, lam0: float, shar
     t = share * out.half_period
     there = out.state(t)
     back = solve(lam0=there.lam, v0=abs(there.v), direction=1)
-    # At the end it is at rest: an error in time shows squared, one in energy as it is.
+    # At its end the body is at rest, so that an error in time counts squared, and one in energy as it is.
     assert abs(back.lam(t) - lam0) <= 10 * TWO_POSITIONS * lam0
 
 

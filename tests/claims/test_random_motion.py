@@ -20,7 +20,7 @@ import gqm_sym as gqm
 
 G = 9.81
 HORIZON = 3.0
-# Events closer than this to a change of what happens are not compared with the integrator.
+# Events closer than this to a change of the motion are not compared with the integrator.
 GRAZING = 1e-9
 
 

@@ -14,33 +14,34 @@ from problems import PROBLEMS, TRACKS, Problem, number, where
 MotionOf = Callable[[Problem], Any]
 ModuleOf = Callable[[str], ModuleType]
 
-# Half periods and periods, also where a barrier is close or heights agree to many digits: the double nearest to the
-# truth. Worst measured: 0.49.
+# Half periods and periods are the doubles nearest to the true values, also if a barrier is close or heights agree to
+# many digits. Worst measured: 0.49.
 NEAREST = 0.51
 
-# Positions in the first ten periods, of their scale. Worst measured: 5.0e-16.
+# The tolerance of positions in the first ten periods, relative to their scale. Worst measured: 5.0e-16.
 TEN_PERIODS = 10.0
 POSITION = 1e-15
-# Where the orbit is small and far from the origin, rounding the place and its coordinates comes in.
+# If the orbit is small and far from the origin, the rounding of the place and its coordinates is added.
 COORDINATE_ULPS = 2.0
 
-# The paper's example: lam(t) in its first period and after 1000 s, of the scale of lam. Worst measured: 1.8e-16.
+# The tolerance of lam(t) in the paper's example, in its first period and after 1000 s, relative to the scale of lam.
+# Worst measured: 1.8e-16.
 FIRST_PERIOD = 4e-16
 AFTER_1000_S = 4e-16
 
-# The speed field at a float: V**2, N, kappa, ds.
+# The tolerances of the speed field at a float: V**2, N, kappa, ds.
 FIELD_ULPS = 4.0
 # Kappa of a curve whose metric varies divides by a root cubed, and N has kappa and V**2 as factors: half a dozen
 # roundings each. Worst measured: 4.1 (ellipse) and 5.6 (ellipse).
 COMPOSED_ULPS = 6.0
 
-# A turning point is meant to be the nearest double.
+# A turning point is the nearest double.
 TURNING_POINT_ULPS = 1.0
 
-# Times of single events, relative. Worst measured: 6.3e-16.
+# The relative tolerance of times of single events. Worst measured: 6.3e-16.
 EVENT_TIME = 1e-15
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 EXAMPLE = PROBLEMS["example1_pendulum"]
@@ -125,7 +126,7 @@ def test_the_error_bound_holds_at_any_time(motion_of: MotionOf) -> None:
     motion = motion_of(EXAMPLE)
     times = np.geomspace(1e-3, 1e9, 300)
     found, bounds = motion.lam(times), motion.error_bound(times)
-    # A state has the largest error on its interval of the table.
+    # A state states the largest error on its interval of the table.
     ratio = motion.state(times).error / bounds
     assert 1.0 - 1e-5 <= ratio.min() <= ratio.max() < 1.25
     with mp.workdps(50):
@@ -140,7 +141,7 @@ def test_quadrature_error_and_condition_number_are_told_apart(motion_of: MotionO
     assert calm.quadrature_error < 1e-14
     assert near.quadrature_error < 1e-14
     assert calm.condition_number < 2
-    # An angle of 1e-6 below the hilltop: V**2's regular factor is the square of that at the top.
+    # At an angle of 1e-6 below the hilltop, V**2's regular factor is the square of that at the top.
     assert near.condition_number > 1e5
     rest = motion_of(PROBLEMS["pendulum_at_the_bottom"])
     assert (rest.quadrature_error, rest.condition_number) == (0.0, 1.0)

@@ -18,7 +18,7 @@ from gqm_sym.kernels.base import DIRECTION, W
 from gqm_sym.specfile import read_spec
 
 G0 = 9.80665
-# A track that rises, falls and turns, whose tangent is never vertical.
+# This track rises, falls and turns, and its tangent is never vertical.
 WAY = {"x": "3*sin(u)", "y": "4*cos(u) + u", "z": "u**2/8 + sin(2*u)/3", "parameter": "u"}
 ROLLS: dict[str, Any] = {"angle": "u/3 - 1/4", "coordinated": "coordinated", "designed": ("coordinated", "6 + u/5")}
 

@@ -15,12 +15,12 @@ import gqm_sym as gqm
 from gqm_sym.errors import LaunchError, SolutionError
 
 ROUNDINGS = 8 * 2.0**-53
-# The nearest double; worst measured: 0.46.
+# Times are the nearest doubles. Worst measured: 0.46.
 NEAREST = 0.51
-# Errors of double-double arithmetic beside a curve, as shares; worst measured: 7e-18 for a thousandth of a radian and a
-# ball that all but fills its track.
+# The relative errors of double-double arithmetic beside a curve. Worst measured: 7e-18, for a thousandth of a radian
+# and a ball that nearly fills its track.
 USEFUL_ERROR = 1e-17
-# Of charted curves at t < 100 s, relative to the size of the curve.
+# The tolerance for charted curves at t < 100 s, relative to the size of the curve.
 EARLY = 1e-13
 
 
@@ -216,7 +216,7 @@ def test_a_body_that_does_not_fit_is_an_error(bowl: ModuleType) -> None:
     """A body that does not fit is refused at launch or at such a place, but not if the motion ends before it."""
     with pytest.raises(LaunchError, match=r"this rho a body does not fit .* theta = 0\.5; launch elsewhere"):
         bowl.solve(0.5, L=1, rho=1, beta=0)
-    # kappa*rho = 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
+    # kappa*rho is 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
     launch = {"lam0": 1.5, "a": 0.5, "rho": 1.5, "beta": "2/5"}
     place = np.sqrt(1.5 ** (2 / 3) - 1)
     with pytest.raises(SolutionError, match=r"does not fit .* after .* s; give rho") as error:
@@ -256,7 +256,8 @@ def test_slip_is_told_where_it_begins(slippery: ModuleType) -> None:
     launch = {"lam0": start, "L": 2, "rho": 0.5, "beta": beta, "g": 9.81}
     worst = grip(start, start, beta)
     assert [e.kind for e in slippery.solve(**launch, mu_s=1.001 * worst).events] == ["turn", "turn"]
-    # Less than is needed at rest there: it slips at once, then rolls, and slips again beyond the mirrored place.
+    # The coefficient is less than a body at rest there needs: it slips at once, then rolls, and slips again beyond the
+    # mirrored place.
     place = 0.8
     motion = slippery.solve(**launch, mu_s=grip(place, start, beta))
     slipping = [event for event in motion.events if event.kind == "slip"]

@@ -10,7 +10,8 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.runtime.charts.sampled import DEGREE, Sampled, _made
 
-# Chebyshev points on each polynomial of a spline; with 24 the truth is wrong by 2e-9 where points scatter by 5 cm.
+# The number of Chebyshev points on each polynomial of a spline; with 24 the reference is wrong by 2e-9 if points
+# scatter by 5 cm.
 NODES = 40
 SPEED, DRAG = 4, "1/20"
 

@@ -47,7 +47,7 @@ def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
     assert np.max(np.abs(state.v2 - told) - slope) <= 1e-14 * SLOW["v0"] ** 2
     assert np.max(np.abs(well.pass1(state.lam, **SLOW).v2 - told)) > 1e-10 * SLOW["v0"] ** 2
     assert soak.faults(well, SLOW, random.Random(0), closely=True) == []
-    # Doubles leave too little of so small a V**2: forty digits are taken unasked.
+    # Doubles leave too few digits of so small a V**2, so that forty digits are used without being asked for.
     loosely, unsure = soak.speed_squared(well, motion, state.lam, bit, SLOW, False, SLOW["v0"] ** 2)
     assert np.array_equal(loosely, told)
     assert np.max(unsure) <= 2e-9 * SLOW["v0"] ** 2
@@ -143,14 +143,14 @@ def test_random_librations_keep_to_their_bounds(families: dict[str, ModuleType])
     assert tally["checks"] >= 900
 
 
-# What each takes: its launch and parameters. Each lay outside its bound by a factor of 10 to 10,000.
+# Each of these launches, with its parameters, was outside its bound by a factor of 10 to 10,000.
 SMALL = {
     "balance": {"lam0": 8.8e-06, "v0": 8.8e-06, "direction": 1, "a": 1.42, "k": 0.322, "c": 43.26211180124224},
     "ring": {"lam0": -1.09e-06, "v0": 0.0, "direction": -1, "k": 0.0},
     "rolling": {"lam0": -6.8e-05, "v0": 0.0, "direction": 1, "a": 0.68, "beta": 0.42},
 }
 
-# Near a hilltop the rounding of an end is thirty of the time on the way.
+# Near a hilltop the rounding of an end is thirty roundings of the time.
 NEAR_HILLTOP = {
     "lam0": 0.013704888185852636,
     "v0": 0.0,
@@ -288,7 +288,7 @@ def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch:
     assert failed == []
     assert tally["checks"] >= 550
     assert {kind.__name__ for kind in soak_kinds.KINDS} <= tally.keys()
-    # With gravity that is a little stronger the closed forms are those of another law.
+    # With slightly stronger gravity the closed forms are those of another law.
     monkeypatch.setattr(soak_kinds, "G", "9.8100000001")
     for kind in (soak_kinds.slides, soak_kinds.swings, soak_kinds.bounces):
         assert any(kind(random.Random(seed), modules)[0] for seed in range(20))

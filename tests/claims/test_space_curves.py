@@ -21,7 +21,7 @@ from gqm_sym.errors import DeclarationError, InputError
 from gqm_sym.kernels.base import DIRECTION, W
 
 ROWS = {row["name"]: row for row in json.loads((DATA / "space_curves.json").read_text(encoding="utf-8"))}
-# Those of which a module is made: the others have the same functions.
+# Modules are made for these curves; the others have the same functions.
 BUILT = ("lying_helix", "sprung_helix", "saddle_lap")
 U = sp.Symbol("u", real=True)
 
@@ -207,7 +207,7 @@ def test_friction_and_drag_against_dop853(build: Build) -> None:
     module = build("rough_viviani", generated_curve(), gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag())
     motion = module.solve(-2.0, 4.0, mu=0.1, b=0.02, t_max=20)
     turn = motion.legs[0].t_end
-    # DOP853 cannot pass the jump of friction at a turn: it is asked before the first.
+    # DOP853 cannot pass the jump of friction at a turn, so that it is asked for times before the first.
     times = [share * turn for share in (0.1, 0.4, 0.7, 0.95)]
     truth = dop853(0.1, 0.02, -2.0, 4.0, times)
     state = motion.state(np.array(times))
@@ -216,7 +216,8 @@ def test_friction_and_drag_against_dop853(build: Build) -> None:
     assert state.v == pytest.approx(truth.y[1] * ds, abs=1e-10)
     assert motion.energy(np.array(times)).lost == pytest.approx(truth.y[2] + truth.y[3], abs=1e-10)
     assert [leg.end for leg in motion.legs][-1] == "rest"
-    # Friction takes |N| times the way, on each leg: the trapezoidal rule in the angle of a swing converges fast.
+    # The work of friction on each leg is that of |N| over the distance: the trapezoidal rule in the angle of a swing
+    # converges fast.
     lost = 0.0
     for leg in motion.legs:
         share = 0.5 - 0.5 * np.cos(np.pi * (np.arange(400) + 0.5) / 400)

@@ -16,11 +16,11 @@ import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
 
 G = mpf("9.81")
-# Heights of a chart are right to a unit or two in the last place; half periods are measured to 2 of them.
+# Heights of a chart are right to a unit or two in the last place; half periods are tested to 2 of them.
 MAX_ULPS = 3.0
-# Forces are a few operations on such heights, as a share of the weight.
+# Forces are a few operations on such heights, and the tolerance is a share of the weight.
 SHARE = 1e-14
-# Times along points in space are known in doubles only: some units in the last place.
+# Times along points in space are known in doubles only, to some units in the last place.
 ROUNDING = 4e-15
 
 Build = Callable[..., ModuleType]
@@ -76,7 +76,7 @@ def test_short_trains_on_small_swings(circle: ModuleType, angle: float) -> None:
             4 * mp.sqrt(radius / weaker(length, radius)) * mp.ellipk(mp.sin(mpf(angle * radius) / (2 * radius)) ** 2)
         )
         found = circle.solve(angle * radius, L=radius, length=length).period
-        # At the lowest place the chart begins and ends: a place is rounded there as the length of a lap is.
+        # The chart begins and ends at the lowest place, where a place has the rounding of the length of a lap.
         assert abs(found / truth - 1) <= ROUNDING + 2.0**-53 * 2 * mp.pi / angle
 
 
@@ -98,7 +98,7 @@ def test_forces_on_cars(circle: ModuleType) -> None:
     assert not found.normal_y.any()
     assert not found.y.any()
     np.testing.assert_allclose(found.z, -radius * np.cos(angles), rtol=0, atol=1e-14)
-    # The part behind a coupling is as fast as all: its own gravity is g sinc(own length/2R) at its own middle.
+    # The part behind a coupling is as fast as the train; its own gravity is g sinc(own length/2R) at its own middle.
     for k in range(1, cars):
         behind = length * k / cars
         middle = state.lam - length / 2 + behind / 2
@@ -190,7 +190,7 @@ def test_in_space(build: Build) -> None:
     planar, spatial = (module.solve(9, length=2.5) for module in (flat, tilted))
     assert spatial.half_period == pytest.approx(planar.half_period, rel=1e-13)
     cars, theirs = planar.cars(0.7), spatial.cars(0.7)
-    # The curvature of a spline through 60 points has some hundred roundings of these.
+    # The curvature of a spline through 60 points has some hundred roundings of the points.
     np.testing.assert_allclose(theirs.normal_force, np.abs(cars.normal_force), rtol=1e-11)
     np.testing.assert_allclose(0.6 * theirs.normal_x + 0.8 * theirs.normal_y, cars.normal_x, rtol=0, atol=1e-11)
     np.testing.assert_allclose(theirs.coupling_force, cars.coupling_force, rtol=0, atol=1e-13)
@@ -306,7 +306,7 @@ def test_friction_on_a_helix(build: Build) -> None:
     one = generated.helix_coulomb.solve(0, t_max=5, R=2, c="-2*tan(1/2)", mu="0.2").state(1.5)
     assert motion.state(1.5).v == pytest.approx(one.v, rel=1e-13)
     assert cars.normal_force == pytest.approx(np.full(7, one.normal_force / 7), rel=1e-13)
-    # Each car would run like that alone.
+    # Each car would move like that alone.
     assert np.abs(cars.coupling_force).max() < 1e-12
 
 
@@ -368,7 +368,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     assert np.abs(cars.normal_force) == pytest.approx(force / 4, rel=1e-10)
     low, high = ends(truth[0][1])
     acceleration = -9.81 * (high - low) / length - mu * force.mean()
-    # A coupling carries what the cars behind it lack: theirs is gravity over their own part of the track.
+    # A coupling balances what the cars behind it lack, which is gravity over their own part of the track.
     edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
     lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
@@ -376,7 +376,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
 
 @pytest.mark.parametrize("in_space", [True, False])
 def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
-    """A short train moves like a body with friction in the limit; at a length of a nanometre both motions are the same."""
+    """A short train moves like a body with friction in the limit; at a length of a nanometre both move alike."""
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
     name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
@@ -384,7 +384,7 @@ def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
     rail = gqm.Curve.piecewise([curve])
     body = build(f"body_{in_space}", rail, gqm.CoulombFriction(), cars=0).solve(30, 12, mu="0.05", t_max=3).state(2.0)
     trains = [module.solve(30, 12, mu="0.05", length=length, t_max=3).state(2.0) for length in (2.0, 1.0, 1e-9)]
-    # The cars of a train see the square of its length.
+    # The effect of a train's length on its cars is in proportion to its square.
     wide, half, short = (abs(train.lam - body.lam) for train in trains)
     assert wide / half == pytest.approx(4.0, rel=0.05)
     assert short < 1e-12 * body.lam

@@ -459,7 +459,7 @@ def test_what_a_figure_goes_with(here: Commands) -> None:
 
 def test_what_ends_a_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """An expression that is nested too deeply or too large for memory ends the command with one line."""
-    monkeypatch.setattr("sys.stdout", io.StringIO())  # which cannot be told how to write what it lacks
+    monkeypatch.setattr("sys.stdout", io.StringIO())  # the message cannot say how to write what is missing
     for error, what in ((RecursionError(), "nested too deeply"), (MemoryError(), "too large")):
 
         def work(error: BaseException = error) -> int:

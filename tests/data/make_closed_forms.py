@@ -14,10 +14,10 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-mp.dps = 80  # before the first number below is made
+mp.dps = 80  # This is set before the first number below is made.
 
 DIGITS = 40
-SQUARED = mpf(10) ** -130  # findroot compares the square of a residual with it
+SQUARED = mpf(10) ** -130  # findroot compares the square of a residual with this.
 G = mpf(981) / 100
 
 Row = dict[str, Any]
@@ -155,7 +155,7 @@ def pendulum_from_bottom(slug: str, v0: str, speed: mpf, times: list[str]) -> Ro
             sn, cn, dn = (mp.ellipfun(name, u, m=1 / m) for name in ("sn", "cn", "dn"))
             half = mp.asin(sn / k)
             angle, rate = 2 * half, 2 * OMEGA / k * cn * dn / mp.cos(half)
-        # The energy is a second way to the speed.
+        # The energy gives the speed in a second way.
         must_agree(rate**2, speed**2 - 4 * G * mp.sin(angle / 2) ** 2)
         positions.append(position(t, angle, rate))
     expected: Row = {"kind": "asymptotic", "turning_points": []}
@@ -180,7 +180,7 @@ def pendulum_from_bottom(slug: str, v0: str, speed: mpf, times: list[str]) -> Ro
     }
 
 
-# --- graphs: one smooth integral after the turning points' roots are divided out ------------------
+# --- graphs: one smooth integral after the roots at turning points are divided out ------------------
 
 
 def graph_samples(

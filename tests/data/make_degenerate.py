@@ -16,12 +16,12 @@ from pathlib import Path
 from make_closed_forms import G, Row, graded, integral, must_agree, text
 from mpmath import mp, mpf
 
-# Where on an orbit it is looked at, in half periods (or laps) from launch: early and late, and where it may be fast.
+# Orbits are sampled at these times, in half periods (or laps) from launch: early, late, and at fast places.
 SHARES = (
     *("0.0003", "0.07", "0.31", "0.499", "0.50002", "0.52", "0.96", "0.99999", "1.00001", "1.43", "1.9"),
     *("7.77", "123.456", "1000.50003", "12345.67", "1000000.00001", "9876543.21", "1234567890.123"),
 )
-TIME_DIGITS = 12  # of a time of the table; it is exactly what it says
+TIME_DIGITS = 12  # the relative precision of a time of the table; the text means exactly what it says
 
 Function = Callable[[mpf], mpf]
 
@@ -160,7 +160,7 @@ def thrown_pendulum(slug: str, hard: str, v0: str, speed: mpf) -> Row:
     omega, m = mp.sqrt(G), 4 * G / speed**2
     launch = {"lam0": "0", "v0": v0}
     positions = []
-    if m > 1:  # it comes back
+    if m > 1:  # the body comes back
         tau = 2 * mp.ellipk(1 / m) / omega
         for t in times(tau):
             rest = mpf(t) - 2 * tau * mp.floor(mpf(t) / (2 * tau))

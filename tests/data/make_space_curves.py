@@ -18,7 +18,8 @@ mp.dps = 120
 G, DIGITS = sp.Rational(981, 100), 40
 Row = dict[str, Any]
 
-# Name; x, y, z; potential per unit mass; launch place and speed. The two of LAPS are passed all round, in laps of 2*pi.
+# A row has the name; x, y, z; the potential per unit mass; the place and speed of launch. The two of LAPS are closed,
+# with laps of 2*pi.
 CURVES: tuple[tuple[str, tuple[str, str, str], str, tuple[str, str]], ...] = (
     ("viviani", ("1 + cos(u)", "sin(u)", "2*sin(u/2)"), "g*z", ("3/10", "0")),
     ("trefoil", ("(2 + 3*cos(3*u)/4)*cos(2*u)", "(2 + 3*cos(3*u)/4)*sin(2*u)", "3*sin(3*u)/4"), "g*z", ("1/5", "1/2")),

@@ -19,12 +19,13 @@ from gqm_sym.cli.gen import main
 from gqm_sym.declare.implicit import X, Z
 from gqm_sym.errors import DeclarationError, GQMError, LaunchError
 
-# Of the scale of each (MATHS, section 7): turning points and times; what pass1 fills; a position, however late.
+# The tolerances relative to the scale of each (MATHS, section 7): turning points and times; what pass1 fills; a
+# position, however late.
 TURNING = 1e-15
 TIME = 1e-14
 SAMPLE = 1e-13
 POSITION = 8e-15
-# Of a period, in its last place; and how many times what is needed error_bound may say.
+# The tolerance of a period in its last places, and the largest ratio of error_bound to what is necessary.
 PERIOD_ULPS = 0.5
 USEFUL = 100
 
@@ -304,7 +305,7 @@ def test_launch_point_on_a_curve_without_end(generated_folder: Path) -> None:
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_parabola", folder=generated_folder)
     half = module.solve(point=("1/2", "1/4")).half_period
     with mp.workdps(30):
-        # 2E(m)/sqrt(2ga) with m = -4 a**2 X**2.
+        # The half period is 2E(m)/sqrt(2ga) with m = -4 a**2 X**2.
         assert ulps(half, 2 * mp.ellipe(-1) / mp.sqrt(2 * mpf("9.81"))) <= FAMILY_ULPS
     assert module.solve(point=(0, 0)).kind == "rest"
     with pytest.raises(LaunchError, match=r"point: \(5\.0, 0\.0\) is 4\.06 off the curve; the nearest .* \(1\."):

@@ -71,7 +71,7 @@ def test_the_domain_may_end_there(text, side, tmp_path):
     }[text]
     with mp.workdps(30):
         drop = lambda x: 2 * mpf("9.81") * (height(mpf(1) / 2) - height(x))  # noqa: E731
-        # x = (1 - u**2)/2 takes the root out of V**2 at the launch.
+        # With x = (1 - u**2)/2 the integrand has no root of V**2 at the launch.
         rate = lambda u: u * mp.sqrt((1 + mp.diff(height, (1 - u * u) / 2) ** 2) / drop((1 - u * u) / 2))  # noqa: E731
         time = quad(rate, [mpf("1e-12"), mpf("0.5"), 1 - mpf("1e-12")])
     (end,) = motion.events

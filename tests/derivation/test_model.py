@@ -244,7 +244,7 @@ def test_textbook_forms(name):
 def test_turning_angles(curve, angle):
     """The angle turned since the launch has a closed form."""
     lam0 = sp.Symbol("lam0", real=True)
-    # lam0 is reserved for users, so it stands in for itself here under another name.
+    # lam0 is reserved for users, so it has another name here.
     expected = read(angle.replace("lam0", "start")).xreplace({real("start"): lam0})
     assert derive(curve, Gravity()).turning_angle == expected
 
@@ -253,7 +253,7 @@ def test_the_ellipses_turning_angle_never_jumps():
     """After one round the tangent has turned by 2π, without a jump at a cut of atan2."""
     model = derive(families.ellipse(a=3, b=1), Gravity())
     assert not model.turning_angle.has(sp.atan2)
-    assert model.parameter in model.turning_angle.args  # seen from a frame that turns once with it, and not twice
+    assert model.parameter in model.turning_angle.args  # in a frame that rotates once with it, and not twice
     around = model.turning_angle.subs({**defaults(model), model.lam0: 0})
     assert around.subs(model.parameter, 2 * sp.pi).evalf(30) == pytest.approx(2 * sp.pi.evalf(30))
 

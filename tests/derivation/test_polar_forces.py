@@ -33,7 +33,7 @@ def bounce(degrees: int) -> mpf:
         left = lambda th: 1 - sin(a) ** 2 * field(th)  # noqa: E731
         excess = lambda th: mp.log(sin(a) ** 2 * field(th))  # noqa: E731
         mirror = mp.findroot(excess, (mpf(0), mp.pi / 2 - mpf("1e-3")), solver="anderson", tol=mpf(10) ** -70)
-        # th = mirror*sin(w): the root of V**2 at the mirror point goes into the cosine.
+        # With th = mirror*sin(w) the root of V**2 at the mirror point cancels against the cosine.
         rate = lambda w: (  # noqa: E731
             cos(mirror * sin(w))
             * sqrt(1 + 3 * sin(mirror * sin(w)) ** 2)

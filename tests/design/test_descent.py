@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 
-# Upper bounds of the least times with mu = 0.3, found by optimisation over splines.
+# These are upper bounds of the least times with mu = 0.3, found by optimisation over splines.
 TIMES = {("1", "-1"): 0.6757788612, ("1", "-0.6"): 0.7222327080, ("1", "-0.45"): 0.804359295}
 
 
@@ -28,7 +28,7 @@ def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
     assert (motion.state(np.linspace(0.01, end.t, 100)).normal_force > 0.0).all()
 
 
-# When a body with mu = 0.3 gets on the textbook's curve to the same places.
+# These are the times at which a body with mu = 0.3 reaches the same places on the textbook's curve.
 TEXTBOOK = {("1", "-1"): 0.6805584516, ("1", "-0.6"): 0.7434743316}
 
 

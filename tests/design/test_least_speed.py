@@ -14,7 +14,7 @@ import generated.rolling_circle
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError, LaunchError, ParameterError, SolutionError
 
-# Roundings of the square that the speed is the root of.
+# The tolerance is in roundings of the square of the speed.
 SHARE = 4e-16
 
 

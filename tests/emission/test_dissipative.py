@@ -16,7 +16,7 @@ from textbook import DIGITS, Textbook
 import gqm_sym as gqm
 from gqm_sym.errors import ParameterError
 
-# Roundings (2**-53) of the size of the parts that a value is the sum of: worst measured 10.
+# The tolerance in roundings (2**-53) of the size of the terms that a value is the sum of. Worst measured: 10.
 ROUNDINGS = 16
 SIGNS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
 LINE = POINTER(c_double)
@@ -206,7 +206,7 @@ def test_drive(case: tuple[Case, Loss, Textbook]) -> None:
                     near(rows[4], kappa, abs(kappa))
                     actual = mpf(rows[1]) - mpf(rows[2]) * mpf(w)
                     near(actual, truth.rate(lam, mpf(w), v, sign), 2 * ds * (abs(push) + 20 + abs(kappa) * w))
-                    # Q is minus its slope in W, P the rest.
+                    # Q is minus the slope in W, and P is the remainder.
                     h = mpf(10) ** -12
                     if w:
                         slope = (truth.rate(lam, w + h, v, sign) - truth.rate(lam, w - h, v, sign)) / (2 * h)

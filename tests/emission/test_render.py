@@ -19,10 +19,10 @@ from gqm_sym.emission.render import INTERFACE
 from gqm_sym.errors import EmissionError, ExpressionError, GQMError, InputError
 from gqm_sym.runtime import interface
 
-# Formulas of 60 digits, with some for rounding.
+# Formulas are evaluated to 60 digits, with some more for rounding.
 EXACT = mpf("1e-56")
 
-# An inner function that bends, in (0.1, 0.7) on the places below.
+# This inner function is curved, and has values in (0.1, 0.7) at the places below.
 W = "(u/2 + u**2/9)"
 HEADS = {
     **{name: f"{name}{W}" for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")},
@@ -43,10 +43,10 @@ HEADS = {
     "large": "1e30*u**2 + 12345678901234567890123*u",
     "small": "1e-30*u**2",
 }
-# Compiling a module takes some seconds, so the others are run by Python: it is the printed text that is tested.
+# Compiling a module takes some seconds, so the others are run by Python; the test is of the printed text.
 COMPILED = ("sin", "acosh", "power -7/5", "kink", "parameter as exponent", "both", "nested", "product")
 
-# Every name that emitted functions have for something of their own.
+# These are all names that emitted functions use for something of their own.
 TAKEN = (
     "a",
     "b",

@@ -27,7 +27,7 @@ A, B, G, K = sp.symbols("a b g k", real=True)
 def test_parts_times_factors_are_the_form(form: sp.Expr, held: set[sp.Symbol], count: int) -> None:
     """Factors do not depend on the place, and parts depend only on parameters that are held fixed."""
     found: set[sp.Symbol] = set()
-    for _ in range(2):  # what the end of a form holds back, its beginning may have
+    for _ in range(2):  # the beginning of a form may have what its end lacks
         parts = separate(form, S, found)
     assert found == held
     assert len(parts) <= count

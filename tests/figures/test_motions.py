@@ -10,7 +10,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.figures import animations
 
-# Lengths of lines of 800 pieces, and of the way towards an equilibrium that is reached in no time.
+# The tolerances for lengths of lines of 800 pieces, and for the distance to an equilibrium that is approached.
 SHOWN = 1e-3
 
 

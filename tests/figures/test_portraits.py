@@ -65,7 +65,7 @@ def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:
     def height(x: np.ndarray) -> np.ndarray:
         return x**4 - 2 * x**2 + x / 4
 
-    # Between places of the grid turning points lie on chords: off by at most h''*step**2/8, times 2g.
+    # Between places of the grid turning points lie on chords, with an error of at most h''*step**2/8, times 2g.
     chord = G * 44 * (4 / 1600) ** 2 / 4
     for x, v in map(np.transpose, curves(figure, "separatrix")):
         inside = np.isfinite(v)

@@ -75,7 +75,7 @@ def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) ->
     period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
     found = gqm.fit(pendulum, pd.DataFrame({"lam0": lam0, "period": period, "sigma": 1e-3}), {"L": None})
     assert found.estimates["L"] == pytest.approx(1.3, rel=1e-14)
-    # T ~ sqrt(L), so dT/dL = T/(2 L).
+    # T is in proportion to sqrt(L), so dT/dL = T/(2 L).
     assert found.std["L"] == pytest.approx(1e-3 * 2.6 / np.linalg.norm(period), rel=1e-9)
     degrees = {"lam0": np.rad2deg(lam0) * u.deg, "period": period * 1e3 * u.ms}
     assert gqm.fit(pendulum, degrees, {"L": 1.2}).estimates["L"] == pytest.approx(1.3, rel=1e-13)
@@ -123,7 +123,8 @@ def test_friction(spring: ModuleType) -> None:
     found = gqm.fit(spring, {"t": t, "x": x}, {"mu": (0, 0.09, 1), "k": (30, 39.9, 50)}, lam0=start)
     assert found.estimates == pytest.approx({"mu": mu, "k": k}, rel=1e-12)
     assert _until_rest(spring.solve(1), np.array([5.0, 12.0])) == pytest.approx([5.0, last * np.pi / rate], rel=1e-14)
-    # Through the place of equilibrium of swings to the left: in the middle of these, and later on the swings back.
+    # These are passages through the equilibrium place of swings to the left, which lies in their middle and later on
+    # the swings back.
     n = np.arange(5)
     half = np.where(n % 2, np.arccos(-2.0 * offset / (start - (2.0 * n + 1.0) * offset)), 0.5 * np.pi)
     data = {"passages": (n * np.pi + half) / rate, "place": offset}

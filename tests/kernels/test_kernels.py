@@ -141,7 +141,7 @@ def test_the_table_of_kernels_makes_each_of_them():
         assert row.summary
 
 
-# What is lost on the way --------------------------------------------------------------------------
+# Forces with losses --------------------------------------------------------------------------
 
 
 def test_lossy_slots_add() -> None:

@@ -66,9 +66,9 @@ def test_cube_roots() -> None:
     [
         ("0**(-sqrt(2))", "column 2: division by zero"),
         ("q + pi", "'q' is not a number"),
-        # Too near zero to tell its digits, and yet not equal to it; beyond 4096 bits it is.
+        # This is too near to zero to tell its digits at first; beyond 4096 bits it counts as zero.
         (less_its_digits(1240), "its digits cancel; write it in another form"),
-        # Of an argument of 1100 digits few are left behind the point.
+        # Of an argument of 1100 digits few are left after the point.
         (" - ".join(["sin(10**900*10**200*sqrt(2))"] * 2), "its digits cancel"),
     ],
     ids=["pole", "name", "pi", "sine"],

@@ -12,7 +12,7 @@ from gqm_sym.errors import ExpressionError, GQMError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, MAX_LENGTH, parse
 from gqm_sym.literals.trees import evaluate
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=10)
 
 VALUES = {"x": Fraction(3, 7), "L": Fraction(-5, 2), "a_1": Fraction(11)}
@@ -283,7 +283,7 @@ def test_chains_agree_with_python(operators, data):
     """Without parentheses, precedence and association must be Python's."""
     numbers = data.draw(st.lists(st.integers(1, 9), min_size=len(operators) + 1, max_size=len(operators) + 1))
     text = str(numbers[0])
-    # Slow and obvious: products first, then sums, from the left.
+    # This is slow and simple: products first, then sums, from the left.
     terms = [Fraction(numbers[0])]
     for operator, number in zip(operators, numbers[1:], strict=True):
         text += f" {operator} {number}"

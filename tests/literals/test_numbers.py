@@ -21,10 +21,10 @@ from gqm_sym.errors import GQMError, NumberError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
 from gqm_sym.literals.numbers import Number, read_number, read_numbers
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=20)
 
-# More digits than any case below cancels.
+# These are more digits than any case below cancels.
 TRUTH = mpmath.mp.clone()
 TRUTH.prec = 1500
 
@@ -115,7 +115,7 @@ def test_irrational_numbers_are_rounded_once(given, truth):
     assert number.fraction is None
     exact = truth(TRUTH)
     if isinstance(given, str) and given.startswith("pi - 3.14"):
-        # The truth was typed in, to 17 digits.
+        # The expected value was typed in, to 17 digits.
         assert number.value == float(exact)
         return
     assert (number.value, number.low) == halves(exact)
@@ -269,17 +269,17 @@ def test_values_agree_with_mpmath(grown):
         truth = compute()
     except (ZeroDivisionError, ValueError, OverflowError):
         truth = None
-    # A cube root of a negative number is complex to mpmath; a zero may be true or all rounding.
+    # For mpmath a cube root of a negative number is complex, and a zero may be exact or pure rounding.
     assume(truth is not None and isinstance(truth, TRUTH.mpf) and TRUTH.isfinite(truth))
     assume(1e-100 < abs(truth) < 1e300)
     try:
         number = read_number(text, where="t")
     except NumberError:
-        # Refused for its size on the way, or an exact zero where mpmath has but a small number.
+        # The number is refused for the size of a part, or it is an exact zero where mpmath has a small number.
         assume(False)
     value, low = halves(truth)
     assert number.value == value
-    # tanh(314) equals 1 to 200 digits, so nothing beyond 1 is held; ``at`` still knows better.
+    # tanh(314) equals 1 to 200 digits, so nothing beyond 1 is stored; ``at`` still has the exact value.
     assert number.low == low or abs(number.low - low) < abs(value) * 2.0**-690
     if number.fraction is None:
         assert number.at(mpmath.mp) == mpmath.mpf(truth)

@@ -10,7 +10,7 @@ import gqm_sym as gqm
 from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.charts.sampled import Sampled
 
-# A closed track of some 150 m by its formulas, which tell tangent and curvature.
+# The track is closed, some 150 m long, and has formulas that give tangent and curvature.
 U = sp.Symbol("u", real=True)
 KNOT = ((20 + 5 * sp.cos(3 * U)) * sp.cos(U), (20 + 5 * sp.cos(3 * U)) * sp.sin(U), 5 * sp.sin(3 * U) + 10 * sp.sin(U))
 at, slope_at, bend_at = (
@@ -79,7 +79,7 @@ def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) 
         for axis in (aside, np.cross(tangent[:, :3], aside)):
             ratios.append(((bend[:, :3] - true) * axis).sum(axis=1) / report.curvature_error)
         off = np.abs(np.remainder(place[:, 3] - roll(u) + np.pi, 2.0 * np.pi) - np.pi)
-        assert off.max() < 0.1 * scatter + 1e-4  # smoothed as much as the coordinates are, though without scatter
+        assert off.max() < 0.1 * scatter + 1e-4  # the roll is smoothed like the coordinates
     size = np.abs(np.concatenate(ratios))
     assert np.mean(size < 1.0) > 0.68
     assert np.mean(size < 2.0) > 0.95

@@ -23,7 +23,7 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.sampled import Sampled
 
 G = 9.81
-# Half a millimetre apart: what is nearest to a place is told to that.
+# Places are half a millimetre apart, which is how well the nearest one is known.
 FINE = 200_001
 
 

@@ -55,7 +55,7 @@ def edited(*changes: tuple[str, str]) -> str:
 GRAPH = "graph: {z: h*x**2, parameter: x, domain: [-2, 2]}"
 NAME_RULE = "a name is made of ASCII letters, digits and _, and begins with a letter"
 
-# What is wrong -> the file, and everything that must be said of it.
+# A row has the kind of mistake, the file, and everything that the message must contain.
 WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "unknown key": (
         edited(("launch:", "lunch:")),

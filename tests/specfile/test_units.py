@@ -18,7 +18,7 @@ from gqm_sym.parameters import in_si
 from gqm_sym.specfile.schema import _KERNEL_ARGUMENTS
 from gqm_sym.specfile.units import KERNEL_UNITS
 
-# Values of the SI brochure and of the international yard and pound agreement of 1959.
+# These are values of the SI brochure and of the international yard and pound agreement of 1959.
 EXACT = {
     "1": Fraction(1),
     "m": Fraction(1),

@@ -92,7 +92,7 @@ def test_what_has_no_value_is_counted(here: Path, capsys: pytest.CaptureFixture[
     assert Path("a.zarr").is_dir()
 
 
-# What a file beside another may turn into while it is opened
+# These may take the place of a file while it is opened.
 
 
 @pytest.mark.parametrize("kind", ["a pipe", "no right"])

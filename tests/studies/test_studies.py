@@ -42,7 +42,7 @@ grid:
   lam0: {start: 0.1, stop: 3, num: 30}
   L: {values: [50, 100], unit: cm}
 """
-# Half periods away from barriers, in units of the last place.
+# The tolerance of half periods away from barriers, in units in the last place.
 ULPS = 4.0
 
 
@@ -264,7 +264,7 @@ def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -
 
 LONG = "curve: swing.yaml\nquantities: [half_period]\ngrid: {lam0: {start: 0.1, stop: 2.9, num: 100000}}\n"
 
-# Ends itself as a power cut would when the second part is stored.
+# This process ends itself as in a power cut when the second part is stored.
 KILLED = """\
 import os, signal, sys
 from gqm_sym.cli import tool

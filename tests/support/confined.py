@@ -28,7 +28,7 @@ def confined(seconds: float = SECONDS, megabytes: int = MEGABYTES) -> Iterator[N
 
     def stop(*_: object) -> None:
         left = begin + seconds - thread_time()
-        # Once more soon after: an exception in a finalizer is lost.
+        # The signal is repeated soon, because an exception in a finalizer is lost.
         signal.setitimer(signal.ITIMER_VIRTUAL, left if left > 0.0 else 0.1)
         if left <= 0.0:
             raise OutOfTime(f"more than {seconds} s of processor time")

@@ -18,12 +18,12 @@ from gqm_sym.derivation import Model
 from gqm_sym.runtime import interface
 
 DIGITS = 50
-# Roundings (2**-53) of what a value is made of: worst measured 6.1, 2.0, 1.9 and 6.7.
+# The tolerances in roundings (2**-53) of the terms of a value. Worst measured: 6.1, 2.0, 1.9 and 6.7.
 PATH, POTENTIAL, DIVDIFF1, DIVDIFF2 = 8, 3, 3, 9
 # Bounds at a single place are as wide as a few roundings outwards of each operation.
 POINT_WIDTH = 1e-13
 
-# Ends and a place between or beyond them, near and far, whose differences are exact.
+# The ends, and a place between or beyond them, near and far, have exact differences.
 TRIPLES = (
     (0.25, 0.5, 1.125),
     (0.5, 0.75, 0.75),

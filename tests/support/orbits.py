@@ -10,7 +10,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-# Nodes of the midpoint rule, which gives 35 digits on all orbits here.
+# The number of nodes of the midpoint rule, which gives 35 digits on all orbits here.
 NODES = 128
 
 

@@ -178,8 +178,8 @@ TRACKS = {
     )
 }
 
-# Track and difficulty of the cases taken from paper_cases.json; the others there have forces that
-# are not conservative gravity.
+# The track and the difficulty of the cases taken from paper_cases.json; the others there have forces that are not
+# conservative gravity.
 PAPER = {
     "example1_pendulum": ("pendulum", "exact launch, 1e9 s"),
     "table3_1_graph": ("bowl", ""),
@@ -194,7 +194,7 @@ PAPER = {
     "table2_1b_frictionless_quartic": ("quartic", "no curvature at the bottom"),
 }
 
-# Curves of the corpus that are declared as one of the tracks, and how their parameters are called.
+# The curves of the corpus that are declared as one of the tracks, and the names of their parameters.
 CORPUS = {
     "Circle": ("pendulum", {"R": "L"}),
     "Ellipse": ("ellipse", {}),
@@ -293,7 +293,7 @@ def _corpus() -> Iterator[Problem]:
             points = expected.get("turning_points", [])
             lam0, v0, direction = launch["lam0"], launch["v0"], launch["direction"]
             transit = expected.get("transit_time")
-            # A transit was only followed to where its timing stops; it may turn beyond.
+            # A transit was only followed to the place of its timing, and may turn beyond.
             met = _met(points, float(lam0), v0, direction) if transit is None else None
             yield Problem(
                 slug=f"corpus_{name.lower().replace(' ', '_')}_{count + 1}",

@@ -7,7 +7,7 @@ from typing import Any
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.chart import Chart
 
-# A loop between clothoids.
+# The rail is a loop between clothoids.
 LOOP = [
     gqm.line(length="a"),
     gqm.clothoid(length="c", kappa_start=0, kappa_end="1/R"),

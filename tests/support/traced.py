@@ -15,7 +15,7 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.tracing import Traced
 from gqm_sym.runtime.interface import FIELD, INTERFACE
 
-# Of the curve's extent; worst measured 4e-16 where F is computed without cancellation.
+# The tolerance relative to the curve's extent. Worst measured: 4e-16 if F is computed without cancellation.
 ROUNDING = 1e-15
 
 DEGREE = 6

@@ -152,7 +152,7 @@ def test_long_products_do_not_explode():
     """The length of a second derivative grows little faster than the product's."""
     names = [sp.Symbol(f"c{k}", real=True) for k in range(100)]
     second = differentiate(differentiate(sp.Mul(*(t + name for name in names)), t), t)
-    # Written out flat it has 9900 terms of 98 factors.
+    # Multiplied out it has 9900 terms of 98 factors.
     assert sp.count_ops(second) < 40_000
 
 

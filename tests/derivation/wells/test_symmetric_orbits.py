@@ -36,7 +36,7 @@ def graph(z: str) -> gqm.Curve:
 PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
 ELLIPSE = gqm.Curve.parametric(x="2*cos(theta)", z="3*sin(theta)", parameter="theta")
 GRAVITY = gqm.Gravity()
-# Curves, forces, and how far both turning points are from the axis.
+# A row has the curve, the force, and the distance of both turning points from the axis.
 CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
     "pendulum": (PENDULUM, GRAVITY, "2.8"),
     "ellipse": (ELLIPSE, GRAVITY, "1.3"),
@@ -118,7 +118,7 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
 
 AGM = ["pendulum", "Duffing"]
 TURNING_POINTS = [name for name in CASES if name != "root of a wave"]
-# Of these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
+# In these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
 NOT_GROWING = ["double well", "two waves"]
 
 
@@ -195,7 +195,7 @@ def test_parameters_with_the_names_of_variables_of_an_orbit(tmp_path: Path) -> N
         assert abs(value - float(truth)) <= 5 * np.spacing(value)
 
 
-# Orbits whose times were taken for settled when one change of the rule was small by accident, and neighbours.
+# The times of these orbits were taken for converged when one change of the rule was small by accident.
 @pytest.mark.parametrize(
     ("track", "z", "places"),
     [

@@ -7,7 +7,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 
 PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
-# Curves, a place of symmetry, the step to the next, and whether heights between them only rise or only fall.
+# A row has a curve, a place of symmetry, the step to the next, and whether heights between them are monotone.
 CASES = {
     "pendulum": (PENDULUM, -sp.pi / 2, sp.pi, True),
     "parabola": (gqm.Curve.graph("x**2", parameter="x"), 0, None, True),

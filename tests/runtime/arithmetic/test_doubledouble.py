@@ -12,16 +12,17 @@ from hypothesis import strategies as st
 from gqm_sym.runtime.arithmetic.doubledouble import add, minus, plus, reduce_many, two_product, two_sum
 
 U = Fraction(1, 2**53)
-# Proved for the accurate sum of two pairs: Joldes, Muller, Popescu, ACM TOMS 44 (2017), theorem 3.1.
+# The bound is proved for the accurate sum of two pairs: Joldes, Muller, Popescu, ACM TOMS 44 (2017), theorem 3.1.
 SUM_OF_PAIRS = 3 * U**2 / (1 - 4 * U)
-# What is left of a time by the period: the product of the count is right to 2**-106 of itself, and two rounded
-# additions follow, each within SUM_OF_PAIRS of numbers no larger than the time. In units of 2**-106 of the time.
+# The error of the remainder of a time by the period: the product with the count is right to 2**-106 of itself, and two
+# rounded additions follow, each within SUM_OF_PAIRS of numbers no larger than the time. The unit is 2**-106 of the
+# time.
 REDUCTION = 8
 
-# Neither overflow nor a product whose error falls below the least double.
+# In this range nothing overflows, and no error of a product falls below the smallest double.
 SIZES = st.floats(2.0**-200, 2.0**200)
 NUMBERS = st.one_of(st.just(0.0), SIZES, SIZES.map(lambda x: -x))
-# A low part in units of the high part's last place; at most half of one.
+# A low part is given in units of the high part's last place, and is at most half of one.
 SHARES = st.floats(-0.5, 0.5)
 PERIODS = st.floats(1e-3, 1e3)
 COUNTS = st.one_of(

@@ -14,7 +14,7 @@ from gqm_sym.runtime.arithmetic import elementary
 # Worst measured on 5000 arguments of each kind: 0.75 (cosine), 0.62 (exp), 0.93 (sinh), 0.86 (cosh).
 ULPS = 1.0
 DIGITS = 60
-# Roundings of the argument that a sine of a very large one may stand for: worst measured 5.
+# The number of roundings of a very large argument that its sine may correspond to. Worst measured: 5.
 LARGE = 8
 # Below this the rounding of the last sum of the argument's low parts counts, which is 2**-106 of the argument.
 SMALL_SINE = 1e-12
@@ -22,7 +22,7 @@ COUNT = 500
 
 FUNCTIONS: dict[str, Callable[[mpf], mpf]] = {"sin": mp.sin, "cos": mp.cos}
 
-# Kinds of arguments, and what draws one.
+# Kinds of arguments, and strategies that draw them.
 KINDS: dict[str, Callable[[random.Random], float]] = {
     "kernel": lambda source: source.uniform(-0.8, 0.8),
     "turns": lambda source: source.uniform(-10, 10),

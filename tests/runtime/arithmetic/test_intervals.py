@@ -15,10 +15,10 @@ from gqm_sym.runtime.arithmetic import intervals
 Interval = tuple[float, float]
 
 ALL = (-math.inf, math.inf)
-# Both ends: what the C library's functions are widened by, then rounding.
+# The widening of both ends: that for the C library's functions, and the rounding.
 WIDTH = 2 * (2.0**-50 + 2.0**-52)
 DIGITS = 40
-# Far enough for every overflow and underflow, while mpmath still answers at once.
+# This is large enough for every overflow and underflow, while mpmath is still fast.
 LARGEST = 1e9
 
 UNARY = {
@@ -76,9 +76,9 @@ def test_function_of_a_number_is_tight(name: str, data: st.DataObject) -> None:
     _true, low, high = UNARY[name]
     x = data.draw(st.floats(max(low, -3.0), min(high, 3.0), allow_subnormal=False))
     lo, hi = getattr(intervals, f"i{name}")((x, x))
-    assume(name != "tan" or abs(abs(x) - math.pi / 2) >= 1e-12)  # else a pole lies too close
+    assume(name != "tan" or abs(abs(x) - math.pi / 2) >= 1e-12)  # otherwise a pole is too close
     if name in ("sin", "cos") and math.cos(2 * x) ** 2 > 1 - 1e-14:
-        assert hi - lo <= 1e-14  # a zero or an extremum lies too close
+        assert hi - lo <= 1e-14  # a zero or an extremum is too close
     else:
         assert hi - lo <= WIDTH * max(abs(lo), abs(hi)) + 1e-322
 
@@ -125,7 +125,7 @@ def test_real_powers_hold_every_value(data: st.DataObject, p: float) -> None:
 @given(a=st.tuples(*[st.floats(allow_nan=True)] * 2), b=st.tuples(*[st.floats(allow_nan=True)] * 2))
 def test_never_nan(a: Interval, b: Interval) -> None:
     """No bound is NaN for any input, even NaN and infinities."""
-    assume(not (a[0] > a[1] or b[0] > b[1]))  # NaN is let through
+    assume(not (a[0] > a[1] or b[0] > b[1]))  # NaN is accepted
     results = [getattr(intervals, f"i{name}")(a, b) for name in BINARY]
     results += [intervals.ipow(a, 2), intervals.ipow(a, 3), intervals.ipow(a, -1), intervals.ipow(a, -2)]
     results += [intervals.irpow(a, 0.3), intervals.irpow(a, -0.3)]
@@ -134,7 +134,7 @@ def test_never_nan(a: Interval, b: Interval) -> None:
         assert bounds[0] <= bounds[1]
 
 
-# An operation, its arguments, which end of the result is meant (None: both), and what it must be.
+# A row has an operation, its arguments, which end of the result is meant (None: both), and the expected value.
 EXACT = [
     (intervals.ipow, [(-2.0, 1.0), 2], 0, 0.0),
     (intervals.ipow, [(-2.0, 1.0), 4], 0, 0.0),

@@ -96,7 +96,7 @@ def test_rows() -> None:
     chart = Ring().chart((RADIUS,))
     s = np.linspace(-20.0, 20.0, 501)
     x, z, alpha, kappa = chart.points(s)
-    # A place reduced by the period is known to an ulp of itself.
+    # A place reduced by the period has an error of an ulp of the original place.
     assert np.abs(x - RADIUS * np.sin(s / RADIUS)).max() <= 20.0 * ULP
     assert np.abs(z + RADIUS * np.cos(s / RADIUS)).max() <= 20.0 * ULP
     assert np.abs(alpha - s / RADIUS).max() <= 20.0 * ULP
@@ -130,7 +130,7 @@ def test_divided_differences(size: float) -> None:
             first = (height(mpf(b)) - height(mpf(a))) / (mpf(b) - mpf(a))
             second = ((height(mpf(c)) - height(mpf(b))) / (mpf(c) - mpf(b)) - first) / (mpf(c) - mpf(a))
             assert abs(evaluate.divdiff1_chart_z(chart.block, a, b, b - a) - first) <= 16 * ULP
-            # Next to a joint a second difference is a derivative of the fit: 16 nodes cost it three digits.
+            # Next to a joint a second difference is a derivative of the fit, which with 16 nodes loses three digits.
             assert abs(evaluate.divdiff2_chart_z(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
             swapped = evaluate.divdiff2_chart_z(chart.block, c, a, b, a - c, b - a)
             assert abs(swapped - second) <= 4e-13
@@ -204,8 +204,8 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
             u, v, w = map(Fraction, (a, b, c))
             truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
             found = evaluate.divdiff2_chart_alpha(chart.block, a, b, c, b - a, c - b)
-            # It is a derivative of the fit, which costs short pieces five digits; and the distances from the joint
-            # count, which are known to an ulp of the place.
+            # The tangent is a derivative of the fit, which costs short pieces five digits; distances from the joint
+            # count too, with errors of an ulp of the place.
             assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size
 
 
@@ -230,7 +230,7 @@ def test_nearest_point() -> None:
     assert abs(distance - (RADIUS - np.hypot(0.5, 0.9))) <= 4 * ULP
     flat = np.zeros((2, NODES.size))
     line = assemble([0.0, 1.0, 2.0], PieceData([[0.0, 0.0], [1.0, 0.0]], flat, flat))
-    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
+    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end, the end is the nearest point
         assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
 
 

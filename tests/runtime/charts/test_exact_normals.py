@@ -17,7 +17,8 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# A position of its scale; a period in its last place; how much error_bound may say too much.
+# The tolerances: a position relative to its scale; a period in its last place; the largest ratio of error_bound to the
+# error.
 POSITION = 8e-15
 PERIOD_ULPS = 0.5
 USEFUL = 100
@@ -52,7 +53,7 @@ def pendulum_period(angle: mpf, speed: mpf) -> mpf:
     return 4 * mp.ellipk(k2) / mp.sqrt(g) if k2 < 1 else 2 * mp.ellipk(1 / k2) / mp.sqrt(g * k2)
 
 
-# Beside the separatrix, where a period takes many panels, to fewer digits.
+# Beside the separatrix, where a period takes many panels, fewer digits are tested.
 SWINGS = [
     ({"lam0": "6/5"}, "libration", DIGITS),
     ({"lam0": 0, "v0": "3"}, "libration", DIGITS),
@@ -159,7 +160,7 @@ def test_another_force(generated_folder: Path) -> None:
         g, rate = mpf(G), mpf(9) / 4
 
         def quarter(phi: mpf) -> mpf:
-            # sin(angle/2) = k sin(phi): V**2 = (cos(angle) - cos(1)) (2 g - rate (cos(angle) + cos(1))).
+            # With sin(angle/2) = k sin(phi), V**2 = (cos(angle) - cos(1)) (2 g - rate (cos(angle) + cos(1))).
             k = mp.sin(mpf("0.5"))
             angle = 2 * mp.asin(k * mp.sin(phi))
             return 2 / (mp.cos(angle / 2) * mp.sqrt(2 * (2 * g - rate * (mp.cos(angle) + mp.cos(1)))))
@@ -233,7 +234,7 @@ def test_spline(generated_folder: Path) -> None:
     spline = make_interp_spline(knots, points, k=5)
     motion = module.solve(lam0=0.25)
     with mp.workdps(40):
-        # Each polynomial between breaks through six places of de Boor's algorithm in extended precision.
+        # Each polynomial between breaks is found from six places by de Boor's algorithm in extended precision.
         breaks = np.unique(spline.t)
 
         def at(place: mpf, derivative: int) -> tuple[mpf, mpf]:

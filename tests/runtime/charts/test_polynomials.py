@@ -7,7 +7,7 @@ import pytest
 
 from gqm_sym.runtime.charts.polynomials import Polynomials, read_pieces
 
-# z = x**2 from -1 to 2: one piece on each side of the bottom, the second in (x - 1).
+# The track is z = x**2 from -1 to 2, with one piece on each side of the bottom, the second in (x - 1).
 PARABOLA = "-1 0 0 1 0 0 0 1\n-1 1 1 1 0 1 2 1"
 
 

@@ -105,7 +105,7 @@ def test_a_curve_among_pieces(tmp_path: Path) -> None:
             row = chart.points([float(s)])[:, 0]
             assert abs(row[0] - x) <= 4 * ULP
             assert abs(row[1] - x * x) <= 8 * ULP
-            # A place is known to an ulp, over which the angle turns by up to twice that.
+            # A place has an error of an ulp, over which the angle turns by up to twice that.
             assert abs(row[2] - mp.atan(2 * mpf(float(x)))) <= 4 * ULP + 2 * ULP * s
             if abs(x) < 1.0:  # curvature jumps at the joints
                 assert abs(row[3] - 2 / (1 + 4 * mpf(float(x)) ** 2) ** mpf(1.5)) <= 16 * ULP + 4 * ULP * s
@@ -139,7 +139,7 @@ def test_a_stadium(tmp_path: Path) -> None:
     """
     pieces = [gqm.line(length=3), gqm.arc(radius=1, angle="pi")] * 2
     module = built(tmp_path, "stadium", pieces, closed=True)
-    joints = [0.0, 3.0, 3.0 + math.pi, 6.0 + math.pi]  # at the start too the curvature jumps
+    joints = [0.0, 3.0, 3.0 + math.pi, 6.0 + math.pi]  # the curvature jumps at the start too
     chart = chart_of(module)
     assert chart.breaks == pytest.approx(joints, abs=8 * ULP)
     one, two = chart.points([0.5, 0.5 + chart.high])[2]
@@ -153,7 +153,7 @@ def test_a_stadium(tmp_path: Path) -> None:
     assert abs(motion.period - around) <= 8 * ULP * around
 
 
-# Of the loop: lengths of the lines and of the clothoids, and the radius.
+# The loop has these lengths of lines and clothoids, and this radius.
 LINE, EASE, RADIUS = 2.0, 2.0, 1.5
 
 
@@ -225,7 +225,7 @@ def test_force_along_a_loop(loop: ModuleType) -> None:
 def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
     """A slower body leaves a unilateral rail at the top, where N vanishes according to the integration."""
     with mp.workdps(30):
-        # Height of the top by the Fresnel integrals of the clothoid.
+        # The height of the top follows from the Fresnel integrals of the clothoid.
         size, ease, radius = mp.sqrt(2 * mpf(EASE) * RADIUS), mpf(EASE), mpf(RADIUS)
         turned = ease / (2 * radius)
         rise = size * mp.quad(lambda w: mp.sin(w * w), [0, ease / size])

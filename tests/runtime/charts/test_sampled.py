@@ -19,7 +19,7 @@ from gqm_sym.runtime.charts.sampled import Sampled
 
 ULP = 2.0**-52
 G = 9.81
-# Semi-axes of the ellipse that points are taken from.
+# The semi-axes of the ellipse from which points are taken.
 A, B = 2.0, 1.0
 
 
@@ -91,7 +91,7 @@ def test_a_motion_on_a_spline_converges(tmp_path: Path) -> None:
         rate = np.hypot(A * sine, B * cosine)
         force = -G * A * sine / rate + 2.0 * G * (start[1] - found.z) * A * B / rate**3
         errors.append((abs(motion.half_period - smooth.half_period), np.abs(found.normal_force - force).max()))
-        # The jumps of its fifth derivative cost the motion on the spline itself nothing.
+        # The jumps of its fifth derivative do not affect the motion on the spline itself.
         assert motion.error_bound(motion.half_period) <= 1e-13
     errors_of_period, errors_of_force = np.array(errors).T
     assert np.all(errors_of_period[1:] < errors_of_period[:-1] / 2.0**4.5)

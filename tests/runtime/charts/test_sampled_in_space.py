@@ -49,7 +49,7 @@ def test_points_converge_to_their_curve(smooth: object) -> None:
     assert errors[2] <= errors[1] / 50
     states = motion.state(0.7), true.state(0.7)
     for names, allowed in ((("x", "y", "z", "v"), 1e-10), (("normal_x", "normal_y", "normal_z"), 2e-6)):
-        for name in names:  # what is left is the distance of the spline, and of its curvature, from the curve
+        for name in names:  # the remaining difference is that of the spline, and of its curvature, from the curve
             found, wanted = (getattr(state, name) for state in states)
             assert found == pytest.approx(wanted, abs=allowed), name
     track = module(knot(400), closed=True)
@@ -110,7 +110,7 @@ def test_the_time_along_the_spline_itself() -> None:
     u = np.linspace(-2.0, 2.0, 97)
     points = np.stack([2.0 * np.cos(u), np.sin(2.0 * u), u * u], axis=1)
     chart = Sampled("\n".join(" ".join(map(repr, row)) for row in points.tolist()), in_space=True).chart(())
-    # The arc lengths of the points are their knots, and of so many points to rounding.
+    # The arc lengths of the points are their knots, which for so many points are right to rounding.
     knots = np.array([_arc_length_at(chart, point) for point in points])
     spline = make_interp_spline(knots, points, k=5)
     nodes, weights = np.polynomial.legendre.leggauss(16)
@@ -120,7 +120,7 @@ def test_the_time_along_the_spline_itself() -> None:
             low, high = mpf(knots[k]), mpf(knots[k + 1])
             for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
                 share = (1 + mpf(node)) / 2
-                # Next to a turning point the place is a square, so that the rate is smooth.
+                # Next to a turning point the place is a square, which makes the rate smooth.
                 place, gain = low + (high - low) * share, high - low
                 if k == 24:
                     place, gain = low + (high - low) * share**2, 2 * share * (high - low)

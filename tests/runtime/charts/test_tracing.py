@@ -12,7 +12,7 @@ from naive import error, ulps
 from paths import DATA
 from traced import ROUNDING, hold, trace
 
-# Of the largest curvature: as for every sample of the corpus.
+# The tolerance relative to the largest curvature, as for every sample of the corpus.
 SAMPLE = 1e-13
 PERIOD_ULPS = 2.0
 
@@ -43,14 +43,14 @@ def test_ellipse() -> None:
         chart = trace("x**2/9 + z**2 - 1", (3.0, 0.0))
         assert ulps(chart.period, 4 * 3 * mp.ellipe(mpf(8) / 9)) <= PERIOD_ULPS
         angles = [2 * mp.pi * k / 29 for k in range(30)]
-        # ds = sqrt(9 - 8 cos(t)**2) dt: from the end of the long axis on.
+        # From the end of the long axis on, ds = sqrt(9 - 8 cos(t)**2) dt.
         quarter = mp.ellipe(mpf(8) / 9)
         places = [3 * (quarter - mp.ellipe(mp.pi / 2 - t, mpf(8) / 9)) for t in angles]
         sizes = [mp.sqrt(9 * mp.sin(t) ** 2 + mp.cos(t) ** 2) for t in angles]
 
         def truth(k: int) -> tuple[Any, ...]:
             t = angles[k]
-            # The place is rounded to a double: what is there is that far along.
+            # The place is rounded to a double, and the curve is sampled there.
             off = mpf(float(places[k])) - places[k]
             along, across = -3 * mp.sin(t) / sizes[k], mp.cos(t) / sizes[k]
             kappa = 3 / sizes[k] ** 3
@@ -73,7 +73,7 @@ def test_superellipse() -> None:
     rows = chart.points(float(quarter) * np.arange(4))
     flat = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0], np.pi / 2 * np.arange(1, 5), np.zeros(4)])
     assert np.abs(rows - flat).max() <= 4e-15
-    # Two or three times as many would be resolved as well, at twice the time.
+    # Two or three times as many pieces would resolve it as well, in twice the time.
     assert chart.edges.size <= 60
 
 
@@ -107,7 +107,7 @@ def test_cusp() -> None:
         assert error(chart.low, -whole) <= ROUNDING
         assert np.abs(chart.points([chart.low])[:2]).max() <= ROUNDING
         places = [-1.43, -1.3, -0.7, 0.0, 1.1, 4.9]
-        # s = (4 + 9x)**(3/2)/27, from the cusp.
+        # The arc length from the cusp is s = (4 + 9x)**(3/2)/27.
         abscissae = [((27 * (mpf(s) + whole) + 8) ** (mpf(2) / 3) - 4) / 9 for s in places]
 
         def truth(k: int) -> tuple[Any, ...]:

@@ -23,7 +23,7 @@ def crossings(work: Callable[[], Any]) -> int:
         code = frame.f_code
         count += event == "call" and code.co_name == "call" and code.co_filename == jit.__file__
 
-    work()  # compiled by now
+    work()  # compiled before
     sys.setprofile(look)
     try:
         work()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 
-# Every private name that `numba_internals` uses: what it imports, and attributes of that.
+# These are all private names that `numba_internals` uses: those that it imports, and attributes of these.
 IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
 ATTRIBUTES = ("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache")
 LIBRARIES = (
@@ -18,7 +18,8 @@ LIBRARIES = (
 )
 ALL = (*IMPORTED, *ATTRIBUTES, *LIBRARIES)
 
-# While `numba_internals` is imported, the modules that it imports from lack the names; and it finds no such attributes.
+# While `numba_internals` is imported, the modules from which it imports lack the names, and there are no such
+# attributes.
 PROGRAM = """
 import builtins, sys
 from numba.core import caching, ccallback, codegen, compiler, environment, runtime

@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
-# Together these have sines, powers, roots, exponentials, arc tangents and the law of friction.
+# Together these modules have sines, powers, roots, exponentials, arc tangents and the law of friction.
 MODULES = ("pendulum", "log_spiral", "cubic_coulomb")
 
 MODULE = f"""from numba import carray, types
@@ -42,7 +42,7 @@ def everything(n, first, second, third, out):
 {{lines}}
 """
 
-# What an argument may be besides ordinary numbers.
+# Arguments may be these values in addition to ordinary numbers.
 EXTREME = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e308, -1e-310])
 
 
@@ -65,7 +65,7 @@ def _results(function: Emitted, call: Any, seed: int, count: int) -> np.ndarray:
             given.append(count if kind == types.intp else float(rng.normal()))
     call(*(value.ctypes.data if isinstance(value, np.ndarray) else value for value in given))
     out: np.ndarray = given[-1]
-    out[np.isnan(out)] = np.nan  # which NaN it is, is left open
+    out[np.isnan(out)] = np.nan  # either NaN is right
     return out.view(np.int64)
 
 

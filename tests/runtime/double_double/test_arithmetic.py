@@ -12,11 +12,11 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
 
 DIGITS = 60
-# Registers: two operands, and what becomes of them.
+# The registers: two operands, and the result.
 A, B, OUT, OTHER = range(4)
 
-# Operation, its exact form, the ranges of its operands, and the limit of the error in units of 2**-104 of the result,
-# or of one where the result may be much smaller than its terms.
+# A row has an operation, its exact form, the ranges of its operands, and the limit of the error in units of 2**-104 of
+# the result, or of one if the result may be much smaller than its terms.
 Case = tuple[int, Callable[..., Any], tuple[tuple[float, float], ...], float, bool]
 WIDE, POSITIVE = (-1e6, 1e6), (1e-6, 1e6)
 CASES: dict[str, Case] = {

@@ -23,7 +23,7 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 G = number("9.81")
 AMPLITUDES = st.floats(1e-3, 3.1)
-# Modules in which a body swings from a place drawn between these, with a speed up to the third number.
+# In these modules a body swings from a place drawn between the first two numbers, with a speed up to the third.
 SWINGS = {
     "ellipse": (-1.5, 1.5, 2.0),
     "parabola": (0.1, 2.0, 3.0),

@@ -12,7 +12,7 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
 from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape, bind, record
 from gqm_sym.runtime.interface import ExactFormulas
 
-# Every function that a formula may contain, each for places between 1.1 and 1.9.
+# These are all functions that a formula may contain, for places between 1.1 and 1.9.
 FUNCTIONS = {
     "trigonometric": lambda op, u, p: op.sin(u) * op.cos(p[0] * u) + op.tan(u / 2),
     "inverse trigonometric": lambda op, u, p: op.asin(u / 4) + op.acos(p[0] / 3) * op.atan(u),

@@ -12,7 +12,7 @@ from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.orbit import pairs
 from gqm_sym.runtime.gradients.programs import assemble
 
-# Each for places between 1.1 and 1.9, and a parameter of 1.4.
+# Each formula is tested for places between 1.1 and 1.9, and a parameter of 1.4.
 FUNCTIONS = {
     "trigonometric": lambda op, u, p: op.sin(u) * op.cos(p * u) + op.tan(u / 2) + op.cos(u * u),
     "inverse trigonometric": lambda op, u, p: op.asin(u / 4) + op.acos(p / 3) * op.atan(u),

@@ -129,7 +129,7 @@ def test_states_on_a_circle(arc: float, radius: float, v0: float, t: float, ring
     for k, name in enumerate(found.wrt[:4]):
         for quantity in ("x", "z", "v", "normal_force"):
             scale = np.abs(getattr(period, quantity)[k]).max()
-            # A contact force has the second derivative of the displacement of the curve.
+            # A contact force depends on the second derivative of the displacement of the curve.
             enough = 1e-10 if (quantity, name) == ("normal_force", "R") else 5e-14
             assert abs(getattr(found, quantity)[k] - on_circle(getattr(wanted, quantity), name)) <= enough * scale
     angle = on_circle(wanted.lam, "R") * radius + float(other.lam(t))

@@ -138,7 +138,7 @@ def test_differences(name: str) -> None:
         assert motion.kind == "libration"
         ends = tuple(sorted(motion.turning_points))
         found = [motion.gradient(q) for q in ("half_period", "action", "turning_points")]
-        # The rounding of a gradient is a share of the integral of the absolute values of what it is the integral of.
+        # The rounding of a gradient is in proportion to the integral of the absolute value of its integrand.
         means = motion._derivatives._means[0][1:, 3]
         sizes = dict(zip((*module.PARAMETERS, "lam0", "v0"), means * np.pi, strict=False))
         with mp.workdps(42):

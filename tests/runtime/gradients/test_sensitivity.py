@@ -12,7 +12,7 @@ from paths import ROOT
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
-# Times from launch, in periods: within the first one, and much later.
+# The times from launch, in periods: within the first one, and much later.
 TIMES = np.array([0.0, 0.03, 0.21, 0.25, 0.4, 0.5, 0.71, 0.98, 1.0, 2.3, -0.6, 1234.56, 1e6 + 0.37, 1e9 + 0.11])
 
 

@@ -86,7 +86,7 @@ def test_turning_points_and_extremes_of_pendulums() -> None:
     lap, speed = lam0[~swings], v0[~swings]
     v = np.sqrt(speed**2 - 2 * g * length * (1 + np.cos(lap)))
     np.testing.assert_allclose(slowest[~swings, :2].T, [g * length * np.sin(lap) / v, speed / v], rtol=8 * ULP)
-    # At its turns a swinging body's N is m g cos(angle).
+    # At its turns the N of a swinging body is m g cos(angle).
     at_turn = [-mass * g * np.sin(lam0[swings]), -mass * v0[swings] / length, g * np.cos(angle)]
     np.testing.assert_allclose(lightest[swings].T, at_turn, rtol=8 * ULP)
 

@@ -18,16 +18,17 @@ from gqm_sym.runtime.quadrature.time_panels import lay_panels, read_off_many
 ModuleOf = Callable[[str], ModuleType]
 
 ULP = 2.0**-52
-# Reading the panels back at the table's phase angle: units in the last place of the whole time, and of the last angle.
-# Worst measured 3 (at a cusp, and on a tiny swing of one segment).
+# The tolerances of the panels' time at the table's phase angle, in units in the last place of the whole time, and of
+# the last angle. Worst measured: 3 (at a cusp, and on a tiny swing of one segment).
 THERE_AND_BACK = 4.0
-# Phase angles against closed forms, in units of the last place of the last phase angle: measured 5.1.
+# The tolerance of phase angles against closed forms, in units in the last place of the last phase angle. Worst
+# measured: 5.1.
 ANOMALY = 6.0
-# What a first-level cache holds of rows of fifteen numbers is 300; at a cusp they shrink to the time's last place.
+# A first-level cache has room for 300 rows of fifteen numbers; at a cusp segments shrink to the time's last place.
 MOST_SEGMENTS = 300
 ROOT = 3e-8
 
-# Track, parameters, kind of stretch, its ends, V**2 at its start, and its last phase angle.
+# A row has the track, parameters, the kind of segment, its ends, V**2 at its start, and its last phase angle.
 STRETCHES: dict[str, tuple[str, dict[str, Any], int, float, float, float, float]] = {
     "pendulum": ("circle", {"L": 1}, TURN_TURN, -1.2, 1.2, 0.0, math.pi),
     "tiny swing": ("circle", {"L": 1}, TURN_TURN, -1e-8, 1e-8, 0.0, math.pi),
@@ -131,7 +132,8 @@ def test_a_table_is_small_and_knows_its_error(name: str, table_of: Callable[[str
     slots = table.whole * np.arange(len(index)) / len(index)
     assert (index <= np.searchsorted(ends, slots, side="right")).all()
     assert len(ends) <= MOST_SEGMENTS
-    # At a cusp the phase angle is as the root of the time left: as much is lost there as the time's last place takes.
+    # At a cusp the phase angle is the root of the remaining time, so that it has an error of the root of the time's
+    # last place.
     assert errors.max() <= (ROOT if "cusp" in name else 1e-14) * table.stop
 
 

@@ -88,7 +88,7 @@ def test_digits_that_cannot_be_had(digits: Any, circle: ModuleType) -> None:
         circle.solve(lam0=1, L=1).period_to(digits)
 
 
-# What is said of a motion
+# Printed motions
 
 
 def said(motion: Any) -> str:

@@ -9,9 +9,10 @@ import pytest
 
 import gqm_sym as gqm
 
-# z = -3 x**2/4 right of the hilltop and -x**2/4 left of it: the curvature jumps at the equilibrium. Launched from 0.8.
+# The curve is z = -3 x**2/4 right of the hilltop and -x**2/4 left of it, so that the curvature jumps at the
+# equilibrium; the launch is at 0.8.
 X0, Z0, G = 0.8, -0.48, 9.81
-# What rounding of the speed leaves of a place and a time near the top.
+# The accuracy of a place and a time near the top that the rounding of the speed allows.
 PLACE = 2e-8
 
 

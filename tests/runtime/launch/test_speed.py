@@ -20,11 +20,11 @@ from gqm_sym.runtime.launch.speed import BLOCK
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Roundings (2**-53) of the larger of V**2 at launch and its change: worst measured 14.1 (circle).
-# By divided differences alone it is the same.
+# The tolerance in roundings (2**-53) of the larger of V**2 at launch and its change. Worst measured: 14.1 (circle),
+# also by divided differences alone.
 ROUNDINGS = 15
 LEGION = LARGE // 8
-# Roundings (2**-53) of the rows of a spiral: worst measured 2.43 (curvature).
+# The tolerance in roundings (2**-53) of the rows of a spiral. Worst measured: 2.43 (curvature).
 SPIRAL = 3
 
 

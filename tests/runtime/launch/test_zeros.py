@@ -22,9 +22,9 @@ from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, STEPS_SPENT, TURN
 ModuleOf = Callable[[str], ModuleType]
 
 G = 9.81
-# A turning point on a slope of order one: its last places, and those of V**2 over its slope.
+# The tolerance of a turning point on a slope of order one: its last places, and those of V**2 over its slope.
 TURN_PLACE = 1e-13
-# Sampled truth: places closer to zero than this share of v0**2 are left to the exact tests.
+# Sampled values closer to zero than this share of v0**2 are left to the exact tests.
 CLEAR = 1e-6
 
 FIELDS = {
@@ -80,7 +80,7 @@ def test_no_narrow_barrier_is_jumped(
         level = mpf(v0) ** 2 / (2 * mpf("9.81"))
         away = mp.sqrt(-mp.log(level))
         truth = mpf(centre) - side * mpf(width) * away
-        # Rounding of the energy over the slope there, and of the place.
+        # The tolerance is the rounding of the energy over the slope there, and that of the place.
         allowed = 2.0**-52 * (8 + width / float(away))
         assert what == TURN
         assert abs(mpf(place) - truth) <= allowed
@@ -156,7 +156,7 @@ def test_random_landscapes(
     truth = first_turn(heights[name], start, v0, direction, reach)
     given_ = {"a": a, "b": b, "c": c, "d": d, "f": f}
     what, place, _ = walk(field(name), start, v0, direction, reach, **given_)
-    assume(truth is not None)  # else the sample cannot tell
+    assume(truth is not None)  # otherwise the sample cannot decide
     if math.isinf(truth):
         assert what == LIMIT
     else:

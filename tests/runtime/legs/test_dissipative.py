@@ -159,7 +159,7 @@ def test_a_singular_point_is_reached(root: ModuleType) -> None:
         def length(x: mpf) -> mpf:
             return 8 * ((1 + mpf("2.25") * x) ** mpf("1.5") - 1) / 27
 
-        def w_over_way(y: mpf) -> mpf:  # the way is y**2
+        def w_over_way(y: mpf) -> mpf:  # the distance is y**2
             x = 1 - y * y
             place = lambda v: x + y * y * v  # noqa: E731
             return (
@@ -189,7 +189,7 @@ def test_an_approach_has_a_last_digit(build: Build) -> None:
         v0 = mp.sqrt(2 * g / (1 + k**2) * (loss(mp.pi) - loss(0)))
     motion = module.solve(lam0=0, v0=float(v0))
     assert motion.lam(60.0) == pytest.approx(math.pi, abs=4e-15)
-    # On the way the speed is that of the closed form, which near the top is a small difference.
+    # The speed on the way is that of the closed form, which near the top is a small difference.
     state = motion.state(np.array([0.5, 1.0, 2.0]))
     with mp.workdps(40):
         for place, v in zip(state.lam, state.v, strict=True):
@@ -236,7 +236,7 @@ def test_over_a_joint_and_back(build: Build) -> None:
         below = mp.sqrt(down(mpf(0)))
         there = [flat + top, flat - below**2 / (2 * mu * g)]
         joined = mp.sqrt(16 - 2 * mu * g * flat)
-        # Gauss: W is a small difference near the turn.
+        # Gauss-Legendre nodes do not come too near to the turn, where W is a small difference.
         rise, fall = (
             mp.quad(lambda y, w=w: 2 * y / mp.sqrt(w(top - y * y)), [0, mp.sqrt(top)], method="gauss-legendre")
             for w in (up, down)
@@ -277,11 +277,11 @@ def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
 @pytest.mark.parametrize(
     ("lam0", "v0"),
     [
-        # Time is counted back from the turn to where N changes sign, and no farther.
+        # Time is counted back from the turn to the place where N changes its sign, and no farther.
         (0.7483964034543935, 5.818989927693156),
         (0.5492047797152688, 6.863503323397249),
         (1.4219101233586642, 4.690743520201464),
-        # Back from the turn past that place: the distance to it is a rounding longer than what was run.
+        # On the way back from the turn, the distance to that place is a rounding longer than the distance run.
         (0.9646260788927759, 6.440001136948692),
     ],
 )

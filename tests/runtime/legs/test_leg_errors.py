@@ -16,7 +16,7 @@ from gqm_sym.errors import SolutionError
 Build = Callable[..., ModuleType]
 G = mpf("9.81")
 
-# A bound that is larger than the error by more than this is of no use.
+# A bound that is larger than the error by more than this factor is useless.
 USELESS = 1e5
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import gqm_sym as gqm
 
-# A swing that rests, two that go on for ever, one that dies away, and an approach without a swing.
+# The motions are a swing that rests, two that go on for ever, one that dies away, and an approach without a swing.
 KERNELS = {
     "friction": gqm.CoulombFriction(),
     "drag": gqm.QuadraticDrag(),

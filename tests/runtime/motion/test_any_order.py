@@ -13,7 +13,7 @@ from generated import catenary, double_well, superellipse
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Thrown so slowly, 2e-24 m from where it turns, that doubles took the time to the turn for negative.
+# The launch is so slow, 2e-24 m from the turn, that doubles took the time to the turn for negative.
 BESIDE_TURN = {
     "lam0": 5.672834743747337,
     "v0": 1.4288970094889906e-11,
@@ -21,7 +21,8 @@ BESIDE_TURN = {
     "g": 4.0791236336312915,
 }
 
-# Track and launch: an orbit for each tier of arithmetic, formulas and a chart, and an approach to an equilibrium.
+# A row has a track and a launch: an orbit for each tier of arithmetic, formulas and a chart, and an approach to an
+# equilibrium.
 MOTIONS: dict[str, tuple[ModuleType | str, dict[str, Any]]] = {
     "swing": ("circle", {"lam0": "6/5", "v0": "1/2", "L": 1}),
     "once round": ("circle", {"lam0": 0.3, "v0": 9.0, "direction": -1, "L": 1}),

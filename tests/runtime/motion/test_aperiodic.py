@@ -17,10 +17,11 @@ from gqm_sym.errors import InputError
 ModuleOf = Callable[[str], ModuleType]
 
 G = mpf("9.81")
-# Of the largest place, speed or time of the motion up to then: quadrature, the table and the place's own rounding.
+# The tolerance relative to the largest place, speed or time of the motion so far: quadrature, the table and the place's
+# own rounding.
 POSITION = 1e-14
 TIME = 1e-14
-# A time and the place it belongs to give each other back to rounding of both.
+# A time and its place determine each other to the rounding of both.
 INVERSE = 1e-14
 
 WELL_SPEED = "sqrt(2*9.81*({0}**2 - {0}**4))"  # to the barrier of the double well, by energy
@@ -95,7 +96,7 @@ def test_down_a_cubic(place: str, passage: Callable[..., Any]) -> None:
     with mp.workdps(30):
 
         def time(start: mpf, stop: mpf, w0: mpf) -> mpf:
-            def rate(u: mpf) -> mpf:  # the root's substitution, which is right from a turn and does no harm elsewhere
+            def rate(u: mpf) -> mpf:  # the substitution for the root is right from a turn, and harmless elsewhere
                 x = start + (stop - start) * u**2
                 return mp.sqrt((1 + 9 * x**4) / abs(w0 + 2 * G * (-1 - x**3))) * 2 * abs(stop - start) * u
 
@@ -171,7 +172,7 @@ def test_back_to_the_barrier_by_a_turn(start: str, module_of: ModuleOf) -> None:
         assert motion.kind == "asymptotic"
         assert [leg.end for leg in motion.legs] == ["turn", "asymptote"]
         assert off(motion.turning_points[0], mpf(1)) <= 2.0**-52
-        # A passage starts at the double nearest to the launch place, which close to the turn takes time.
+        # A passage starts at the double nearest to the launch place; close to the turn the difference takes time.
         slowest = mp.sqrt(2 * G * (mpf(start) ** 2 - mpf(start) ** 4))
         rounding = float(mp.sqrt(5) / slowest) * math.ulp(float(start))
         assert off(motion.legs[0].t_end, out) <= TIME * float(out) + rounding
@@ -225,7 +226,7 @@ def test_velocity_and_arc_length_follow_the_legs(name: str, passage: Callable[..
         assert (np.sign(state.v) == leg.direction).all()
         assert (np.diff(state.lam) * leg.direction > 0).all()
         assert (np.diff(state.s) * leg.direction > 0).all()
-        # Simpson's rule for the speed: its own error is of fourth order in the share of a leg.
+        # Simpson's rule for the speed has an error of fourth order in the share of a leg.
         rule = (t[2] - t[0]) / 6 * (state.v[:-2:2] + 4 * state.v[1:-1:2] + state.v[2::2])
         assert np.diff(state.s[::2]) == pytest.approx(rule, rel=1e-3)
 

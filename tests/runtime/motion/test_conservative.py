@@ -70,7 +70,7 @@ def test_up_the_arch_and_back(arch: ModuleType, v0: float) -> None:
     truth = np.arctanh(v0 / (4 * R * W)) / W
     assert abs(motion.events[1].t - truth) <= 1e-14 * truth
     assert abs(motion.events[3].t - 2 * truth) <= 1e-14 * truth
-    # N/m = 2*g*sin(theta/2) - v0**2/(4*R*sin(theta/2)): against the arch in the sharp bend at its foot.
+    # N/m = 2*g*sin(theta/2) - v0**2/(4*R*sin(theta/2)) presses against the arch in the sharp bend at its foot.
     place = 2 * np.arcsin(v0 / np.sqrt(8 * G * R))
     assert abs(motion.events[0].lam - place) <= 1e-14 * place
 

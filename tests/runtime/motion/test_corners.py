@@ -14,7 +14,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 
 G = 9.81
-# Two valleys with a ridge between, lower than the sides.
+# The track has two valleys with a ridge between them, lower than the sides.
 POINTS = [(0, 2), (1, 0), (2, 1), (3, 0), (4, 2)]
 LENGTHS = [math.dist(a, b) for a, b in pairwise(POINTS)]
 EDGES = [sum(LENGTHS[:k]) for k in range(5)]

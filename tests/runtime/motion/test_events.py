@@ -16,9 +16,9 @@ import gqm_sym as gqm
 ModuleOf = Callable[[str], ModuleType]
 
 G = mpf("9.81")
-# Of the angle: the zero of N is found in N's own rounding, about 1e-15 of m g.
+# The tolerance of the angle: the zero of N is found within N's own rounding, about 1e-15 of m g.
 ANGLE = 4e-15
-# Of the time.
+# The tolerance of the time.
 TIME = 1e-14
 
 
@@ -51,7 +51,7 @@ def test_a_body_slides_off_a_cylinder(v0: str, direction: int, circle: ModuleTyp
     with mp.workdps(40):
         height = mpf(2) / 3 + mpf(v0) ** 2 / (3 * G)
         truth = mp.pi / 2 + direction * mp.acos(height)
-        # Flat as N is near the top, its rounding is a larger angle.
+        # N is flat near the top, so that its rounding is a larger angle.
         assert abs(mpf(place) - truth) <= ANGLE * float(truth) / float(mp.sqrt(1 - height**2))
         rate = lambda a: 1 / mp.sqrt(mpf(v0) ** 2 + 2 * G * (1 - mp.cos(a)))  # noqa: E731
         time = mp.quad(rate, [0, 0.001, 0.01, 0.1, 0.3, mp.acos(height)] if v0 == "0.01" else [0, mp.acos(height)])
@@ -100,7 +100,7 @@ def test_just_fast_enough_for_the_top(circle: ModuleType) -> None:
 @pytest.mark.parametrize(
     ("lam0", "v0", "direction", "contact"),
     [
-        ("pi/2", "1", 1, "above"),  # on the outside of a track that is only there from inside
+        ("pi/2", "1", 1, "above"),  # on the outside of a track that exists on the inside only
         ("-pi/2", "1", 1, "below"),  # under the ball
         ("pi/2", "4", -1, "below"),  # over the crest faster than sqrt(g L)
         ("pi/4", "0", 1, "above"),  # at rest on the ceiling

@@ -83,7 +83,8 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
         assert sign * (found.value - sampled(motion, name)) <= 2e-3 * size  # at a turning point speeds are steep
         state = motion.state(found.t)
         there = abs(state.v) if name.startswith("v_") else state.normal_force
-        # At a turning point the speed is as steep as the acceleration: a rounding of the time is one of the speed.
+        # At a turning point the slope of the speed is the acceleration, so that a rounding of the time is one of the
+        # speed.
         assert there == pytest.approx(found.value, rel=1e-12, abs=1e-12)
         assert state.lam == pytest.approx(found.lam, rel=1e-9, abs=1e-9)
 

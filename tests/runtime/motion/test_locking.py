@@ -22,8 +22,8 @@ ModuleOf = Callable[[str], ModuleType]
 THREADS = 6
 TIMES = np.linspace(0.0, 40.0, 23)[1:]
 
-# A transit to infinity, an approach to a hilltop, a libration whose panels extended precision lays, a circulation, a
-# launch place that is no double, and a motion with friction.
+# The motions are a transit to infinity, an approach to a hilltop, a libration whose panels extended precision lays, a
+# circulation, a launch place that is no double, and a motion with friction.
 LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
     "open": ("waves", {"lam0": 0, "v0": 8, "direction": -1}),
     "approach": ("pendulum", {"lam0": "-pi/2", "v0": "2*sqrt(981/100)", "L": 1}),

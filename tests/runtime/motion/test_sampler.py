@@ -18,16 +18,17 @@ from gqm_sym.runtime.motion.motion import Motion
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Of the scale (MATHS, section 7): measured 3.7e-16.
+# The tolerance relative to the scale (MATHS, section 7). Worst measured: 3.7e-16.
 PLACE = 5e-16
-# Of the swing, next to the separatrix, where the panels' own noise grows: measured 1.6e-15.
+# The tolerance relative to the swing next to the separatrix, where the panels' own noise grows. Worst measured:
+# 1.6e-15.
 STEEP = 2.5e-15
-# Coefficients, of the swing or the lap: rounding of the nodes.
+# The tolerance of coefficients, relative to the swing or the lap, is the rounding of the nodes.
 SERIES = 4e-16
 # The compiled loop and the reading of exact times differ by the rounding of both.
 AGREE = 1.5e-15
 
-# Track and launch of motions of every sort: short series, long ones, and none.
+# A row has the track and launch of a motion; together they have short series, long ones, and none.
 MOTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "swing": ("circle", {"lam0": "6/5", "L": 1}),
     "swing on the way down": ("circle", {"lam0": 0.3, "v0": 2.0, "direction": -1, "L": 1}),
@@ -99,7 +100,7 @@ def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:
         assert (motion.lam(t) == state.lam).all()
         width = abs(motion._segment.b - motion._segment.a)
         for name, got, old in zip(state._fields, state, plain, strict=True):
-            if name == "error":  # an estimate: of one size either way
+            if name == "error":  # an estimate, which is of the same size in both directions
                 assert np.all((got <= 2.0 * old) & (old <= 2.0 * got))
                 continue
             scale = max(np.abs(old).max(), width) if name == "lam" else np.abs(old).max()

@@ -12,7 +12,7 @@ from naive import ulps
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
 
-# Twice the root of g L: from the lowest place exactly to the highest.
+# Twice the root of g L is the speed that leads from the lowest place exactly to the highest.
 TO_THE_TOP = "2*sqrt(9.81)"
 
 
@@ -49,7 +49,7 @@ def test_lost_on_the_way_to_the_top(circle: ModuleType) -> None:
     with mp.workdps(30):
         there = mp.acos(-mpf(2) / 3)
         assert ulps(motion.legs[-1].lam_end, there) <= 2.0
-        # tan((pi + angle)/4) = exp(omega t) on the separatrix.
+        # On the separatrix tan((pi + angle)/4) = exp(omega t).
         when = mp.log(mp.tan((mp.pi + there) / 4)) / mp.sqrt(mpf("9.81"))
         assert ulps(motion.t_end, when) <= 4.0
 

@@ -13,7 +13,7 @@ from gqm_sym.loading import load
 from gqm_sym.runtime.multiprecision.gauss_legendre import legendre_rule
 
 ENERGY, USEFUL = 2e-14, 1e-11
-# Launches that a random run found: from rest, and with little to spare at a crest.
+# A random run found these launches: from rest, and slightly faster than necessary at a hilltop.
 LAUNCHES = ((5.725266733964419, 0.0, -1), (5.754549511786295, 0.43248306634587075, 1), (0.7953743236188708, 0.0, -1))
 
 
@@ -39,7 +39,7 @@ def test_many_hills_and_a_slow_passage() -> None:
     now it is right.
     """
     module = transient(gqm.derive(gqm.Curve.graph("x**2/40 + cos(8*x)/2", parameter="x"), gqm.Gravity()))
-    # A millimetre above the twelfth crest.
+    # The launch is a millimetre above the twelfth hilltop.
     motion = module.solve(10.063448508143175)
     state, start = motion.state(np.linspace(0.0, motion.period, 1000)), module.pass1(10.063448508143175, lam0=0).z
     wanted = 2 * 9.81 * (start - state.z)

@@ -34,13 +34,14 @@ ModuleOf = Callable[[str], ModuleType]
 ULP = 2.0**-52
 # Nodes and weights are rounded once each.
 RULE = ULP
-# How wrong the rule is about the first polynomial beyond its degree, of norm about 0.2: measured 1.9e-3.
+# The error of the rule for the first polynomial beyond its degree, of norm about 0.2. Measured: 1.9e-3.
 BEYOND = 1e-3
-# Interpolation at 21 nodes: each coefficient is a sum of 21 products of values up to 1. Measured 1.2e-16.
+# The tolerance of interpolation at 21 nodes: each coefficient is a sum of 21 products of values up to 1. Worst
+# measured: 1.2e-16.
 INTERPOLATION = 4 * ULP
-# A whole stretch, and any part of it, as a share of the whole. Measured 2.9e-16.
+# The tolerance of a whole segment and of any part of it, as a share of the whole. Worst measured: 2.9e-16.
 TIME = 4 * ULP
-# Speeds come without a difference of heights: measured 3.3e-16.
+# The tolerance of speeds, which are found without a difference of heights. Worst measured: 3.3e-16.
 SPEED = 4 * ULP
 
 NODES_BOTH = np.concatenate([-NODES[:0:-1], NODES])
@@ -223,7 +224,7 @@ def test_the_separatrix_of_the_pendulum(start: float, module_of: ModuleOf) -> No
             truth = (mp.log(mp.tan(whole / 4)) - mp.log(mp.tan(left / 4))) / w
             assert share(times[k], truth, laid.whole) <= TIME
             v = 2 * w * mp.sin(left / 2)
-            # The exponential of an phase_angle of 64 has a rounding of its own in units of the anomaly's last place.
+            # The exponential of a phase angle of 64 has a rounding of its own, in units in the angle's last place.
             assert share(speeds[k], v, float(v)) <= SPEED + math.ulp(phase_angle)
 
 

@@ -18,9 +18,9 @@ from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.sweep import quantities
 
 G = 9.81
-# Of elementary closed forms.
+# The relative tolerance of elementary closed forms.
 FEW = 1e-14
-# A sweep reads the same panels as a solved motion, which makes other polynomials of them.
+# A sweep reads the same panels as a solved motion, which converts them to other polynomials.
 ROUNDING = 4e-14
 
 Build = Callable[..., ModuleType]
@@ -65,7 +65,7 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
     assert (module.sweep("v_min", starts, **given).values == 0.0).all()
     for quantity in ("normal_force_min", "normal_force_max"):
         assert module.sweep(quantity, starts, m=2, **given | {"k": 2 * k}).values == pytest.approx(2 * G, rel=FEW)
-    # The middle is passed after a quarter of a swing and a little more.
+    # The body passes the middle after slightly more than a quarter of a swing.
     first = np.arccos(-np.sign(1.0) * offset / (np.abs(starts) - offset)) / math.sqrt(k)
     assert module.sweep("time_at", starts, lam=0.0, **given).values == pytest.approx(first, rel=FEW)
     beyond = module.sweep("time_at", starts, lam=2.0, **given)

@@ -13,7 +13,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 from gqm_sym.runtime.sweep.quantities import SINGLE, SOLVE
 
-# Curves with hills: their heights as formulas, an estimate of a hilltop, and where to launch from.
+# A row has a curve with hills: its heights as formulas, an estimate of a hilltop, and the launch place.
 HILLS: dict[str, tuple[Any, Any, float, tuple[float, float]]] = {
     "two_wells": (gqm.Curve.graph("x**4/4 - x**2/2", parameter="x"), lambda x: x**4 / 4 - x**2 / 2, 0.0, (-1.3, 1.3)),
     "uneven_wells": (
@@ -101,8 +101,8 @@ def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType])
                     assert abs(mpf(motions[k].v_min.value) - slowest) <= rounding
 
 
-# The error of a time of a body that passes a hilltop, in units in the last place. Doubles alone, measured from the
-# launch, are off by the inverse of the share of V**2 that is left there.
+# The error of the time of a body that passes a hilltop, in units in the last place. In doubles alone, measured from the
+# launch, it is the inverse of the share of V**2 at the hilltop.
 MAX_PASSING_ULPS = 6.0
 
 
@@ -160,10 +160,10 @@ def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
         assert ulps(float(found.values[0]), truth) <= MAX_PASSING_ULPS, (lam0, direction)
 
 
-# Half periods: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
-# Distances of an energy from that of a hilltop, as shares of the well's depth.
+# The distances of an energy from that of a hilltop, as shares of the well's depth.
 GAPS = np.geomspace(0.3, 1e-7, 40)
 
 

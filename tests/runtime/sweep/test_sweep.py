@@ -20,11 +20,11 @@ from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Half periods away from barriers, in units of the last place.
+# The tolerance of half periods away from barriers, in units in the last place.
 ULPS = 4.0
-# An extreme is flat: its value has the digits of V or N themselves, relative to the largest.
+# An extreme is flat, so that its value has the digits of V or N themselves, relative to the largest.
 LOAD = 4e-15
-# Arrival by panels against the exact reading.
+# The tolerance of an arrival by panels against the exact reading.
 ARRIVAL = 4e-15
 
 
@@ -55,11 +55,11 @@ def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) ->
     speeds = np.sqrt(2 * 9.81 * (np.cos(places) - np.cos(top)))
     got = module_of("circle").sweep("period", places[:, None], speeds[:, None], [1, -1], L=1)
     assert got.values.shape == got.status.shape == (7, 2)
-    # Speeds are rounded, and the period follows the amplitude they mean.
+    # Speeds are rounded, and the period is that of the amplitude that they mean.
     assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
 
 
-# Whole turns away, and speeds in units of what just reaches the top.
+# The launches are whole turns away, and speeds are in units of the one that just reaches the top.
 LAUNCHES = [(turns, reach) for turns in (0, 1, -100) for reach in (1e-9, 1e-3, 0.4, 0.9)]
 
 
@@ -79,7 +79,7 @@ def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: Modu
                 return mp.pi / mp.sqrt(mpf("9.81")) / mp.agm(1, mp.sqrt(1 - square))
 
             w = mpf(speed) ** 2
-            # Three roundings of V**2 from the lowest place to the top, at most.
+            # The tolerance is three roundings of V**2 from the lowest place to the top.
             rounding = abs(mp.diff(truth, w)) * 3 * mpf(2) ** -53 * 4 * mpf("9.81")
             assert abs(mpf(float(value)) - truth(w)) <= ULPS * np.spacing(float(value)) + rounding
 
@@ -159,7 +159,8 @@ def test_arrivals(module_of: ModuleOf) -> None:
                 assert np.isnan(value)
                 assert motion.kind == "libration" or (place - lam0) * way < 0
             else:
-                # Both are differences of times since the turn: of up to half a period, and as its last place goes.
+                # Both are differences of times since the turn of up to half a period, and have errors in its last
+                # place.
                 last = np.spacing(0.5 * motion.period)
                 assert value == pytest.approx(motion.time_at(float(place)), rel=ARRIVAL, abs=last)
 
@@ -402,8 +403,8 @@ def test_a_hoop_that_turns(omega: float) -> None:
             assert abs(swept["turning_points"].values[k] / np.array([-top, top]) - 1).max() < 4e-16
 
 
-# Graphs z(x) with their derivatives, swept more widely than closed forms of second divided differences hold: over one
-# turn of a wave, or a narrow range of hyperbolic functions.
+# These graphs z(x), with their derivatives, are swept more widely than closed forms of second divided differences hold:
+# over one turn of a wave, or a narrow range of hyperbolic functions.
 WIDE = {
     "wave": ("x**2/2 + sin(3*x)/10", lambda x: x**2 / 2 + mp.sin(3 * x) / 10, lambda x: x + 3 * mp.cos(3 * x) / 10),
     "chain": ("cosh(x) + x/3", lambda x: mp.cosh(x) + x / 3, lambda x: mp.sinh(x) + mpf(1) / 3),
@@ -441,7 +442,8 @@ def incline(generated_folder: Path) -> ModuleType:
     return gqm.build(gqm.derive(line, gqm.Gravity()), name="incline", folder=generated_folder)
 
 
-# Launch place, speed, direction: from rest; down; up to a turning point and back; up and out; from the end inwards.
+# A row has launch place, speed and direction: from rest; down; up to a turning point and back; up and out; from the end
+# inwards.
 LEAVING = np.array([[0.5, 0, 1], [-1, 1, 1], [0.3, 2, -1], [1.5, 0.01, -1], [0.5, 9, -1], [2, 3, -1]], dtype=float)
 
 

@@ -16,22 +16,22 @@ from gqm_sym.runtime import vocabulary
 Real = Callable[[mpf], mpf]
 Points = tuple[float, float, float, float, float]
 
-# A few roundings each. Worst on 1000 triples of each row: 3.0 (rpow 0.99), else 2.1 (sinh).
+# The tolerance is a few roundings. Worst on 1000 triples of each row: 3.0 (rpow 0.99), otherwise 2.1 (sinh).
 FIRST_ULPS = 4.0
 # Worst on 1000 triples of each row but those below: 4.3 (tanh).
 SECOND_ULPS = 6.0
-# Just beyond their closed form, with f'' still small about 0, these two subtract first differences
-# near 1 whose last digits weigh more. Worst on 1000 triples: 13.8 (atan), 12.7 (asinh).
+# Just beyond their closed form, with f'' still small about 0, these two subtract first differences near 1 whose last
+# digits have more weight. Worst on 1000 triples: 13.8 (atan), 12.7 (asinh).
 INFLECTED_ULPS = 16.0
 INFLECTED = frozenset({"atan", "asinh"})
-# Worst measured: 1.8; at amplitude 2.8, near the barrier, 5.8: there rounding (y+b)/2 shows.
+# Worst measured: 1.8; at amplitude 2.8, near the barrier, 5.8, because of the rounding of (y+b)/2.
 PENDULUM_ULPS = 7.0
 
-# Where the divided differences live, and their names but for those that are for near points alone.
+# The modules of the divided differences, and the names in them except those for near points alone.
 HOME, SHAPE = "arithmetic.divided_differences", re.compile(r"divdiff[12]_[a-z]+$")
 
 TRIPLES = 150
-# What a second difference over a spread of 1e-60 may lose, the digits of a double, and to spare.
+# The number of digits that a second difference over a spread of 1e-60 may lose, those of a double, and some more.
 DIGITS = 240
 COINCIDENT = 1e-60
 NUDGE = mpf(10) ** -30

@@ -12,7 +12,7 @@ from gqm_sym.runtime.arithmetic.divided_differences.trigonometric import (
     sinc_near,
 )
 
-# Absolute: at most 1/2, 1/6 and 1 in size. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
+# The absolute tolerances of values up to 1/2, 1/6 and 1. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
 EVEN, ODD, SINC = 1.5e-16, 8e-17, 3e-16
 
 

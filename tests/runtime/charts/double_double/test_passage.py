@@ -20,7 +20,7 @@ from gqm_sym.runtime.motion import timing
 G = "9.81"
 DIGITS = 50
 
-# A double-double number has some 31 digits; a sum over many pieces fewer.
+# A double-double number has some 31 digits, and a sum over many pieces has fewer.
 USEFUL_ERROR = 1e-23
 
 
@@ -139,7 +139,7 @@ def test_an_arc_between_lines(angle: float, module_for: Callable[..., ModuleType
     with mp.workdps(DIGITS):
         g, lam0 = mpf(G), float(2 + mp.pi / 2 - mpf(angle))
         holds(module.solve(lam0=lam0), pendulum(2 + mp.pi / 2 - mpf(lam0), 0))
-        height = mpf(angle)  # above the arc's ends
+        height = mpf(angle)  # above the ends of the arc
         on_line = module.solve(lam0=float(2 - height))
         w = 2 * g * (2 - mpf(float(2 - height)))
         k2 = (w + 2 * g) / (4 * g)
@@ -161,7 +161,7 @@ def test_a_spline(launch: dict[str, float], module_for: Callable[..., ModuleType
     assert found.offsets == pytest.approx(exact.offsets, rel=1e-14)
     assert found.edge_times is not None
     assert exact.edge_times is not None
-    # The edges of panels are doubles, and stand for places that differ by the chart's rounding.
+    # The edges of panels are doubles, so that places differ by the chart's rounding.
     assert np.abs(found.edge_times[0] - exact.edge_times[0]).max() <= 1e-15
 
 
@@ -198,7 +198,7 @@ def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -
     alone = [module.solve(*launch[:1], g=launch[1], m=launch[2]).half_period for launch in zip(lam0, g, m, strict=True)]
     assert (np.abs(swept.values - alone) <= 2.0 * 2.0**-52 * np.array(alone)).all()
     assert _chart_with.cache_info().misses == before + 1
-    # Two shapes are two charts.
+    # Two shapes have two charts.
     half = module.sweep("half_period", np.repeat([0.5, 1.0], 20), g=g, R=np.repeat([0.5, 1.0], 20)).values
     assert half[:20] * np.sqrt(g[:20]) == pytest.approx(half[0] * np.sqrt(g[0]), rel=2e-15)
     assert half[20:] * np.sqrt(g[20:]) == pytest.approx(half[0] * np.sqrt(2 * g[0]), rel=2e-15)
@@ -229,7 +229,7 @@ def test_swings_too_small_for_doubles_along_a_chart(g: float, ring: ModuleType) 
         motion = ring.solve(lam0, g=g)
         state = motion.state(1.0)
         with mp.workdps(40):
-            # To the third order in the amplitude.
+            # The reference is right to the third order in the amplitude.
             size, omega = mpf(lam0), mp.sqrt(mpf(g))
             place = size * mp.cos(omega * (1 - size**2 / 16)) + size**3 / 192 * (mp.cos(omega) - mp.cos(3 * omega))
             assert abs(state.lam - place) <= state.error + size**5

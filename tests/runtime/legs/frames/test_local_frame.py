@@ -21,7 +21,7 @@ LAWS = {
     "viscous": gqm.Gravity() + gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"}),
     "drag": gqm.Gravity() + gqm.QuadraticDrag(b="1/10"),
 }
-# Each shape with its equilibrium at 0, and elsewhere.
+# A row has a shape with its equilibrium at 0, and the same elsewhere.
 SHAPES: dict[str, tuple[Any, Any, str]] = {
     "pendulum": (
         gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"),
@@ -39,7 +39,7 @@ SHAPES: dict[str, tuple[Any, Any, str]] = {
         "1",
     ),
 }
-# Relative error of the times of turns; worst measured: 1.4e-15, of the viscous law.
+# The relative tolerance of times of turns. Worst measured: 1.4e-15 (viscous law).
 TURN_TIMES = 2e-15
 Pairs = Callable[[str, str], tuple[ModuleType, ModuleType]]
 
@@ -160,7 +160,7 @@ def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, 
     motion, larger = (pairs("pendulum", law)[0].solve(start, t_max=40) for start in (f"1e-{exponent}", "1e-60"))
     bounds = np.asarray(motion.error_bound(t))
     assert np.all((bounds > 0.0) & (bounds <= 2.5 * lam0))
-    # Such small swings are proportional to each other, but for what drag takes of the larger one.
+    # Such small swings are proportional to each other, except for the drag on the larger one.
     ratio = 1e60 * lam0
     allowed = bounds + ratio * np.asarray(larger.error_bound(t)) + 1e-15 * lam0
     assert np.all(np.abs(np.asarray(motion.lam(t)) - ratio * np.asarray(larger.lam(t))) <= allowed)
@@ -204,13 +204,13 @@ def test_the_rounding_of_the_force_on_a_hilltop_is_charged(
 @pytest.mark.parametrize(
     ("lam0", "v0", "direction", "h", "k", "c"),
     [
-        # It turned below the noise of V**2, and was taken to stay there: bounds were NaN.
+        # The body turned below the noise of V**2, and was taken to stay there: bounds were NaN.
         ("-0.0867479117080234", 0.00015122745205837793, -1, -0.08680920764520268, 6.0869, 0.00198),
         ("-10.76013231434322748237478", 4.243898578878686e-17, 1, -10.760132314343227, 78.776, 0.0878),
-        # It turned within the last digit of the hilltop, and was taken to stay there, with a bound of 1e-17.
+        # The body turned within the last digit of the hilltop, and was taken to stay there, with a bound of 1e-17.
         ("0.02417403986204569313377977", 2.931476132824515e-20, -1, 0.024174039862045693, 1.0811, 4.7809),
         ("60.49656240641458281075578", 7.68221402805137e-17, 1, 60.49656240641458, 32.388, 9.0299),
-        # The rounding of the force was charged after the turn only.
+        # The rounding of the force was included after the turn only.
         ("-41.710671021825114", 8.332599366366813e-06, -1, -41.71069236634652, 0.1524, 0.005118386811700331),
     ],
 )

@@ -19,7 +19,7 @@ TRACKS: dict[str, list[Any]] = {
     "level": [(0, 2), (2, 0), (3, 0), (4, 3)],
 }
 LAUNCHES = 16
-# Of times, against the whole; of places.
+# The tolerances of times, relative to the whole, and of places.
 TIMES, PLACES = 1e-13, 2e-13
 CORNER = math.sqrt(2.0)
 Long = np.longdouble

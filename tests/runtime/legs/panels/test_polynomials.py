@@ -28,7 +28,7 @@ from gqm_sym.runtime.legs.panels.polynomials import (
 )
 from gqm_sym.runtime.legs.panels.resolution import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
 
-# Roundings of as many products, of size 1.
+# The tolerance is the rounding of as many products of size 1.
 TABLE = 1e-15
 NOISE = 1e-15
 

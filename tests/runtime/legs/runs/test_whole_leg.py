@@ -13,7 +13,7 @@ import generated.circle_coulomb
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS
 from gqm_sym.runtime.legs.runs import whole_leg
 
-# Tables are rounded numbers, and so are sums with them.
+# The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
 
 

@@ -17,7 +17,7 @@ Launch = Mapping[str, str]
 Build = Callable[..., ModuleType]
 STATES = ("lam", "s", "x", "z", "v", "normal_force")
 
-# The largest error of a derivative: relative to it, or to the largest one at any of the times.
+# The largest error of a derivative, relative to it or to the largest one at any of the times.
 TOLERANCE = 1e-13
 
 
@@ -91,7 +91,7 @@ def test_a_spring_with_dry_friction(build: Build, changed: Launch, direction: in
     start = RoughSpring(**{k: mpf(v) for k, v in launch.items()}, direction=direction)
     times = float(start.end) * np.array([0.01, 0.05, 0.2, 0.37, 0.55, 0.77, 0.93, 0.9999])
     assert_states(motion, times, lambda t, **at: RoughSpring(**at, direction=direction).at(t), launch, ("lam", "v"))
-    # At the last two turns the margins are of the same size where both are on one side.
+    # At the last two turns the margins are of equal size, and both on one side.
     margins = [float(start.rate**2 * abs(place) / (mpf(launch["mu"]) * mpf("9.81"))) - 1.0 for place in start.turns]
     nearest = motion.nearest_switch
     assert abs(nearest.margin) == pytest.approx(np.abs(margins).min(), rel=1e-12)
@@ -148,7 +148,7 @@ def test_the_papers_second_example() -> None:
     found = motion.gradient("turning_points", ("mu", "v0"))
     assert found["mu"][0] == pytest.approx(-1.370490175291658727794, rel=1e-14)
     assert found["v0"][0] == pytest.approx(0.1812676943574192802416, rel=1e-14)
-    # Where N changes its sign: the change of the place at the time of that, less what the change of the time makes.
+    # At a change of the sign of N, this is the change of the place less the effect of the change of the time.
     event = next(event for event in motion.events if event.kind == "contact-sign")
     there = motion.sensitivity(event.t, ("mu", "v0"))
     with mp.workdps(30):
@@ -248,7 +248,7 @@ def test_all_fields_over_laps() -> None:
     assert state.lam.max() > 25.0
     rows = {name: k for k, name in enumerate(found.wrt)}
     assert found.wrt == ("lam0", "v0", *n)
-    # In units of length L, and with t sqrt(g/L) for the time, there is nothing but b L/m and v0/sqrt(g L).
+    # In units of length L and of time sqrt(L/g), the motion depends on b L/m and v0/sqrt(g L) only.
     mass, drag, length, gravity = (rows[name] for name in ("m", "b", "L", "g"))
     np.testing.assert_allclose(found.lam[mass] * 1.0, -found.lam[drag] * 0.02, rtol=1e-12)
     rates = state.v / 1.25

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from gqm_sym.loading import load
 
 LAM, V = sp.symbols("lam V", real=True)
-# The integrator's own errors; those of derivatives grow with the number of events.
+# The tolerances are the integrator's own errors; those of derivatives grow with the number of events.
 RTOL, ATOL, TOLERANCE = 1e-13, 1e-15, 2e-11
 
 

@@ -16,7 +16,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
-# The goal for derivatives through legs, as a share of the largest of an array.
+# The tolerance of derivatives over several legs, relative to the largest of an array.
 TOLERANCE = 1e-13
 
 
@@ -154,7 +154,7 @@ def test_a_track_through_points(generated_folder: Path) -> None:
         wanted = {"lam0": 1, "v0": exact["v0"] / up, "g": -(exact["v0"] ** 2) / (2 * up * exact["g"])}
         for name, value in wanted.items():
             assert abs(turn[name][0] - value) <= TOLERANCE, name
-        # It passes 2.5 on its way up, with v**2 = v0**2 - 2 up d.
+        # The body passes 2.5 on its way up, with v**2 = v0**2 - 2 up d.
         assert abs(slopes["lam0"] + 1 / mp.sqrt(exact["v0"] ** 2 - up)) <= TOLERANCE
 
 

@@ -45,7 +45,7 @@ def answered(
 
 
 CIRCLE = (-np.inf, np.inf, 2 * np.pi)
-# What may be said of a circle's symmetry: nothing, its axes, and that heights between them only rise or only fall.
+# The symmetry of a circle may be given in three ways: not at all, its axes, and that heights between them are monotone.
 SAID: dict[str, dict[str, Any]] = {
     "nothing": {},
     "axes": {"mirrors": (0.0, np.pi)},
@@ -69,11 +69,11 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
-# So many of 300 launches are left to be solved one by one where nothing is said of symmetry: they go downhill, far up
-# the other side, and bounds of the slope over the whole way do not prove that nothing stops them before.
+# So many of 300 launches are left to be solved singly if no symmetry is given: they go downhill and far up the other
+# side, and bounds of the slope do not prove that nothing stops them before.
 UNPROVED = {1: 50, -1: 49}
 
-# Amplitudes from which on times are left to double-double arithmetic.
+# From these amplitudes on, times are left to double-double arithmetic.
 NEAR_TOP = 2.6
 
 
@@ -113,7 +113,7 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     assert (status == quantities.ANSWERED).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
-    # Speeds are rounded, and the loop time follows the energy they mean.
+    # Speeds are rounded, and the loop time is that of the energy that they mean.
     assert out[:, 0] == pytest.approx(truth, rel=2e-15)
     ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.TURNING_POINTS, **SAID[said])
     assert (ends[1] == quantities.NOT_PERIODIC).all()
@@ -205,7 +205,7 @@ def test_released_beside_the_top(module_of: ModuleOf) -> None:
             assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
-# Half periods of batches: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods of batches is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
 

@@ -16,10 +16,10 @@ from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 with mp.workdps(40):
     G = mpf("9.81")
 
-# Half periods: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
-# Times and loads on a rail whose parts are given in doubles, relative.
+# The relative tolerance of times and loads on a rail whose parts are given in doubles.
 ROUNDING = 2e-15
 
 
