@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 12, input a497e433309c, body 5704624eb5d6
+# interface 12, input a497e433309c, body 77495cf24df0
 """Loop of a roller coaster
 
 x              = x(s)
@@ -107,7 +107,7 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_effective_potential(op, x, z, p):
-    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
+    """U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."""
     g = p[3]
     return g*z, 0, g
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 12, input 1c6e3a707056, body b3f775535334
+# interface 12, input 1c6e3a707056, body e2ffdd99f054
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -171,7 +171,7 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_effective_potential(op, x, z, p):
-    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
+    """U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."""
     g = p[0]
     return g*z, 0, g
 

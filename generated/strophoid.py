@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 12, input 761b603021f8, body 39e1113ec1f8
+# interface 12, input 761b603021f8, body 8373c9c3d10b
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -137,7 +137,7 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_effective_potential(op, x, z, p):
-    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
+    """U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."""
     g = p[1]
     return g*z, 0, g
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 12, input fe6d2f95d843, body 6cc52baba6ea
+# interface 12, input fe6d2f95d843, body b26754d97d49
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -132,7 +132,7 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_effective_potential(op, x, z, p):
-    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
+    """U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."""
     g = p[2]
     return g*z, 0, g
 

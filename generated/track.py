@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 12, input e49691f04fda, body 168a0c457df6
+# interface 12, input e49691f04fda, body 6a2410c4e940
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -171,7 +171,7 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_effective_potential(op, x, z, p):
-    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
+    """U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."""
     g = p[0]
     return g*z, 0, g
 

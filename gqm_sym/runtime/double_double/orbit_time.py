@@ -11,9 +11,9 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER, atan
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI, atan
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
@@ -80,7 +80,7 @@ class Integrand(NamedTuple):
     width: Any
 
 
-class Bounded(NamedTuple):
+class BoundedNumber(NamedTuple):
     """A number as two doubles, with a bound on its error."""
 
     high: float
@@ -133,7 +133,7 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
     lam0, lam0_low = launch[0], launch[1]
     for i in range(ENDS):
         work[place + i], work[place + LOW + i] = add(lam0, lam0_low, offsets[i] if i < 2 else 0.0, 0.0)
-    level, step, rest = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
+    level, step, residual = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
     for _ in range(NEWTON_STEPS):
         for i in range(ENDS):
             work[place + ERROR + i] = 0.25 * UNIT * fabs(work[place + i])
@@ -148,9 +148,9 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
             ratio = fabs(move) / step[i] if step[i] > 0.0 else 0.0
             if not fabs(move) <= MAX_STEP * fabs(offsets[1] - offsets[0]):
                 ratio = nan
-            step[i], rest[i] = fabs(move), fabs(half) * ratio * ratio + level[2] + work[u + ERROR]
-    errors = rest[0] / fabs(work[slope]), rest[1] / fabs(work[slope + 1])
-    return (level[0], level[1], level[2] + rest[0] + rest[1]), errors
+            step[i], residual[i] = fabs(move), fabs(half) * ratio * ratio + level[2] + work[u + ERROR]
+    errors = residual[0] / fabs(work[slope]), residual[1] / fabs(work[slope + 1])
+    return (level[0], level[1], level[2] + residual[0] + residual[1]), errors
 
 
 @Inner
@@ -174,9 +174,9 @@ def fill_places(n, start, width, nodes, first, place):  # type: ignore[no-untype
     """Fill a register with the places of nodes."""
     shares, shares_low = nodes[0, first : first + n], nodes[1, first : first + n]
     for i in range(n):
-        way, way_low = multiply(width[0], width[1], shares[i], shares_low[i])
-        place[i], place[LOW + i] = add(start[0], start[1], way, way_low)
-        place[ERROR + i] = UNIT * (fabs(place[i]) + fabs(way))
+        distance, distance_low = multiply(width[0], width[1], shares[i], shares_low[i])
+        place[i], place[LOW + i] = add(start[0], start[1], distance, distance_low)
+        place[ERROR + i] = UNIT * (fabs(place[i]) + fabs(distance))
 
 
 @Inner
@@ -312,27 +312,27 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
     float
         A bound on the error of the times.
     """
-    work, p, rule, times = uncounted(work), uncounted(p), uncounted(rule), uncounted(times)
+    work, p, rule, times = borrowed(work), borrowed(p), borrowed(rule), borrowed(times)
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
+    tape = (address, borrowed(operations), parts, registers)
     fill_parameters(tape, p, work)
     integrand = Integrand(tape, work, *orbit)
-    angle, at, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
+    angle, last_angle, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     times[1, 0], times[2, 0] = 0.0, 0.0
     is_thrown = times[0, 0] != 0.0
     thrown_at = launch_angle(integrand, launch) if is_thrown else angle
     for k in range(1, times.shape[1] + 1):
         is_last = k == times.shape[1]
         if is_thrown and (is_last or thrown_at[0] < times[0, k]):
-            part, part_low, of_part = time_between(integrand, kind, at, thrown_at, rule)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, thrown_at, rule)
             times[1, 0], times[2, 0] = add(high, low, part, part_low)
             is_thrown, of_launch = False, error + of_part
         if not is_last:
             # The upper turning point is at the angle pi itself.
-            angle = (times[0, k], 2.0 * QUARTER[1] if times[0, k] == 2.0 * QUARTER[0] else 0.0)
-            part, part_low, of_part = time_between(integrand, kind, at, angle, rule)
+            angle = (times[0, k], 2.0 * HALF_PI[1] if times[0, k] == 2.0 * HALF_PI[0] else 0.0)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, angle, rule)
             high, low = add(high, low, part, part_low)
-            times[1, k], times[2, k], at, error = high, low, angle, error + of_part
+            times[1, k], times[2, k], last_angle, error = high, low, angle, error + of_part
     return max(error, of_launch)
 
 
@@ -374,7 +374,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
         start, end = (work[place], work[place + LOW]), (work[place + 1], work[place + LOW + 1])
         width = add(end[0], end[1], -start[0], -start[1])
         ends = mean_at_ends(work, registers, width)
-        scale = multiply(width[0], width[1], 2.0 * QUARTER[0], 2.0 * QUARTER[1])
+        scale = multiply(width[0], width[1], 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])
     else:
         for i in range(ENDS):
             at = place + i
@@ -401,8 +401,8 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
 def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
     """Return what `find_orbit_time` returns."""
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
-    work, p, nodes = uncounted(work), uncounted(p), uncounted(nodes)
+    tape = (address, borrowed(operations), parts, registers)
+    work, p, nodes = borrowed(work), borrowed(p), borrowed(nodes)
     return find_orbit_time(tape, work, p, launch, offsets, direction, nodes, MAX_NEXT_CHANGE)
 
 
@@ -411,25 +411,25 @@ class Orbit(NamedTuple):
 
     Attributes
     ----------
-    duration : Bounded
+    duration : BoundedNumber
         Half period or lap time in s.
-    low, high : Bounded
+    low, high : BoundedNumber
         The turning points of a libration.
     """
 
-    duration: Bounded
-    low: Bounded
-    high: Bounded
+    duration: BoundedNumber
+    low: BoundedNumber
+    high: BoundedNumber
 
 
 def find_turning_points(
     formulas: BoundTape, launch: tuple[Number, Number], offsets: tuple[float, float]
-) -> tuple[Bounded, Bounded]:
+) -> tuple[BoundedNumber, BoundedNumber]:
     """Return the lower and the upper turning point of a libration; the arguments are those of `time_orbit`."""
     lam0, v0 = launch
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low), (-offsets[0], offsets[1])
     _, low, high, _ = orbit_time(*given, 0, np.ascontiguousarray(trapezoidal_nodes(LIBRATION)[:, :0]))
-    return Bounded(*low), Bounded(*high)
+    return BoundedNumber(*low), BoundedNumber(*high)
 
 
 def time_orbit(
@@ -461,10 +461,10 @@ def time_orbit(
     nodes = trapezoidal_nodes(kind)[:, :0] if by_panels else trapezoidal_nodes(kind)
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
     *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, np.ascontiguousarray(nodes))
-    duration, low, high = map(Bounded._make, found)
+    duration, low, high = map(BoundedNumber._make, found)
     if times.size:
         error = fill_times(*given, kind, orbit, panel_rule(), times)
-        duration = Bounded(float(times[1, -1]), float(times[2, -1]), error) if by_panels else duration
+        duration = BoundedNumber(float(times[1, -1]), float(times[2, -1]), error) if by_panels else duration
         if np.isnan(times).any():
             return None
     return Orbit(duration, low, high) if duration.error <= MAX_ERROR * duration.high else None

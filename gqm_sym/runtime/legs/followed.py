@@ -142,7 +142,7 @@ class FollowedMotion(Motion):
         not known.
         """
         driver = self._driver
-        if not self._known_beginning and self._horizon == inf and not driver.ending and driver.goes_on_for_ever:
+        if not self._known_beginning and self._horizon == inf and not driver.ending and driver.is_endless:
             self._known_beginning = len(self._all_runs)
         return self._known_beginning
 

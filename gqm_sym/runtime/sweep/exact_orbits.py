@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import LAM0, PARAMETERS, V0, element
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
@@ -58,10 +58,10 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         The nodes of the trapezoidal rule for librations and for laps (`nodes.trapezoidal_nodes`).
     """
     (address, operations, parts, registers), work, p = exact
-    tape, work, p = (address, uncounted(operations), parts, registers), uncounted(work), uncounted(p)
-    half, lap = uncounted(nodes[0]), uncounted(nodes[1])
-    columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
-    statuses = uncounted(answers.status)
+    tape, work, p = (address, borrowed(operations), parts, registers), borrowed(work), borrowed(p)
+    half, lap = borrowed(nodes[0]), borrowed(nodes[1])
+    columns, spans, values = borrowed(columns), borrowed(spans), borrowed(answers.values)
+    statuses = borrowed(answers.status)
     for k in range(statuses.size):
         if statuses[k] != SPAN_KNOWN:
             continue
