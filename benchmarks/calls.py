@@ -66,7 +66,7 @@ def conservative() -> list[tuple[str, float]]:
 
 
 def dissipative() -> list[tuple[str, float]]:
-    """Parts of the first leg of the paper's Example 2."""
+    """Measure parts of the first leg of the paper's Example 2."""
     model = friction.MODEL
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     assert model.dissipation is not None

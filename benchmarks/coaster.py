@@ -25,7 +25,7 @@ COMPARED = 400
 
 
 def rates() -> list[tuple[float, float, float]]:
-    """How far each piece turns to the left and upwards, and rolls: hills and level bends by turns."""
+    """Return how far each piece turns to the left and upwards, and rolls: hills and level bends by turns."""
     found = []
     for group in range(PIECES // 4):
         if group % 2:
@@ -40,18 +40,18 @@ def rates() -> list[tuple[float, float, float]]:
 
 
 def bump(angle: float) -> str:
-    """A rate that is zero at both ends of a piece, with its slope, and turns by an angle."""
+    """Return a rate that is zero at both ends of a piece, with its slope, and turns by an angle."""
     return f"{angle!r}*30*(s/{LENGTH!r})**2*(1 - s/{LENGTH!r})**2/{LENGTH!r}"
 
 
 def track() -> gqm.Curve:
-    """The track of 60 transitions, banked by their roll."""
+    """Return the track of 60 transitions, banked by their roll."""
     pieces = [gqm.transition(length=LENGTH, yaw=bump(y), pitch=bump(p), roll=bump(r)) for y, p, r in rates()]
     return gqm.Curve.piecewise(pieces, start=(0, 0, START), roll="pieces", heartline="1.1")
 
 
 def truth(places: Any) -> Any:
-    """Rows of the vertical and lateral load on riders at the middle of the train."""
+    """Return rows of the vertical and lateral load on riders at the middle of the train."""
     told = np.array(rates())
 
     def slopes(s: float, state: Any) -> Any:
@@ -98,7 +98,7 @@ class Pipeline:
         self.launch = int(np.argmin(np.abs(places - LAUNCH)))
 
     def __call__(self) -> Any:
-        """The vertical and the lateral load."""
+        """Return the vertical and the lateral load."""
         first = np.gradient(self.points, self.step, axis=0)
         tangent = first / np.linalg.norm(first, axis=1)[:, None]
         bend = np.gradient(tangent, self.step, axis=0)
@@ -119,7 +119,7 @@ class Pipeline:
 
 
 def coaster() -> list[Row]:
-    """The profile by this package and by finite differences, at the same places."""
+    """Measure the profile by this package and by finite differences, at the same places."""
     folder = tempfile.mkdtemp()
     sys.path.insert(0, folder)
     gqm.build(

@@ -151,7 +151,7 @@ def through_legs() -> list[Row]:
         return [found["mu"][0], found["v0"][0]]
 
     def differences() -> list[float]:
-        """Central differences of our own turning points."""
+        """Return central differences of our own turning points."""
         d, ends = STEP, []
         for moves in (({"mu": MU + d}, {"mu": MU - d}), ({"v0": SPEED + d}, {"v0": SPEED - d})):
             sides = [

@@ -31,7 +31,7 @@ survey_inside = Inner(survey.survey.__wrapped__)
 
 @njit(VECTOR(ADDRESSES, VECTOR, VECTOR, DOMAIN), error_model="numpy")
 def in_a_loop(fns, p, lam0, domain):  # type: ignore[no-untyped-def]
-    """Half periods of launches from rest, one after the other."""
+    """Return half periods of launches from rest, one after the other."""
     out = np.empty(lam0.size)
     for k in range(lam0.size):
         out[k] = survey_inside(fns, p, lam0[k], 0.0, 1, domain, True)[3]
@@ -39,7 +39,7 @@ def in_a_loop(fns, p, lam0, domain):  # type: ignore[no-untyped-def]
 
 
 def half_periods() -> list[Row]:
-    """Half periods, one by one and in a sweep."""
+    """Measure half periods, one by one and in a sweep."""
     amplitudes = np.random.default_rng(1).uniform(0.05, 2.5, ORBITS)
     lam0 = amplitudes - pi / 2
     # The sweep is given doubles, so its amplitudes are what those mean.
@@ -174,7 +174,9 @@ def half_periods() -> list[Row]:
 
 
 def launched(amplitudes: Any, ours: str) -> list[Row]:
-    """The same orbits from anywhere on them, with the speed there; the truth is that of doubles."""
+    """Measure the same orbits launched from anywhere on them, with the speed there; the reference is that of
+    doubles.
+    """
     lam0 = amplitudes * np.random.default_rng(2).uniform(-1.0, 1.0, ORBITS)
     v0 = np.sqrt(2 * 9.81 * (np.cos(lam0) - np.cos(amplitudes)))
 
@@ -197,7 +199,9 @@ def launched(amplitudes: Any, ours: str) -> list[Row]:
 
 
 def on_an_ellipse(ours: str) -> list[Row]:
-    """Half periods on an ellipse twice as wide as it is high, of orbits that need up to 32 nodes between turns."""
+    """Measure half periods on an ellipse twice as wide as it is high, of orbits that need up to 32 nodes between
+    turns.
+    """
     a, b = 2.0, 1.0
     amplitudes = np.random.default_rng(3).uniform(0.05, 1.2, ORBITS)
 

@@ -134,15 +134,15 @@ class _Leg:
         self.c = -(self.a * mp.sin(start) + self.b * mp.cos(start))
 
     def v2(self, lam: Any) -> Any:
-        """V**2 at a place."""
+        """Return V**2 at a place."""
         return self.a * mp.sin(lam) + self.b * mp.cos(lam) + self.c * mp.exp(-self.q * self.u * (lam - self.start))
 
     def force(self, lam: Any) -> Any:
-        """N over the mass."""
+        """Return N over the mass."""
         return mpf(str(G)) * mp.cos(lam) + self.v2(lam)
 
     def time(self, end: Any) -> Any:
-        """The time to a place inside."""
+        """Return the time to a place inside."""
         width = end - self.start
 
         def rate(w: Any) -> Any:
@@ -160,7 +160,7 @@ def _rest_place(start: float) -> Any:
 
 
 def _first_turn(leg: _Leg) -> Any:
-    """The first zero of V**2 on the other side, by bisection and Newton's method."""
+    """Return the first zero of V**2 on the other side, by bisection and Newton's method."""
     step, lam = mpf(1) / 64, leg.start + leg.u * mpf("1e-6")
     while leg.v2(lam + leg.u * step * abs(leg.start)) > 0:
         lam += leg.u * step * abs(leg.start)

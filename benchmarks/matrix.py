@@ -39,12 +39,12 @@ rng = np.random.default_rng(args.variant)
 
 
 def num(value: float) -> str:
-    """A constant: as written, or up to 10 % off in a variant."""
+    """Return a constant: as written, or up to 10 % off in a variant."""
     return repr(round(value * (1 + (0.1 * rng.uniform(-1, 1) if args.variant else 0.0)), 6))
 
 
 def survey() -> np.ndarray:
-    """Points of a sampled track."""
+    """Return points of a sampled track."""
     x = np.linspace(-2, 2, 201)
     return np.column_stack([x, float(num(0.5)) * x * x + float(num(0.01)) * np.cos(3 * x)])
 

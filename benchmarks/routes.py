@@ -56,7 +56,7 @@ class Swept(NamedTuple):
 
 
 def famous(curve: str, force: str) -> Iterator[Swept]:
-    """Each curve of the corpus that has formulas, with each force."""
+    """Yield each curve of the corpus that has formulas, with each force."""
     for entry in json.loads((ROOT / "tests/data/curves.json").read_text()):
         for law, (made, parameters) in FORCES.items():
             if entry["kind"] == "implicit" or curve not in entry["name"] or force not in law:
@@ -72,7 +72,7 @@ def famous(curve: str, force: str) -> Iterator[Swept]:
 
 
 def examples(curve: str, force: str) -> Iterator[Swept]:
-    """Each example curve that has formulas and loses no energy."""
+    """Yield each example curve that has formulas and loses no energy."""
     for path in sorted((ROOT / "curves").glob("*.yaml")):
         module = importlib.import_module(f"generated.{path.stem}")
         model, asked_for = module.MODEL, curve in path.stem and force in "own"
@@ -82,7 +82,7 @@ def examples(curve: str, force: str) -> Iterator[Swept]:
 
 
 def wells(swept: Swept) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Places and potentials from one hilltop to the next."""
+    """Return places and potentials from one hilltop to the next."""
     places = np.linspace(swept.low, swept.high, PLACES)[1:-1]
     lam0 = float(places[PLACES // 2]) if swept.low < 0.0 else float(places[PLACES // 3])
     level = -0.5 * swept.module.pass1(places, lam0, 0.0, **swept.given).v2
@@ -94,7 +94,7 @@ def wells(swept: Swept) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float6
 
 
 def launches(swept: Swept, most: float, rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Places, speeds and directions of launches, and a place that each comes by."""
+    """Return places, speeds and directions of launches, and a place that each body passes."""
     found = [np.empty((4, 0))]
     for places, level in wells(swept):
         bottom = level.argmin()
@@ -113,7 +113,7 @@ def launches(swept: Swept, most: float, rng: np.random.Generator) -> list[NDArra
 
 
 def shares(swept: Swept, quantity: str, some: list[NDArray[np.float64]], **given: Any) -> tuple[float, float]:
-    """The shares of launches that were solved one by one, and singly."""
+    """Return the shares of launches that were solved one by one, and singly."""
     lam0, v0, direction, place = some
     extra = {"lam": place} if quantity == "time_at" else {}
     found = swept.module.sweep(quantity, lam0, v0, direction, **extra, **swept.given, **given)

@@ -6,7 +6,7 @@ G = mpf("9.81")
 
 
 def half_period(amplitude: float) -> mpf:
-    """Half period of the pendulum of length 1, in closed form."""
+    """Return the half period of the pendulum of length 1, in closed form."""
     return 2 * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2) / mp.sqrt(G)
 
 

@@ -27,7 +27,7 @@ Track = tuple[np.ndarray, np.ndarray]
 
 
 def acceleration(angle: float) -> float:
-    """Angular acceleration; the angle is counted from the horizontal."""
+    """Return the angular acceleration; the angle is measured from the horizontal."""
     return -G / LENGTH * math.cos(angle)
 
 
@@ -62,7 +62,7 @@ def integrate(step: Callable[[float, float, float], tuple[float, float]]) -> Tra
 
 
 def energy_error(angles: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Energy of a unit mass less that of the launch, in joules."""
+    """Return the energy of a unit mass less that of the launch, in joules."""
     # sin(a) - sin(b) as a product: the difference of two heights would round the answer away.
     fall = 2 * np.sin((START - angles) / 2) * np.cos((START + angles) / 2)
     return speeds**2 / 2 - G * LENGTH * fall

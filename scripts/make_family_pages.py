@@ -79,7 +79,7 @@ EXAMPLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...]], str]] = {
 
 
 def page(name: str) -> str:
-    """The page of one family."""
+    """Return the page of one family."""
     given, named, module = EXAMPLES.get(name, ((), {}, MODULES.get(name, name)))
     curve: Curve = getattr(gqm.families, name)(*given, **named)
     spelled = [_quoted(text) for text in given]
@@ -120,7 +120,7 @@ def _conventions(model: Model) -> str:
 
 
 def pages() -> dict[Path, str]:
-    """All pages by their files."""
+    """Return all pages by their files."""
     names = list(REMARKS)
     index = [
         "# Families of curves",

@@ -29,7 +29,7 @@ def legendre_row(x, count):
 
 
 def kronrod_nodes():
-    """The nodes of the rule that are not negative."""
+    """Return the nodes of the rule that are not negative."""
     # E11 = sum of e_k P_k over odd k, with e_11 = 1: int P10 E11 P_j = 0 for j = 1, 3, 5, 7, 9.
     odd = [1, 3, 5, 7, 9]
 
@@ -50,7 +50,7 @@ def kronrod_nodes():
 
 
 def show(name, values):
-    """One array as text, four numbers a line."""
+    """Return one array as text, four numbers a line."""
     print(f"{name} = np.array(\n    [")
     for i in range(0, len(values), 4):
         print("        " + ", ".join(repr(float(v)) for v in values[i : i + 4]) + ",")

@@ -124,7 +124,7 @@ def options() -> list[str]:
 
 
 def in_tests(file: Path) -> str:
-    """The name of a file of tests: its path inside the folder of tests, without its suffix."""
+    """Return the name of a file of tests: its path inside the folder of tests, without its suffix."""
     return file.relative_to(ROOT / "tests").with_suffix("").as_posix()
 
 
@@ -202,7 +202,7 @@ LEFT_OUT_STATEMENTS = (ast.Assign, ast.AugAssign, ast.Expr, ast.Continue, ast.Br
 
 
 def changed_number(value: complex | str | bytes | None) -> Any:
-    """Another number: the next one, or a tolerance or limit ten thousand times as large or small."""
+    """Return another number: the next one, or a tolerance or limit ten thousand times as large or small."""
     if isinstance(value, bool):
         return not value
     if isinstance(value, int):
@@ -228,7 +228,7 @@ def places(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def changes(tree: ast.Module) -> Iterator[tuple[int, str]]:
-    """Where a change can be made: a node's number among `places`, and the kind of change."""
+    """Return where a change can be made: a node's number among `places`, and the kind of change."""
     for number, node in enumerate(places(tree)):
         if isinstance(node, ast.Compare) and len(node.ops) == 1:
             yield number, "swap"
@@ -247,7 +247,7 @@ def changes(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 
 def mutated(tree: ast.Module, number: int, kind: str) -> tuple[ast.Module, ast.AST, str, str]:
-    """A copy of the tree with one change; the node that stands there now, and both spelled out."""
+    """Return a copy of the tree with one change; the node that stands there now, and both spelled out."""
     tree = copy.deepcopy(tree)
     node: Any = next(node for k, node in enumerate(places(tree)) if k == number)
     before = ast.unparse(node).split("\n")[0]
@@ -304,7 +304,7 @@ def quiet(tests: list[str], path: Path, tree: ast.Module, seconds: float) -> str
 
 
 def users(path: Path, trees: dict[Path, ast.Module]) -> list[str]:
-    """A file, or where it has no functions the files that import it."""
+    """Return a file, or if it has no functions the files that import it."""
     if any(isinstance(node, ast.FunctionDef) for node in ast.walk(trees[path])):
         return [path.relative_to(ROOT).as_posix()]
     module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -314,7 +314,7 @@ def users(path: Path, trees: dict[Path, ast.Module]) -> list[str]:
 
 
 def meeting(tests: list[str], taken: dict[str, float]) -> Iterator[tuple[list[str], float]]:
-    """The tests of each round, and how long they take: the quickest of each file first, as they are alike."""
+    """Return the tests of each round, and how long they take: the quickest of each file first, as they are alike."""
     files = defaultdict(list)
     for test in sorted(tests, key=lambda test: taken[test]):
         files[test.split("::")[0]].append(test)

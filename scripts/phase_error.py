@@ -124,7 +124,7 @@ def integrated(method: Method) -> list[Point]:
 
 
 def truth(phase: mpf) -> tuple[mpf, mpf]:
-    """The angle from the vertical and its rate, at a phase of the period after release."""
+    """Return the angle from the vertical and its rate, at a phase of the period after release."""
     u, k = mp.sqrt(G) * phase * PERIOD, mp.sqrt(K2)
     sn, cn, dn = (mp.ellipfun(name, u, m=K2) for name in ("sn", "cn", "dn"))
     half = mp.asin(k * cn / dn)
@@ -132,7 +132,7 @@ def truth(phase: mpf) -> tuple[mpf, mpf]:
 
 
 def tabulated(lam_at: Callable[[mpf], float]) -> list[Point]:
-    """Largest phase errors of a function of time, over the phases looked at."""
+    """Return the largest phase errors of a function of time, over the phases examined."""
     points = []
     for n in (10**k for k in range(10)):
         worst = mpf(0)

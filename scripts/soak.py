@@ -73,7 +73,7 @@ PROGRESS = 5_000
 
 
 def drawn(module: ModuleType, draw: random.Random) -> dict[str, Any]:
-    """A launch and parameters, of many sizes."""
+    """Return a launch and parameters, of many sizes."""
     values: dict[str, Any] = {}
     for name, default in module.PARAMETERS.items():
         value = 1.0 if default is None else float(quotient(default))
@@ -87,7 +87,7 @@ def drawn(module: ModuleType, draw: random.Random) -> dict[str, Any]:
 
 
 def quotient(text: str) -> float:
-    """The value of a default, which may be a quotient."""
+    """Return the value of a default, which may be a quotient."""
     top, _, bottom = text.partition("/")
     return float(top) / float(bottom or 1)
 
@@ -196,7 +196,7 @@ def speed_squared(
 
 
 def exactly(module: ModuleType, lam: Any, launch: dict[str, Any]) -> tuple[Any, float]:
-    """V**2 at places from exact heights, and the rounding of a chart."""
+    """Return V**2 at places from exact heights, and the rounding of a chart."""
     with mp.workdps(40):
         p = tuple(mpf(launch[name]) for name in module.PARAMETERS)
         start, *heights = (lost(module, float(place), launch, p) for place in (launch["lam0"], *lam))

@@ -53,7 +53,7 @@ class Family:
 
 
 def _signed(draw: random.Random, low: float, high: float) -> float:
-    """A number of either sign, its logarithm evenly distributed."""
+    """Return a number of either sign, its logarithm evenly distributed."""
     return draw.choice((1.0, -1.0)) * 10.0 ** draw.uniform(low, high)
 
 
@@ -150,7 +150,7 @@ FAMILIES = {
 
 
 def build(folder: str | Path) -> dict[str, ModuleType]:
-    """The module of each family."""
+    """Return the module of each family."""
     return {
         name: gqm.build(gqm.derive(family.curve, family.force), name=f"soaked_{name}", folder=folder)
         for name, family in FAMILIES.items()
@@ -158,7 +158,7 @@ def build(folder: str | Path) -> dict[str, ModuleType]:
 
 
 def drawn(draw: random.Random) -> tuple[str, dict[str, Any]]:
-    """A family with a launch, of many sizes; one in three nearly reaches an equilibrium."""
+    """Return a family with a launch, of many sizes; one in three nearly reaches an equilibrium."""
     name = draw.choice(list(FAMILIES))
     family = FAMILIES[name]
     p = {**family.draw(draw), "g": draw.choice((9.81, 1.62))}
@@ -174,7 +174,7 @@ def drawn(draw: random.Random) -> tuple[str, dict[str, Any]]:
 
 
 def equilibrium(family: Family, lam0: float, p: dict[str, float]) -> float | None:
-    """A maximum of the potential near a place, if steps in doubles come upon one."""
+    """Return a maximum of the potential near a place, if steps in doubles come upon one."""
     step, x = 0.05, lam0
     before, here = (float(family.potential(mpf(place), p)) for place in (x - step, x))
     for _ in range(80):
@@ -186,7 +186,7 @@ def equilibrium(family: Family, lam0: float, p: dict[str, float]) -> float | Non
 
 
 def times(family: Family, p: dict[str, Any], ends: tuple[Any, Any], energy: Any, edges: list[Any]) -> list[Any]:
-    """The time between each two neighbours of phase angles, between the turning points ``ends``."""
+    """Return the time between each two neighbours of phase angles, between the turning points ``ends``."""
     a, b = ends
     nodes = _nodes()
 
@@ -210,7 +210,7 @@ def times(family: Family, p: dict[str, Any], ends: tuple[Any, Any], energy: Any,
 
 
 def _nodes() -> list[tuple[Any, Any]]:
-    """The Gauss-Legendre rule of `NODES` nodes, by Newton's method from its nodes in doubles."""
+    """Return the Gauss-Legendre rule of `NODES` nodes, by Newton's method from its nodes in doubles."""
     for guess in () if _RULE else np.polynomial.legendre.leggauss(NODES)[0].tolist():
         x = mpf(guess)
         for _ in range(3):
@@ -254,7 +254,7 @@ def faults(module: ModuleType, family: Family, call: dict[str, Any]) -> tuple[li
 
 
 def root(family: Family, p: dict[str, Any], energy: Any, guess: float, start: Any, v0: float) -> Any:
-    """The turning point that a double is the rounding of; the launch from rest is one itself."""
+    """Return the turning point that a double is the rounding of; the launch from rest is one itself."""
     if v0 == 0.0 and guess == float(start):
         return start
     x = mpf(guess)

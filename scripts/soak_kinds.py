@@ -55,7 +55,7 @@ Kind = Callable[[random.Random, Modules], tuple[list[str], int]]
 
 
 def build(folder: str | Path) -> Modules:
-    """The modules of all kinds."""
+    """Return the modules of all kinds."""
     gravity, line = gqm.Gravity(), gqm.Curve.graph("a*x", parameter="x")
     level = gqm.Curve.graph("0*x", parameter="x", domain=(None, None))
     planes = gqm.Curve.sampled(POINTS, kind="linear")
@@ -87,12 +87,12 @@ def build(folder: str | Path) -> Modules:
 
 
 def log_uniform(draw: random.Random, low: float, high: float) -> float:
-    """A positive number whose decimal logarithm is evenly distributed."""
+    """Return a positive number whose decimal logarithm is evenly distributed."""
     return 10.0 ** draw.uniform(low, high)
 
 
 def signed(draw: random.Random, low: float, high: float) -> float:
-    """The same with either sign."""
+    """Return the same with either sign."""
     return draw.choice((1.0, -1.0)) * log_uniform(draw, low, high)
 
 
@@ -175,7 +175,7 @@ def fall(modules: Modules, launch: dict[str, Any], draw: random.Random) -> tuple
 
 
 def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """A spring with viscous damping, on the level, over many decades of amplitude, speed and damping."""
+    """Check springs with viscous damping, on the level, over many decades of amplitude, speed and damping."""
     lam0, direction = signed(draw, -9.0, 1.0), draw.choice((1, -1))
     k, c = log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.5)
     v0 = 0.0 if draw.random() < 0.5 else log_uniform(draw, -9.0, 1.0) * abs(lam0)
@@ -190,7 +190,7 @@ def damp(modules: Modules, launch: dict[str, Any], draw: random.Random, last: fl
 
 
 def spring(direction: int, lam0: Any, v0: Any, k: Any, c: Any) -> Truth:
-    """The place on a damped spring, by time."""
+    """Return the place on a damped spring, by time."""
     root = mp.sqrt(mp.mpc(c**2 / 4 - k))
     one, two = -c / 2 + root, -c / 2 - root
     share = (direction * v0 - two * lam0) / (one - two)
@@ -198,7 +198,7 @@ def spring(direction: int, lam0: Any, v0: Any, k: Any, c: Any) -> Truth:
 
 
 def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """A pendulum that swings or goes round, near its separatrix too."""
+    """Check pendulums that swing or go round, near the separatrix too."""
     lam0 = draw.uniform(-3.0, 3.0)
     top = 2.0 * float(G) * (1.0 + np.cos(lam0))
     near = draw.choice((0.0, signed(draw, -8.0, -0.5), signed(draw, -2.0, 1.0)))
@@ -342,7 +342,7 @@ def hills(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def coils(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Along a helix about a level axis: a pendulum whose path is longer."""
+    """Check helices about a level axis, along which a body is a pendulum with a longer path."""
     lam0, radius, pitch = signed(draw, -6.0, 0.45), log_uniform(draw, -1.0, 1.0), log_uniform(draw, -2.0, 1.0)
     motion = modules["coil"].solve(lam0, R=radius, c=pitch)
     rate = mp.sqrt(mpf(G) * mpf(radius) / (mpf(radius) ** 2 + mpf(pitch) ** 2))
@@ -358,7 +358,7 @@ def coils(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def gradients(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Derivatives of pendulums' periods and actions, solved and swept, and of damped springs' places."""
+    """Check derivatives of pendulums' periods and actions, solved and swept, and of damped springs' places."""
     lam0, v0, direction = draw.uniform(0.01, 3.0), draw.uniform(0.0, 12.0), draw.choice((1, -1))
     names, found = ("lam0", "v0", "g"), []
     motion = modules["circle"].solve(lam0, v0, direction)
@@ -393,13 +393,13 @@ def unequal(what: str, slopes: Any, true: Any, allowed: float) -> list[str]:
 
 
 def pendulum_period(lam0: Any, v0: Any, g: Any) -> Any:
-    """The period of a pendulum of one metre."""
+    """Return the period of a pendulum of one metre."""
     m = v0**2 / (4 * g) + mp.sin(lam0 / 2) ** 2
     return 4 * mp.ellipk(m) / mp.sqrt(g) if m < 1 else 2 * mp.ellipk(1 / m) / mp.sqrt(g * m)
 
 
 def pendulum_action(lam0: Any, v0: Any, g: Any) -> Any:
-    """The integral of V ds over the period of such a pendulum."""
+    """Return the integral of V ds over the period of such a pendulum."""
     m = v0**2 / (4 * g) + mp.sin(lam0 / 2) ** 2
     if m > 1:
         return 8 * mp.sqrt(g * m) * mp.ellipe(1 / m)
@@ -407,7 +407,7 @@ def pendulum_action(lam0: Any, v0: Any, g: Any) -> Any:
 
 
 def sweeps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Sweeps against solved motions in two wells, next to the separatrix between them."""
+    """Check sweeps against solved motions in two wells, next to the separatrix between them."""
     module, t = modules["wells"], draw.choice((0.0, draw.uniform(-0.3, 0.3)))
     lam0 = draw.uniform(-1.6, 1.6)
     hill = float(np.roots([1.0, 0.0, -1.0, t]).real[np.abs(np.roots([1.0, 0.0, -1.0, t])).argmin()])
@@ -487,7 +487,7 @@ def pipes(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def trains(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """A train on a circle: a pendulum whose gravity is less by the mean of the cosine over its length."""
+    """Check trains on a circle, which are pendulums whose gravity is less by the mean of the cosine over the length."""
     lam0, radius, share = signed(draw, -6.0, 0.45), log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.3)
     size = share * radius
     motion = modules["train"].solve(lam0 * radius, R=radius, ell=size)
