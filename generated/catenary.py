@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 12, input 2558bd3a8d44, body eb7b42be4eb5
+# interface 12, input 2558bd3a8d44, body cf289de013c1
 """Bead on a hanging chain
 
 x              = x
@@ -155,7 +155,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -205,7 +205,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Sweep":

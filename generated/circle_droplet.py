@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 12, input 38113942f710, body 8bb3818f8971
+# interface 12, input 38113942f710, body 70594a0d8f33
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -146,7 +146,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -197,7 +197,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '0.02', gamma: Any = '0.072',
     ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6', **unknown: Any,
 ) -> "Sweep":

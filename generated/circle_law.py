@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 12, input 2718db879066, body 5de7b850afb5
+# interface 12, input 2718db879066, body 6fce40a5f814
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -149,7 +149,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -200,7 +200,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '1', c1: Any = '0.05',
     c2: Any = '0.01', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 12, input 350ae6cf923a, body d3901373f20a
+# interface 12, input 350ae6cf923a, body b7b4c2bfd450
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -153,7 +153,7 @@ def exact_axes(op, p):
     return -op.pi, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -203,7 +203,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Sweep":

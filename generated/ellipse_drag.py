@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 12, input f2717a5ad91f, body 09ba9c1976c8
+# interface 12, input f2717a5ad91f, body 260f31ea0b60
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -158,7 +158,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -209,7 +209,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '1.5', b: Any = '1',
     b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any,
 ) -> "Sweep":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input 3f2dfaf376e9, body 442b8451ecef
+# interface 12, input 3f2dfaf376e9, body cda24fd9972b
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -219,7 +219,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '2', c: Any = '-1.1', mu: Any = '0.2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1InSpace:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '2', c: Any = '-1.1', mu: Any = '0.2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1InSpace:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -270,7 +270,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, R: Any = '2', c: Any = '-1.1',
     mu: Any = '0.2', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":

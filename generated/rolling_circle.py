@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 12, input 2a76ceb4277a, body 1c824d5c2b8d
+# interface 12, input 2a76ceb4277a, body e4c2273299d1
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -154,7 +154,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -204,7 +204,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '2', beta: Any = '2/5',
     g: Any = '9.81', m: Any = '0.3', **unknown: Any,
 ) -> "Sweep":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 12, input 33421e752297, body 094537c86a71
+# interface 12, input 33421e752297, body 9785f08710c6
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -152,7 +152,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -202,7 +202,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '0.6', Omega: Any = '2.5',
     g: Any = '9.81', m: Any = '1.4', **unknown: Any,
 ) -> "Sweep":

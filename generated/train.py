@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 12, input b87305fcd75e, body 425cc23adeb0
+# interface 12, input b87305fcd75e, body a404514c5a09
 """A train of five cars on hills
 
 x              = x(s)
@@ -185,7 +185,7 @@ def exact_factors(op, p):
     return g, g
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, length: Any = '6', g: Any = '9.81', m: Any = '4000', **unknown: Any) -> Pass1:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, length: Any = '6', g: Any = '9.81', m: Any = '4000', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -235,7 +235,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, length: Any = '6', g: Any = '9.81',
     m: Any = '4000', **unknown: Any,
 ) -> "Sweep":

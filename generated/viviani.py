@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 12, input c93b8a64a5a5, body 436c932fec94
+# interface 12, input c93b8a64a5a5, body 205b92f12f1d
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -203,7 +203,7 @@ def exact_axes(op, p):
     return -op.pi, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1InSpace:
+def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1InSpace:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -253,7 +253,7 @@ def solve(
 
 
 def sweep(
-    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    quantity: Any = None, lam0: Any = None, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
     contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Sweep":

@@ -177,7 +177,7 @@ class _Equations:
 
     def _of_sum(self, form: sp.Add) -> _Form | None:
         with_parameters = [term for term in form.args if self._has_parameters(term)]
-        told = [found for term in with_parameters if (found := self._of(term)) is not None]
+        known = [found for term in with_parameters if (found := self._of(term)) is not None]
         others = [self._of(term) for term in form.args if term not in with_parameters]
         numbers = any(other is not None and other.is_number for other in others)
         # for example cos(u) - ecc: the cosine is a number without a unit, while a 1 may stand for a quantity with one
@@ -187,15 +187,15 @@ class _Equations:
         )
         lengths = [other for other in others if other is not None and not other.is_number]
         hidden = None in others or (numbers and lengths) or any(length != lengths[0] for length in lengths)
-        for one in told[1:]:
-            self._same(one, told[0])
-        if told:
+        for one in known[1:]:
+            self._same(one, known[0])
+        if known:
             moving = any(symbol.name in self.variables for term in with_parameters for symbol in term.free_symbols)
             if not hidden and lengths:
-                self._same(told[0], lengths[0])
+                self._same(known[0], lengths[0])
             elif not hidden and numbers and (moving or waves):
-                self._same(told[0], _Form({}))
-            return told[0]
+                self._same(known[0], _Form({}))
+            return known[0]
         if hidden or with_parameters:
             return None
         return lengths[0] if lengths else _Form({})

@@ -42,7 +42,7 @@ MAX_NAME = 60
 
 # The largest size in bits of all rational numbers that one operation may combine into one, and of any number in a
 # result. SymPy searches for the factors of a number of which it takes a root, which takes seconds for 3000 bits.
-_MAX_MELTED_BITS = 2**17
+_MAX_COMBINED_BITS = 2**17
 _MAX_BITS = 1400
 # The largest exponent of anything but a name or a number. SymPy multiplies powers out on many occasions, which can take
 # half a minute for (x - 1)**999.
@@ -287,7 +287,7 @@ class _SymPy:
             raise ValueError(f"SymPy cannot take {function} of it") from error
 
 
-def _check_bits(operands: list[sp.Expr], *, times: int = 1, most: int = _MAX_MELTED_BITS) -> None:
+def _check_bits(operands: list[sp.Expr], *, times: int = 1, most: int = _MAX_COMBINED_BITS) -> None:
     bits = sum(
         max(number.p.bit_length(), number.q.bit_length())
         for operand in operands

@@ -24,10 +24,10 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Returns
     -------
     callable
-        ``f(lam0, v0=0.0, **parameters)``: launch place and speed in m/s and run-time parameters, numbers or arrays
-        that broadcast; the half period in s, NaN where the motion has none. Its derivatives by all of them are those of
-        ``module.sweep(..., gradient=...)``, in forward and reverse mode. It is computed in doubles, and returned in
-        JAX's precision: set ``jax_enable_x64`` to keep all digits.
+        ``f(lam0, v0=0.0, **parameters)``: launch place and speed in m/s and run-time parameters, numbers or arrays that
+        broadcast; the half period in s, NaN where the motion has none. Its derivatives with respect to all of them are
+        those of ``module.sweep(..., gradient=...)``, in forward and reverse mode. It is computed in doubles, and
+        returned in JAX's precision: set ``jax_enable_x64`` to keep all digits.
 
     Raises
     ------

@@ -221,14 +221,14 @@ def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Exp
 
 def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> str:
     """Return parameters with their defaults and units on one line, such as ``L = 2 m, b (1/m, no default)``."""
-    told = []
+    entries = []
     for name, value in defaults.items():
         unit = "" if units.get(name, "1") == "1" else units[name]
         if value is None:
-            told.append(f"{name} ({unit + ', ' if unit else ''}no default)")
+            entries.append(f"{name} ({unit + ', ' if unit else ''}no default)")
         else:
-            told.append(f"{name} = {value} {unit}".rstrip())
-    return ", ".join(told) or "none"
+            entries.append(f"{name} = {value} {unit}".rstrip())
+    return ", ".join(entries) or "none"
 
 
 def is_positive(value: Value | None) -> bool:

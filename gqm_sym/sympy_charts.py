@@ -2,7 +2,7 @@
 
 A curve that is known as numbers only (implicit, sampled or piecewise) has no formula x(s). These functions stand for
 the rows of its chart: they are printed as ``x(s)``, and lowered to calls of the chart. A track in space has a chart of
-each coordinate, with its first three derivatives by arc length, and may have one of its roll angle.
+each coordinate, with its first three derivatives with respect to arc length, and may have one of its roll angle.
 """
 
 from typing import ClassVar
@@ -57,7 +57,8 @@ class chart_kappa(ChartFunction):
 
 
 class SpaceFunction(ChartFunction):
-    """A coordinate of a charted curve in space or its roll angle, or one of their derivatives by arc length.
+    """A coordinate of a charted curve in space or its roll angle, or one of their derivatives with respect to arc
+    length.
 
     Attributes
     ----------
@@ -71,7 +72,7 @@ class SpaceFunction(ChartFunction):
     order: ClassVar[int]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative by arc length."""
+        """Return the derivative with respect to arc length."""
         heads = SPACE_CHARTS[self.axis]
         if self.order + 1 == len(heads):
             raise DerivationError(f"{self}: no derivative of it is known")
@@ -91,7 +92,7 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
     Attributes
     ----------
     by_speed, by_place
-        The functions for its derivatives by V**2 and by the place; None if they are not known.
+        The functions for its derivatives with respect to V**2 and the place; None if they are not known.
     """
 
     nargs = 5
@@ -100,7 +101,7 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
     by_place: "ClassVar[type[TrainLoad] | None]" = None
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative by the place, or by V**2."""
+        """Return the derivative with respect to the place, or V**2."""
         head = (self.by_place, self.by_speed)[argindex - 1] if argindex <= 2 else None
         if head is None:
             raise DerivationError(f"{self}: no derivative of it is known")
@@ -108,11 +109,11 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
 
 
 class train_load_slope(TrainLoad):
-    """The derivative of `train_load` by V**2."""
+    """The derivative of `train_load` with respect to V**2."""
 
 
 class train_load_rate(TrainLoad):
-    """The derivative of `train_load` by the place."""
+    """The derivative of `train_load` with respect to the place."""
 
 
 class train_load(TrainLoad):
@@ -122,7 +123,7 @@ class train_load(TrainLoad):
 
 
 class train_load_slope_in_plane(TrainLoad):
-    """The derivative of `train_load_in_plane` by V**2."""
+    """The derivative of `train_load_in_plane` with respect to V**2."""
 
 
 class train_load_in_plane(TrainLoad):

@@ -26,8 +26,8 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     callable
         ``f(lam0, v0=0.0, **parameters)``: launch place and speed in m/s and run-time parameters, numbers or tensors
         that broadcast; the half period in s as a tensor of doubles on the device of the first tensor, NaN where the
-        motion has none. Its derivatives by all of them are those of ``module.sweep(..., gradient=...)``, in forward and
-        reverse mode. It is computed on the processor.
+        motion has none. Its derivatives with respect to all of them are those of ``module.sweep(..., gradient=...)``,
+        in forward and reverse mode. It is computed on the processor.
 
     Raises
     ------
@@ -66,8 +66,8 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
     import torch
 
     class Swept(torch.autograd.Function):  # type: ignore[misc, unused-ignore]
-        """A sweep as one step of PyTorch: the values or, with names ``wrt``, the derivatives by these, with one more
-        axis.
+        """A sweep as one step of PyTorch: the values or, with names ``wrt``, the derivatives with respect to these,
+        with one more axis.
         """
 
         @staticmethod

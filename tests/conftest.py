@@ -1,4 +1,4 @@
-"""Fixtures of the whole suite: generated modules and motions, each made once a session."""
+"""Fixtures of the whole suite give generated modules and motions, each made once in a session."""
 
 import gc
 import os
@@ -15,20 +15,20 @@ from problems import PROBLEMS, TRACKS, Problem
 
 from gqm_sym.runtime.compiled import jit
 
-# The first example of a test may compile for seconds; and a failure must show again.
+# The first example of a test may compile for seconds, and a failure must be reproducible.
 settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("suite")
 
-# Hypothesis also draws numbers that stand in the text of modules, of all that are imported so far: what a test draws
-# would depend on the tests before it in the same worker.
+# Hypothesis also draws numbers from the text of all modules imported so far, so that what a test draws would depend on
+# the tests before it in the same worker.
 if hasattr(providers, "is_local_module_file"):
     providers.is_local_module_file = lambda _: False
 
-# On a machine that others use compiling takes any time, and tests look at what is said on standard error.
+# On a busy machine compiling may take any time, and tests check what is printed on standard error.
 jit.ANNOUNCER.seconds = 1e6
 
-# A worker comes to hold a million objects of SymPy and numba; to look through them as often as usual takes a twelfth of
-# the time.
+# A worker has up to a million objects of SymPy and numba; collecting garbage as often as usual takes a twelfth of the
+# time.
 gc.set_threshold(100_000, 20, 50)
 
 if numba.config.DISABLE_JIT:
@@ -49,7 +49,7 @@ def generated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def module_of(generated_folder: Path) -> Callable[[str], ModuleType]:
-    """Give the generated module of a track under gravity, by the track's name."""
+    """Return the generated module of a track under gravity, by the track's name."""
     import gqm_sym as gqm
 
     built: dict[str, ModuleType] = {}
@@ -80,7 +80,7 @@ def build(generated_folder: Path) -> Callable[..., ModuleType]:
 
 @pytest.fixture(scope="session")
 def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any]:
-    """Give the motion of a problem, solved once."""
+    """Return the motion of a problem, solved once."""
     solved: dict[str, Any] = {}
 
     def motion(problem: Problem) -> Any:
@@ -93,5 +93,5 @@ def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any
 
 @pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS)
 def problem(request: pytest.FixtureRequest) -> Problem:
-    """Each problem of the table in turn."""
+    """Return each problem of the table in turn."""
     return request.param

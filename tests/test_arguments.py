@@ -34,7 +34,7 @@ SPACE = (*COIL, "period", "domain", "parameters", "title", "roll", "heartline")
 
 @cache
 def parabola():
-    """A model, derived when it is first needed."""
+    """Return a model, derived when it is first needed."""
     return gqm.derive(TRACK, FORCE)
 
 
@@ -112,7 +112,7 @@ CALLS = {
 
 @pytest.mark.parametrize("call", CALLS)
 def test_whatever_is_given_is_understood_or_refused_clearly(call):
-    """No error of Python's, NumPy's or SymPy's own comes through, and each message says what was wrong."""
+    """No error of Python's, NumPy's or SymPy's own is raised, and each message says what was wrong."""
     for thing in THINGS:
         try:
             CALLS[call](thing)
@@ -125,7 +125,7 @@ CIRCLE, DRAG = (import_module(f"generated.{name}") for name in ("circle", "circl
 SWUNG = np.linspace(0.0, 3.0, 12)
 DIPS = {"t": SWUNG, "lam": 0.8 * np.cos(3.0 * SWUNG)}
 
-# Made when they are first needed; the same for all calls.
+# These are made when they are first needed, and are the same for all calls.
 MOTIONS = {
     "libration": lambda: CIRCLE.solve(1, L=1),
     "circulation": lambda: CIRCLE.solve(0, 8, L=1),
@@ -201,7 +201,7 @@ LAUNCHED = {
     "minimise limits": lambda v: gqm.design.minimise("period", None, FORCE, free={}, limits=v, lam0=1),
 }
 
-# Together with these, what raised errors of Python's, NumPy's or pandas' own.
+# Together with these, they raised errors of Python's, NumPy's or pandas' own.
 HOSTILE = (
     *THINGS[:-10],
     *("pi", "30 deg", "5 kg", "1/0", "sqrt(-1)", "1e400", 1e308, 1e-320, 10**400, Fraction(1, 3), Decimal("NaN")),
@@ -223,7 +223,7 @@ def refused_clearly(call, thing, shown):
 @pytest.mark.filterwarnings("ignore:Warning. converting a masked element")
 @pytest.mark.parametrize("name", MOTIONS)
 def test_whatever_a_motion_is_asked_is_answered_or_refused_clearly(name):
-    """A sample of the questions with hostile times, places, names and numbers, another one for each motion."""
+    """The questions are a sample with hostile times, places, names and numbers, another one for each motion."""
     motion, draw = MOTIONS[name](), random.Random(name)
     for call, ask in ASKED.items():
         for thing in draw.sample(HOSTILE, 4):
@@ -232,7 +232,7 @@ def test_whatever_a_motion_is_asked_is_answered_or_refused_clearly(name):
 
 @pytest.mark.filterwarnings("ignore:Warning. converting a masked element")
 def test_whatever_is_launched_is_understood_or_refused_clearly():
-    """A sample of hostile launches, sweeps, fits, uncertainties and designs."""
+    """The calls are a sample of hostile launches, sweeps, fits, uncertainties and designs."""
     draw = random.Random(19)
     for name, call in LAUNCHED.items():
         for thing in draw.sample(HOSTILE, 3):
@@ -267,7 +267,7 @@ def test_whatever_is_launched_is_understood_or_refused_clearly():
     ],
 )
 def test_what_raised_errors_of_others_is_refused(asked, thing):
-    """Each of these was met by a random search of the calls above."""
+    """A random search of the calls above found each of these."""
     call = LAUNCHED[asked] if asked in LAUNCHED else partial(ASKED[asked], MOTIONS["libration"]())
     with pytest.raises(GQMError, match=": "):
         call(thing)
@@ -287,13 +287,13 @@ RISE = [(0, 0, 5), (1, 0.2, 4), (2, 0.1, 3), (3, 0, 3.5), (4, 0.3, 4), (5, 0, 4.
     ],
 )
 def test_what_has_no_end_is_no_list(call, message):
-    """Such lists filled the memory; a span of time was no whole number by an error of Python's."""
+    """Lists without end are refused (they filled the memory), and so is a span of time that is no whole number."""
     with pytest.raises(GQMError, match=f"^{message}"):
         call()
 
 
 def test_questions_without_an_answer_take_no_time():
-    """A circulation has no events in any period, however many of them are asked about."""
+    """A circulation has no events in any period, whatever number of them is asked for."""
     assert CIRCLE.solve(0, 8, L=1).events_between(0, 1e17) == ()
 
 
@@ -331,7 +331,7 @@ def test_the_message_names_the_remedy(call, message):
 
 
 def test_kernels_can_be_summed():
-    """Python's sum() begins with 0."""
+    """Python's sum() begins with 0, which may be added to a kernel."""
     assert sum([gqm.Gravity(), gqm.QuadraticDrag()]) == gqm.Gravity() + gqm.QuadraticDrag()
 
 
@@ -340,7 +340,9 @@ def test_kernels_can_be_summed():
 
 @pytest.mark.parametrize("name", sorted(RESERVED_NAMES))
 def test_reserved_names_are_refused_everywhere(name, tmp_path):
-    """In Python as in YAML, before anything is built with them; a curve's own parameter alone may be called lam."""
+    """In Python as in YAML reserved names are refused before anything is built; only a curve's own parameter may be
+    called lam.
+    """
     for declare in (
         lambda: gqm.Curve.graph(f"{name}*x**2"),
         lambda: gqm.Curve.implicit(f"x - {name}*z", start=(0, 0)),
@@ -361,7 +363,7 @@ def test_reserved_names_are_refused_everywhere(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["numpy", "numba", "math", "json", "gqm_sym", "pytest", "sys", "class"])
 def test_a_module_hides_no_other(name, tmp_path):
-    """`name="numpy"` would be imported for NumPy from then on, in a folder that Python looks into."""
+    """A name such as "numpy" is refused, because the module would be imported instead of NumPy from its folder."""
     with pytest.raises(InputError, match=name):
         gqm.build(gqm.derive(TRACK, FORCE), name=name, folder=tmp_path)
     path = tmp_path / "curve.yaml"
@@ -383,7 +385,7 @@ def test_a_module_of_ones_own_may_be_made_again(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("domain", [(1, 0), (1, 1), ("pi", 3), ("a", "-a"), (0, "a - 2")])
 def test_a_reversed_domain_is_refused(domain):
-    """As soon as defaults make numbers of its ends."""
+    """A reversed domain is refused as soon as defaults give numbers for its ends."""
     for declare in (
         lambda: gqm.Curve.graph("a*x**2", domain=domain, parameters={"a": 2}),
         lambda: gqm.derive(gqm.Curve.graph("a*x**2", domain=domain), FORCE, parameters={"a": 2}),
@@ -393,7 +395,7 @@ def test_a_reversed_domain_is_refused(domain):
 
 
 def test_an_undecided_domain_is_no_mistake():
-    """Ends that are known at run time only are left to it."""
+    """Ends that are known at run time only are checked then."""
     assert gqm.Curve.graph("a*x**2", domain=("a", "-a")).domain[0].name == "a"
 
 
@@ -401,7 +403,7 @@ def test_an_undecided_domain_is_no_mistake():
 
 
 class Table(dict):
-    """A stand-in for a DataFrame, with all that `Curve.sampled` needs of one."""
+    """A substitute for a DataFrame, with all that `Curve.sampled` needs of one."""
 
     @property
     def columns(self):
@@ -428,7 +430,7 @@ def test_points_are_taken_in_any_shape(make):
 
 
 def test_a_data_frame_is_a_table():
-    """With whichever columns beside x and z."""
+    """A data frame may have other columns in addition to x and z."""
     pandas = pytest.importorskip("pandas")
     frame = pandas.DataFrame({"z": Z, "note": "a", "x": X})
     assert gqm.Curve.sampled(frame) == gqm.Curve.sampled(X, Z)
@@ -446,8 +448,8 @@ def test_a_data_frame_is_a_table():
         ({"x": X, "z": Z[:-1]}, "one length"),
     ],
 )
-def test_points_in_the_wrong_shape_are_told_the_right_one(points, message):
-    """Two rows of many numbers are two columns lying down."""
+def test_points_in_the_wrong_shape_get_the_right_one(points, message):
+    """Two rows of many numbers are refused, and the message says how to transpose them."""
     with pytest.raises(DeclarationError, match=message):
         gqm.Curve.sampled(points)
 
@@ -455,7 +457,9 @@ def test_points_in_the_wrong_shape_are_told_the_right_one(points, message):
 @pytest.mark.parametrize("degrees", [21, 30, 60, 89])
 @pytest.mark.parametrize("count", [8, 40])
 def test_a_zigzag_is_refused(degrees, count):
-    """The spline's lengths never settle on one: SciPy was asked, and answered of collocation matrices."""
+    """The spline's lengths do not converge through a zigzag (an error of SciPy's about collocation matrices was
+    raised).
+    """
     height = math.tan(math.radians(degrees / 2))
     with pytest.raises(DeclarationError, match=r"row 2: .*to and fro"):
         gqm.Curve.sampled([(i, height * (i % 2)) for i in range(count)])
@@ -465,7 +469,7 @@ def test_a_zigzag_is_refused(degrees, count):
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.6), kind=st.sampled_from(["line", "ring"]))
 def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):
-    """Noise of any size: a chart whose pieces have lengths, or one clear error."""
+    """Noise of any size gives a chart whose pieces have lengths, or one clear error."""
     random_ = random.Random(seed)
     count = random_.randrange(6, 30)
     angle = [2 * math.pi * i / count for i in range(count)]
@@ -481,7 +485,7 @@ def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):
 
 
 def test_names_of_two_letters_are_suggested_too():
-    """One of them may be wrong; nothing is suggested where nothing is near."""
+    """One of two letters may be wrong; nothing is suggested if no name is near."""
     assert nearest("vo", ("lam0", "v0", "direction")) == "v0"
     assert nearest("Lam", ("lam0", "v0")) == "lam0"
     assert nearest("q", ("lam0", "v0")) is None
@@ -493,6 +497,6 @@ def test_names_of_two_letters_are_suggested_too():
 
 
 def test_a_file_of_points_is_to_be_read_first():
-    """Its name is not taken for rows."""
+    """The name of a file is not taken for rows."""
     with pytest.raises(DeclarationError, match=r"got 'survey.csv'; read a file first"):
         gqm.Curve.sampled("survey.csv")

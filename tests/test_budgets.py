@@ -1,4 +1,4 @@
-"""Budgets of processor time: they end what they should, say whose they were, and leave no trace."""
+"""Budgets of processor time end the right stage, name it, and leave nothing behind."""
 
 import gc
 import threading
@@ -21,7 +21,7 @@ def _work(steps: int) -> None:
 
 
 def test_without_a_budget_nothing_ends() -> None:
-    """Work that nobody limits goes on."""
+    """Work without a budget is not ended."""
     _work(1000)
 
 
@@ -34,7 +34,9 @@ def test_a_budget_ends_its_stage() -> None:
 
 
 def test_collecting_garbage_does_not_count() -> None:
-    """In a program of millions of objects it takes longer than a stage has; callbacks are taken back."""
+    """Garbage collection, which in a program of millions of objects takes longer than a stage has, does not count;
+    callbacks are removed.
+    """
     many, callbacks = [[[]] for _ in range(1_000_000)], len(gc.callbacks)
     begin = time.thread_time()
     with budget("reading", 0.005, "-"), budget("parsing", 0.005, "-"):
@@ -48,7 +50,7 @@ def test_collecting_garbage_does_not_count() -> None:
 
 @pytest.mark.parametrize(("outer", "inner", "named"), [(0.0, 60.0, "outer"), (60.0, 0.0, "inner")])
 def test_the_shorter_of_two_budgets_ends_the_work(outer: float, inner: float, named: str) -> None:
-    """A stage within a stage has no more time than what is around it, and the error names whose it was."""
+    """A stage within a stage has no more time than the outer one, and the error names the stage whose budget ended."""
     with pytest.raises(BudgetError, match=f"^{named}: "), budget("outer", outer, "-"), budget("inner", inner, "-"):
         _work(1_000_000)
 
@@ -81,13 +83,13 @@ def _stages() -> None:
 
 
 def test_time_apart_counts_for_no_stage() -> None:
-    """Neither the stage nor the one around it ends by what was taken apart; both end by their own afterwards."""
+    """Time that is excluded ends neither the stage nor the outer one; both end by their own time afterwards."""
     with pytest.raises(BudgetError, match=r"^outer: "):
         _stages()
 
 
 def test_a_budget_is_its_threads_own() -> None:
-    """Another thread's work is not ended by it."""
+    """Another thread's budget does not end the work of this one."""
     done = []
     with budget("reading", 0.0, "-"):
         thread = threading.Thread(target=lambda: done.append(_work(1000)))
@@ -96,7 +98,7 @@ def test_a_budget_is_its_threads_own() -> None:
     assert done == [None]
 
 
-# The stage, the launch it belongs to, and what is asked of the motion (None: the motion itself).
+# A row has the stage, its launch, and what is asked of the motion (None: the motion itself).
 ASKED: dict[str, tuple[str, str, Callable[[Any], object] | None]] = {
     "an equilibrium": ("search for turning points", "pi/2 - 1e-30", None),
     "a time": ("quadrature", "pi/2 - 1e-6", lambda motion: motion.lam(1e9)),

@@ -1,4 +1,4 @@
-"""Writing modules, whole or not at all, and importing them from wherever they lie."""
+"""Modules are written completely or not at all, and imported from any folder."""
 
 import errno
 import os
@@ -27,13 +27,13 @@ def emitted(z: str = "6*x**2", *, name: str = "bowl") -> str:
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    """Give the text of a small module."""
+    """Return the text of a small module."""
     return emitted()
 
 
 @pytest.fixture
 def path(text: str, tmp_path: Path) -> Path:
-    """Give the place of that module, written long ago."""
+    """Return the path of that module, written long ago."""
     target = tmp_path / "bowl.py"
     assert write_module(text, target)
     os.utime(target, (LONG_AGO, LONG_AGO))
@@ -41,17 +41,17 @@ def path(text: str, tmp_path: Path) -> Path:
 
 
 def names_in(folder: Path) -> list[str]:
-    """List a folder."""
+    """Return the names in a folder."""
     return sorted(entry.name for entry in folder.iterdir())
 
 
 def half_period(module: ModuleType) -> float:
-    """Give the half period of a small motion: π/sqrt(2*g*k) in the bowl k*x**2, but for 1e-10 of it."""
+    """Return the half period of a small motion, π/sqrt(2*g*k) in the bowl k*x**2, up to 1e-10 of it."""
     return module.solve("-1e-6").half_period
 
 
 def test_a_module_is_written_to_a_new_folder(text: str, tmp_path: Path) -> None:
-    """Folders on the way are made; the file holds the text with the usual permissions, alone."""
+    """Missing folders are created; the file has the text with the usual permissions, and there is no other file."""
     target = tmp_path / "one" / "two" / "bowl.py"
     assert write_module(text, target)
     assert target.read_bytes() == text.encode()
@@ -62,7 +62,7 @@ def test_a_module_is_written_to_a_new_folder(text: str, tmp_path: Path) -> None:
 
 
 def test_what_is_the_same_is_not_written(text: str, path: Path) -> None:
-    """The file keeps its time, so that nothing that watches it starts anew."""
+    """The file keeps its time, so that no program that watches it starts anew."""
     assert not write_module(text, path)
     assert path.stat().st_mtime == LONG_AGO
     assert not write_module(text, path, force=True)
@@ -70,7 +70,7 @@ def test_what_is_the_same_is_not_written(text: str, path: Path) -> None:
 
 
 def test_line_ends_of_another_system_are_no_difference(text: str, path: Path) -> None:
-    """A checkout with other line ends was not edited by hand."""
+    """A file with other line ends does not count as edited by hand."""
     path.write_bytes(text.replace("\n", "\r\n").encode())
     assert not write_module(text, path)
     assert difference(text, path) == ""
@@ -147,7 +147,7 @@ FULL = OSError(errno.ENOSPC, "No space left on device")
 def test_a_write_that_fails_changes_nothing(
     step: tuple[Any, str], error: BaseException, path: Path, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever fails, the old file or none is there, whole, and no other file beside it."""
+    """If writing fails, the old file or none is there, complete, and no other file beside it."""
     new = path.with_name("new.py")
     with monkeypatch.context() as patch:
         patch.setattr(*step, _failing(error))
@@ -161,7 +161,7 @@ def test_a_write_that_fails_changes_nothing(
 
 
 def test_text_that_cannot_be_encoded_changes_nothing(path: Path, text: str) -> None:
-    """The encoding fails in the middle of writing: as if nothing had been tried."""
+    """If the text cannot be encoded in the middle of writing, nothing is changed."""
     with pytest.raises(UnicodeEncodeError):
         write_text("a" * 100_000 + "\ud800", path)
     assert path.read_text(encoding="utf-8") == text
@@ -169,7 +169,9 @@ def test_text_that_cannot_be_encoded_changes_nothing(path: Path, text: str) -> N
 
 
 def test_the_difference(text: str, path: Path) -> None:
-    """Empty for what is the same, a unified diff else; a missing file differs in all its lines."""
+    """The difference is empty for the same text, and otherwise a unified diff; a missing file differs in all its
+    lines.
+    """
     assert difference(text, path) == ""
     shown = difference(emitted("7*x**2"), path)
     assert shown.startswith(f"--- {path} (on disk)\n+++ {path} (generated)\n@@")
@@ -200,7 +202,7 @@ def test_a_module_for_another_interface(version: int, text: str, path: Path, mon
 
 
 def test_build_writes_and_imports(tmp_path: Path) -> None:
-    """The module is there under its name, as file and as module."""
+    """After `build` the module exists under its name, as a file and as a module."""
     model = gqm.derive(gqm.Curve.graph("6*x**2"), gqm.Gravity(), title="A bowl")
     module = gqm.build(model, name="bowl", folder=tmp_path / "new")
     assert module.__name__ == "bowl"
@@ -210,7 +212,7 @@ def test_build_writes_and_imports(tmp_path: Path) -> None:
 
 
 def test_build_refuses_an_edited_file(text: str, path: Path) -> None:
-    """Nothing is imported or lost; by force it is written anew."""
+    """Nothing is imported or lost; with force the file is written anew."""
     model = gqm.derive(gqm.Curve.graph("6*x**2"), gqm.Gravity())
     path.write_text(text + "raise SystemExit\n", encoding="utf-8")
     with pytest.raises(HandEditedError):

@@ -1,4 +1,4 @@
-"""The tree of exceptions: what is the user's to mend, and what survives a process border."""
+"""The tree of exceptions shows which errors are the user's to correct, and errors can be sent to other processes."""
 
 import pickle
 
@@ -28,7 +28,7 @@ def test_every_error_is_a_gqm_error_with_one_line_of_doc(name):
 
 
 def test_mistakes_of_a_file_are_joined_line_by_line():
-    """All mistakes must show, in order, and survive pickling between processes."""
+    """All mistakes are shown in order, also after pickling."""
     error = errors.SpecFileError(["a.yaml:1:2: one", "a.yaml:3:4: two"])
     assert str(error) == "a.yaml:1:2: one\na.yaml:3:4: two"
     assert pickle.loads(pickle.dumps(error)).mistakes == error.mistakes

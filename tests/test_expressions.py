@@ -1,4 +1,4 @@
-"""Expressions, from text or SymPy, arrive in few heads, exact, and with real symbols."""
+"""Expressions from text or SymPy become exact, with real symbols and few kinds of functions."""
 
 from datetime import timedelta
 from decimal import Decimal
@@ -15,7 +15,7 @@ from gqm_sym.errors import ExpressionError, GQMError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_name, is_real_at, name_or_value, read_expression
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=20)
 
 x, y, theta, L = sp.symbols("x y theta L", real=True)
@@ -27,7 +27,7 @@ FEW_HEADS = {
 
 
 def assert_plain(expression):
-    """Only the heads that later stages know, real symbols, and exact finite numbers."""
+    """Check that an expression has only functions that later stages know, real symbols, and exact finite numbers."""
     for node in sp.preorder_traversal(expression):
         known = node.func in FEW_HEADS or node.is_Rational or node in (sp.pi, sp.E)
         assert known, f"{node.func} in {expression}"
@@ -71,7 +71,7 @@ def assert_plain(expression):
     ids=str,
 )
 def test_sources_of_every_kind_are_read(source, expected):
-    """The result is the expression meant, in plain heads."""
+    """The result is the intended expression, in plain functions."""
     expression = read_expression(source, where="t")
     assert sp.powsimp(expression) == sp.powsimp(sp.sympify(expected))
     assert_plain(expression)
@@ -157,7 +157,7 @@ def test_enormous_integers_are_refused_unprinted():
 
 
 def test_deep_sympy_expressions_are_refused_before_the_stack_ends():
-    """Nesting beyond the bound is an error of ours, not a RecursionError."""
+    """Nesting beyond the bound is an error of the package, not a RecursionError."""
     deep = sp.Symbol("x")
     for _ in range(120):
         deep = sp.sin(1 + deep, evaluate=False)
@@ -266,7 +266,7 @@ def _closed(text):
 @example("exp(exp((pi*1e40 + 1000) - pi*1e40))")
 @example("+".join(f"sqrt({n}**9+1)" for n in range(100, 300)))
 def test_hostile_text_gives_an_expression_or_one_clear_error(text):
-    """Whatever the text, the answer comes soon, in plain heads or as an error of the package."""
+    """Any text soon gives a plain expression or an error of the package."""
     expression = None
     try:
         expression = read_expression(text, where="t")
@@ -334,7 +334,7 @@ def test_reserved_names_are_for_the_caller_to_say():
     ids=str,
 )
 def test_an_argument_is_another_name_or_a_value(source, expected):
-    """One word renames the parameter; anything else is its value."""
+    """Text of one word renames the parameter, and anything else is its value."""
     assert name_or_value(source, "mu") == expected
 
 
@@ -352,5 +352,7 @@ def test_an_argument_is_another_name_or_a_value(source, expected):
     ],
 )
 def test_whether_a_form_is_a_number_somewhere(form, value, real):
-    """Found without computing towers; nothing is said of what the grammar has no word for."""
+    """Whether a form is a number somewhere is found without computing towers; forms outside the grammar are left
+    open.
+    """
     assert is_real_at(form, {x: sp.sympify(value)}) is real

@@ -74,7 +74,7 @@ SHOWN = [*gqm.__all__, *(f"{room.__name__[8:]}.{name}" for room in (figures, des
 
 @pytest.mark.parametrize("name", SHOWN)
 def test_the_reference_page_lists(name: str) -> None:
-    """Every name that is exported stands on the page, by its full name."""
+    """Every name that is exported stands on the page by its full name."""
     page = (REFERENCE / "api.md").read_text(encoding="utf-8")
     assert re.search(rf"gqm_sym\.{re.escape(name)}\b", page)
 
@@ -132,7 +132,7 @@ def test_words_are_in_order() -> None:
     assert words() == sorted(words(), key=str.lower)
 
 
-# What ARCHITECTURE.md presupposes. A word that is no longer used there leaves this list.
+# ARCHITECTURE.md presupposes these words. A word that is no longer used there is removed from this list.
 TERMS = """arithmetic-geometric mean, axis of symmetry, batch, body, chart, divided difference, double-double,
 effective potential, emission, facade, Fourier series, Gauss-Legendre rule, gradient, hilltop, integrating factor,
 interface, interval bounds, lane, launch, leg, lowering, multiprecision, Newton's method, node, normal, orbit, panel,
@@ -143,7 +143,7 @@ vocabulary"""
 
 @pytest.mark.parametrize("term", [term.strip() for term in " ".join(TERMS.split()).split(",")])
 def test_the_words_of_the_architecture(term: str) -> None:
-    """Each is used there and defined here."""
+    """Each word is used in ARCHITECTURE.md and defined in the glossary."""
     architecture = " ".join((DOCS.parent / "ARCHITECTURE.md").read_text(encoding="utf-8").split())
     used = re.compile(re.sub(r"rule$", "rules?", re.escape(term)).replace("mean", "means?"), re.IGNORECASE)
     assert used.search(architecture)

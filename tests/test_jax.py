@@ -1,4 +1,4 @@
-"""Periods as functions for JAX, against elliptic integrals; run where JAX is installed."""
+"""Periods as functions for JAX agree with elliptic integrals, if JAX is installed."""
 
 import sys
 from collections.abc import Callable
@@ -11,32 +11,32 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 
-# Relative, of values and derivatives.
+# The relative tolerance of values and derivatives.
 CLOSE = 1e-14
 
 
 @pytest.fixture(scope="module")
 def pendulum(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum, whose angle is measured from below."""
+    """Return a pendulum, whose angle is measured from below."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity())
     return gqm.build(model, name="for_jax", folder=tmp_path_factory.mktemp("jax"))
 
 
 @pytest.fixture
 def half_period(pendulum: ModuleType) -> Callable:
-    """The half period as a function for JAX, in doubles."""
+    """Return the half period as a function for JAX, in doubles."""
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
     return gqm.jax.half_period(pendulum)
 
 
 def true(amplitude: float, length: float) -> mpf:
-    """The half period of a pendulum, by Legendre's integral."""
+    """Return the half period of a pendulum, by Legendre's integral."""
     return 2 * mp.sqrt(mpf(length) / mpf("9.81")) * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2)
 
 
 def test_without_jax_it_says_what_to_install(pendulum: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The extra is named."""
+    """The error names the extra to install."""
     monkeypatch.setitem(sys.modules, "jax", None)
     with pytest.raises(GQMError, match=r"jax: needs jax, which is not installed; .* extra \[jax\]"):
         gqm.jax.period(pendulum)
@@ -68,7 +68,7 @@ def test_compiled_and_mapped(pendulum: ModuleType, half_period: Callable) -> Non
 
 
 def test_what_is_not_varied_has_no_say(half_period: Callable) -> None:
-    """The mass has no influence, and numbers that are not varied are no part of the derivative."""
+    """The mass has no influence, and numbers that are not varied have no derivative."""
     import jax
 
     both = jax.grad(lambda q: half_period(1.2, L=0.75, m=q[0], g=q[1]))(np.array([2.0, 9.81]))
@@ -78,7 +78,7 @@ def test_what_is_not_varied_has_no_say(half_period: Callable) -> None:
 
 
 def test_a_name_that_is_none(half_period: Callable) -> None:
-    """A misspelt parameter is told with those that there are, and one that is missing."""
+    """A misspelt parameter is reported with the list of parameters, and so is one that is missing."""
     with pytest.raises(GQMError, match="L: has no default and was not given"):
         half_period(1.2)
     with pytest.raises(GQMError, match=r"jax\.half_period: there is no argument 'length'; it takes lam0, v0, L, g, m"):

@@ -1,4 +1,4 @@
-"""Values of run-time parameters: kept exactly as they were given, or refused."""
+"""Values of run-time parameters are kept exactly as given, or refused."""
 
 from decimal import Decimal
 from fractions import Fraction
@@ -24,7 +24,7 @@ from gqm_sym.parameters import exact_value, read_value
     ],
 )
 def test_a_value_is_kept_as_it_was_given(given: Any, kept: Any, exact: sp.Expr) -> None:
-    """And means the same when it is read again."""
+    """A value is kept as it was given, and means the same when it is read again."""
     assert read_value(given, where="q") == kept
     assert exact_value(kept) == exact
 
@@ -43,14 +43,14 @@ def test_a_value_is_kept_as_it_was_given(given: Any, kept: Any, exact: sp.Expr) 
     ],
 )
 def test_what_is_no_value(given: Any, message: str) -> None:
-    """Not finite, not real, or no number."""
+    """Values that are not finite, not real, or no numbers are refused."""
     with pytest.raises(GQMError, match=f"^{message}"):
         read_value(given, where="q")
 
 
 @pytest.mark.parametrize("parameters", ["a", ["a"], ("a",), {"a": None}])
 def test_names_alone(parameters: Any) -> None:
-    """One name, several, or a mapping: to be given at run time."""
+    """One name, several names, or a mapping are parameters to be given at run time."""
     assert gqm.Curve.graph("a*x**2", parameters=parameters).defaults == (("a", None),)
     with pytest.raises(DeclarationError, match=r"'a' is declared but not used; remove it or use it \(in use: b\)"):
         gqm.Curve.graph("b*x**2", parameters=parameters)

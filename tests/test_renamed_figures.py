@@ -15,6 +15,6 @@ def test_an_old_name_says_the_new_one(old: str, new: str) -> None:
 
 
 def test_a_name_that_never_was() -> None:
-    """It gets the ordinary message."""
+    """A name that never existed gives the ordinary message."""
     with pytest.raises(AttributeError, match=r"has no attribute 'hodograph'$"):
         _ = gqm.figures.hodograph

@@ -1,4 +1,4 @@
-"""Reports: one well-formed page, complete in itself, that says what the motion says."""
+"""A report is one well-formed page, complete in itself, that shows what the motion says."""
 
 import re
 from pathlib import Path
@@ -32,25 +32,27 @@ launch: {lam0: 5/2}
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a curve file, to run commands in."""
+    """Return a folder with a curve file, in which commands run."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "swing.yaml").write_text(FILE)
     return tmp_path
 
 
 def page(*arguments: str) -> ElementTree.Element:
-    """The tree of the page that the command writes."""
+    """Return the tree of the page that the command writes."""
     assert tool.main(["report", "swing.yaml", *arguments, "-o", "swing.html"]) == 0
     return ElementTree.fromstring(Path("swing.html").read_text(encoding="utf-8"))
 
 
 def rows(tree: ElementTree.Element) -> list[list[str]]:
-    """The rows of all tables."""
+    """Return the rows of all tables."""
     return [["".join(cell.itertext()) for cell in row] for row in tree.iter(f"{HTML}tr")]
 
 
 def test_a_page_is_complete_in_itself(here: Path) -> None:
-    """Nothing is fetched or run, whatever the file says; every reference is to a place in the page, and is there."""
+    """The page fetches and runs nothing, whatever the file says; every reference is to a place in the page that
+    exists.
+    """
     tree = page()
     tags = {element.tag.split("}")[1] for element in tree.iter()}
     assert not tags & {"script", "link", "img", "iframe", "object"}
@@ -70,7 +72,7 @@ def test_a_page_is_complete_in_itself(here: Path) -> None:
 
 
 def test_what_a_page_says(here: Path) -> None:
-    """Formulas, figures, events, parameters with their units, and the file itself."""
+    """A page has formulas, figures, events, parameters with their units, and the file itself."""
     tree = page()
     first = Path("swing.html").read_bytes()
     page()
@@ -94,7 +96,9 @@ def test_what_a_page_says(here: Path) -> None:
 
 
 def test_formulas_are_written_as_people_write_them() -> None:
-    """Partial derivatives, functions of arc length, signs of velocity and force, V**2 as a power."""
+    """Partial derivatives, functions of arc length, signs of velocity and force, and V**2 as a power are written as
+    usual.
+    """
     track = gqm.Curve.implicit("x**2*z + z**3 + 1", start=(0, -1))
     rough = gqm.derive(track, gqm.Gravity() + gqm.CoulombFriction())
     shown = [ElementTree.fromstring(block) for block in _formulas(rough) if block.startswith("<div")]
@@ -106,7 +110,7 @@ def test_formulas_are_written_as_people_write_them() -> None:
 
 
 def test_parentheses_of_older_printers_are_drawn() -> None:
-    """SymPy 1.13 prints an element that browsers have dropped, with the signs as its attributes."""
+    """SymPy 1.13 prints an element that browsers have dropped, with the signs as its attributes; these are drawn."""
     old = '<mi>f</mi><mfenced><mi>x</mi><mfenced close="|" open="|"><mi>y</mi></mfenced></mfenced>'
     new = "<mi>f</mi><mrow><mo>(</mo><mi>x</mi><mrow><mo>|</mo><mi>y</mi><mo>|</mo></mrow><mo>)</mo></mrow>"
     assert _unfenced(old) == new
@@ -114,13 +118,13 @@ def test_parentheses_of_older_printers_are_drawn() -> None:
 
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])
 def test_other_motions(launch: list[str], here: Path) -> None:
-    """Rest, circulation, a horizon: options of the launch are those of gqm solve."""
+    """Rest, circulation and a horizon have pages; the options of the launch are those of gqm solve."""
     given = launch[0].split("=")[1]
     assert ["launch at theta", given] in rows(page(*launch))
 
 
 def test_where_it_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Beside the caller by the name in the file; wrong input writes nothing."""
+    """The page is written to the caller's folder by the name in the file; wrong input writes nothing."""
     assert tool.main(["report", "swing.yaml"]) == 0
     assert capsys.readouterr().out == "wrote swing.html\n"
     Path("swing.html").unlink()

@@ -1,4 +1,4 @@
-"""Periods as functions for PyTorch, against elliptic integrals; run where PyTorch is installed."""
+"""Periods as functions for PyTorch agree with elliptic integrals, if PyTorch is installed."""
 
 import sys
 from collections.abc import Callable
@@ -14,37 +14,37 @@ import gqm_sym as gqm
 from gqm_sym.errors import GQMError, SolutionError
 from gqm_sym.loading import load
 
-# Relative, of values and derivatives.
+# The relative tolerance of values and derivatives.
 CLOSE = 1e-14
 
 
 @pytest.fixture(scope="module")
 def pendulum() -> ModuleType:
-    """A pendulum, whose angle is measured from below."""
+    """Return a pendulum, whose angle is measured from below."""
     return load(str(ROOT / "generated" / "circle.py"), "circle")
 
 
 @pytest.fixture
 def half_period(pendulum: ModuleType) -> Callable:
-    """The half period as a function for PyTorch."""
+    """Return the half period as a function for PyTorch."""
     pytest.importorskip("torch", reason="PyTorch is not installed")
     return gqm.torch.half_period(pendulum)
 
 
 def true(amplitude: float, length: float) -> mpf:
-    """The half period of a pendulum, by Legendre's integral."""
+    """Return the half period of a pendulum, by Legendre's integral."""
     return 2 * mp.sqrt(mpf(length) / mpf("9.81")) * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2)
 
 
 def test_without_pytorch_it_says_what_to_install(pendulum: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The extra is named."""
+    """The error names the extra to install."""
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(GQMError, match=r"torch: needs torch, which is not installed; .* extra \[torch\]"):
         gqm.torch.period(pendulum)
 
 
 def doubles(*values: Any) -> list[Any]:
-    """Tensors that are differentiated by."""
+    """Return tensors with respect to which one can differentiate."""
     import torch
 
     return [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in values]
@@ -83,7 +83,7 @@ def test_many_at_once(pendulum: ModuleType, half_period: Callable) -> None:
 
 
 def test_no_second_derivatives(half_period: Callable) -> None:
-    """They are refused, not zero."""
+    """Second derivatives are refused, and not zero."""
     import torch
 
     (amplitude,) = doubles(1.2)
@@ -93,6 +93,6 @@ def test_no_second_derivatives(half_period: Callable) -> None:
 
 
 def test_a_name_that_is_none(half_period: Callable) -> None:
-    """A misspelt parameter is told with those that there are."""
+    """A misspelt parameter is reported with the list of parameters."""
     with pytest.raises(GQMError, match=r"torch\.half_period: there is no argument 'length'; it takes lam0, v0, L"):
         half_period(1.2, length=2.0)

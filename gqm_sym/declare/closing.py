@@ -14,7 +14,7 @@ Point = tuple[sp.Expr, ...]
 
 # Places at which a period is verified, and the largest difference of coordinates as a share of their size.
 PLACES = (-2.71, -1.3, -0.37, 0.113, 0.59, 1.17, 1.93, 2.83)
-SHARE = 1e-6
+MAX_DIFFERENCE = 1e-6
 # Fractions of a period that may be a period themselves.
 PRIMES = (2, 3, 5, 7, 11, 13)
 MOST_TIMES = 10
@@ -41,7 +41,7 @@ def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
         values = {symbol: value * share for symbol, value in tried_values(dict.fromkeys(unset)).items()}
         gap = _gap(point, lam, period, values)
         if gap is not None:
-            return _least_share(point, lam, period, values) if gap <= SHARE else None
+            return _least_share(point, lam, period, values) if gap <= MAX_DIFFERENCE else None
     return None
 
 
@@ -50,7 +50,7 @@ def _least_share(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[
     for prime in PRIMES:
         for _ in range(MOST_TIMES):
             gap = _gap(point, lam, period / prime, values)
-            if gap is None or gap > SHARE:
+            if gap is None or gap > MAX_DIFFERENCE:
                 break
             period /= prime
         else:
@@ -70,12 +70,12 @@ def check_period(
     """
     unset = {sp.Symbol(name, real=True) for name, value in defaults.items() if value is None}
     inside = [argument for form in point for node in form.atoms(sp.Function, sp.Pow) for argument in node.args]
-    told = {symbol for argument in inside if lam in argument.free_symbols for symbol in argument.free_symbols}
-    if unset & (told | period.free_symbols):
+    inner_symbols = {symbol for argument in inside if lam in argument.free_symbols for symbol in argument.free_symbols}
+    if unset & (inner_symbols | period.free_symbols):
         return  # this depends on the values at run time
     values = tried_values(defaults)
     gap = _gap(point, lam, period, values)
-    if gap is None or gap <= SHARE:
+    if gap is None or gap <= MAX_DIFFERENCE:
         return
     right = found_period(tuple(form.xreplace(values) for form in point), lam)
     remedy = "leave it out: the curve does not close" if right is None else f"give {right}"

@@ -39,10 +39,10 @@ class Declaration:
 
     def __post_init__(self) -> None:
         if not any(self.parameter in form.free_symbols for form in self.point):
-            told = ", ".join(f"{name} = {form}" for name, form in self.coordinates)
+            forms = ", ".join(f"{name} = {form}" for name, form in self.coordinates)
             raise DeclarationError(
                 f"{self.kind} curve: {'no' if self.in_space else 'neither'} coordinate depends on the parameter "
-                f"{self.parameter.name!r}; {told} is a point, not a curve"
+                f"{self.parameter.name!r}; {forms} is a point, not a curve"
             )
         one_line(self.title, where=f"{self.kind} curve: title")
         check_ends(self.kind, self.domain, self.period, self.parameter)

@@ -9,10 +9,10 @@ from gqm_sym.declare.points import IN_SPACE, Place
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning
 
 # Points nearer to each other than this share of the track's size are the same point.
-SAME = 1e-12
+SAME_POINT_SHARE = 1e-12
 
 # A smooth track that turns by more than this from one chord to the next is out of order, or sampled too coarsely.
-SHARPEST = pi / 2
+MAX_TURN = pi / 2
 
 # Straight lines that turn by more than this lead back along themselves.
 BACKWARDS = pi - 1e-6
@@ -21,16 +21,16 @@ BACKWARDS = pi - 1e-6
 JUMP = 100.0
 
 # A chord of measured points has the direction of the track if it is this many times longer than their scatter.
-LONG = 8.0
+LONG_CHORD_RATIO = 8.0
 
 # Curvature that alternately rises and falls between more than this share of neighbours is scatter,
-RESTLESS = 0.5
+MAX_ALTERNATING_SHARE = 0.5
 # if it changes loads by this many g at the speed of a body that has fallen over the size of the track.
-FELT = 0.1
+NOTICEABLE_LOAD = 0.1
 
 # So many successive turns to alternating sides by more than this are a zigzag through which no smooth track passes: the
 # lengths of the spline between such points do not converge.
-ZIGZAGS, ZIGZAG = 5, pi / 9
+ZIGZAG_TURNS, ZIGZAG_ANGLE = 5, pi / 9
 
 
 def extent(places: list[Place]) -> float:
@@ -51,9 +51,9 @@ def check_survey(places: list[Place], rows: list[int], joined: bool, scatter: fl
         dist([0.5 * (before + after) for before, after in zip(one, three, strict=True)], two)
         for one, two, three in zip(around, around[1:], around[2:], strict=False)
     ]
-    long = LONG * max(scatter, median(bends))
+    long = LONG_CHORD_RATIO * max(scatter, median(bends))
     for count, (turn, pair) in enumerate(zip(_turns(places, joined), pairwise([*chords, chords[0]]), strict=False), 1):
-        if abs(turn) > SHARPEST and min(pair) > long:
+        if abs(turn) > MAX_TURN and min(pair) > long:
             _refuse_turn(turn, rows[count % len(rows)])
 
 
@@ -91,12 +91,12 @@ def check_order(places: list[Place], size: float, kind: str, joined: bool) -> No
     chords = _chords(places, joined)
     usual = median(chords)
     for count, chord in enumerate(chords, start=1):
-        if chord <= SAME * size:
+        if chord <= SAME_POINT_SHARE * size:
             row = count % len(places) + 1
             raise DeclarationError(f"sampled: row {row}: repeats row {count}; leave one of them out")
         if kind == "spline":
             _check_gap(chord, usual, count, count % len(places) + 1)
-    most = SHARPEST if kind == "spline" else BACKWARDS
+    most = MAX_TURN if kind == "spline" else BACKWARDS
     for count, turn in enumerate(_turns(places, joined), start=1):
         if abs(turn) > most:
             _refuse_turn(turn, count % len(places) + 1)
@@ -127,10 +127,10 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
     ]
     steps = [after - before for before, after in pairwise(bends)]
     swings = [abs(after - before) / 4.0 for before, after in pairwise(steps) if before * after < 0.0]
-    if len(swings) <= RESTLESS * (len(steps) - 1):
+    if len(swings) <= MAX_ALTERNATING_SHARE * (len(steps) - 1):
         return
     felt = 2.0 * extent(places) * median(swings)
-    if felt > FELT:
+    if felt > NOTICEABLE_LOAD:
         changes = sum(before * after < 0.0 for before, after in pairwise(bends))
         warnings.warn(
             f"sampled: the curvature goes up and down from point to point (its sign changes between {changes} of "
@@ -146,11 +146,11 @@ def _check_zigzag(turns: list[float]) -> None:
     run = 0
     for count, turn in enumerate(turns):
         swings = run and turn * turns[count - 1] < 0.0
-        run = 0 if abs(turn) <= ZIGZAG else run + 1 if swings else 1
-        if run == ZIGZAGS:
-            first = count + 3 - ZIGZAGS
+        run = 0 if abs(turn) <= ZIGZAG_ANGLE else run + 1 if swings else 1
+        if run == ZIGZAG_TURNS:
+            first = count + 3 - ZIGZAG_TURNS
             raise DeclarationError(
-                f"sampled: row {first}: the track turns to and fro there, {ZIGZAGS} times by more than "
-                f"{ZIGZAG * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, points "
-                "without their noise (smoothing takes it out), or kind='linear' for planes"
+                f"sampled: row {first}: the track turns to and fro there, {ZIGZAG_TURNS} times by more than "
+                f"{ZIGZAG_ANGLE * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, "
+                "points without their noise (smoothing takes it out), or kind='linear' for planes"
             )

@@ -199,8 +199,8 @@ def _polynomial(given: Source, name: str) -> tuple[sp.Expr, ...]:
     """Return the coefficients of a rate in powers of s, lowest first."""
     rate = sp.expand(read_expression(given, where=f"transition: {name}", unit="1/m"))
     found = tuple(rate.coeff(DISTANCE, power) for power in range(MAX_POWER + 1))
-    rest = sp.expand(rate - sp.Add(*(c * DISTANCE**power for power, c in enumerate(found))))
-    if rest != 0 or any(DISTANCE in c.free_symbols for c in found):
+    remainder = sp.expand(rate - sp.Add(*(c * DISTANCE**power for power, c in enumerate(found))))
+    if remainder != 0 or any(DISTANCE in c.free_symbols for c in found):
         raise DeclarationError(
             f"transition: {name}: must be a polynomial in s of degree {MAX_POWER} at most, got {short(str(rate))}"
         )

@@ -88,10 +88,10 @@ def read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
         if count == 1 and is_row and len(row) == IN_SPACE:
             wanted = IN_SPACE
         if not is_row or len(row) != wanted:
-            told = "two numbers, x and z" if wanted == 2 else "three numbers, x, y and z, as in row 1"
-            told += ", or in space three, x, y and z" if count == 1 else ""
+            expected = "two numbers, x and z" if wanted == 2 else "three numbers, x, y and z, as in row 1"
+            expected += ", or in space three, x, y and z" if count == 1 else ""
             raise DeclarationError(
-                f"sampled: row {count}: must be {told}, got {short(row)}; for one array of each write "
+                f"sampled: row {count}: must be {expected}, got {short(row)}; for one array of each write "
                 "Curve.sampled(x, z)"
             )
         coordinates, place = zip(*[_read(value, count) for value in row], strict=True)

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 KINDS = ("spline", "linear")
 # The smallest number of different points: a quintic polynomial has six coefficients, and a closed track of straight
 # lines is at least a triangle.
-FEWEST = {("spline", False): 6, ("spline", True): 6, ("linear", False): 2, ("linear", True): 3}
+MIN_POINTS = {("spline", False): 6, ("spline", True): 6, ("linear", False): 2, ("linear", True): 3}
 # A track is closed if its first and its last point are nearer to each other than this share of its size.
-CLOSES = 1e-9
+CLOSED_SHARE = 1e-9
 # The smallest and the largest size of a track in m: fourth powers of the distances of points, and their inverses, must
 # be in the range of doubles.
 SIZES = 1e-60, 1e60
 # The smallest and the largest scatter of points in m; its square must be in the range of doubles.
 MAX_DEVIATION = 1e100
 # The smallest number of points for cross-validation, which needs more than a spline does.
-FEWEST_AUTO = 12
+MIN_POINTS_AUTO = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,7 +126,7 @@ def read_track(
         raise DeclarationError(
             f"sampled: the points span {size:.3g} m; a track spans {SIZES[0]:g} to {SIZES[1]:g} m: are they in metres?"
         )
-    repeated = len(places) > 1 and dist(places[0], places[-1]) <= CLOSES * size
+    repeated = len(places) > 1 and dist(places[0], places[-1]) <= CLOSED_SHARE * size
     joined = repeated if closed is None else closed
     if joined and repeated:
         del texts[-1], places[-1]
@@ -141,7 +141,7 @@ def read_track(
         rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
         places = [places[row - 1] for row in rows]
         angles = [angles[row - 1] for row in rows] if angles else angles
-    fewest = FEWEST_AUTO if deviation == "auto" else FEWEST[kind, joined]
+    fewest = MIN_POINTS_AUTO if deviation == "auto" else MIN_POINTS[kind, joined]
     if len(places) < fewest:
         what = "a closed" if joined else "an open"
         how = f"kind {kind!r}" if deviation is None else f"smoothing {smoothing!r}"

@@ -33,7 +33,7 @@ STEP = sp.Rational(37, 100)
 NEAR, NEARER, DIGITS = sp.Float("1e-12", 90), sp.Float("1e-24", 90), 90
 # Unit tangents that differ by less than this are equal; curvatures that grow by more than this factor towards a place
 # are infinite there.
-SAME, GROWS = 1e-3, 10
+MAX_TANGENT_DIFFERENCE, MAX_CURVATURE_GROWTH = 1e-3, 10
 
 Function = Callable[[float], float]
 Vector = tuple[sp.Expr, ...]
@@ -173,17 +173,17 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
     first = [differentiate(form, lam) for form in curve.point]
     forms = [form.xreplace(values) for form in (*first, *(differentiate(form, lam) for form in first))]
     size = 1 + abs(at)
-    sides = [_tangent_and_curvature(forms, lam, at + way * step * size) for way in (-1, 1) for step in (NEAR, NEARER)]
+    sides = [_tangent_and_curvature(forms, lam, at + sign * step * size) for sign in (-1, 1) for step in (NEAR, NEARER)]
     if None in sides:
         return
     (_, left_far), (left, left_near), (_, right_far), (right, right_near) = (side for side in sides if side)
     gap = sum(abs(a - b) for a, b in zip(left, right, strict=True))
     turned = sum(abs(a + b) for a, b in zip(left, right, strict=True))
-    if turned < SAME:
+    if turned < MAX_TANGENT_DIFFERENCE:
         return
     shown = 0.0 if abs(at) < NEARER else float(at)
     place = f"at {lam.name} = {shown:.6g}, where {zero} changes its sign"
-    if gap > SAME:
+    if gap > MAX_TANGENT_DIFFERENCE:
         degrees = float(sp.acos(sum(a * b for a, b in zip(left, right, strict=True))) * 180 / sp.pi)
         raise DeclarationError(
             f"{curve.kind} curve: the tangent turns by {degrees:.3g} degrees {place}: a corner, for which formulas "
@@ -191,7 +191,7 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
             "Curve.sampled(points, kind='linear'), at whose corners the speed is kept"
         )
     near, far = (max(map(abs, pair)) for pair in ((*left_near, *right_near), (*left_far, *right_far)))
-    if near > GROWS * far and near > 1:
+    if near > MAX_CURVATURE_GROWTH * far and near > 1:
         raise DeclarationError(
             f"{curve.kind} curve: the curvature, and with it the contact force, is infinite {place}, though the "
             "tangent is continuous; end the domain there, or round it off, as (x**2 + r**2)**p for (x**2)**p"
@@ -200,7 +200,7 @@ def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, a
     jump, before = (
         max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in ((left_near, right_near), (left_far, right_far))
     )
-    if jump > SAME and jump > before / 2:
+    if jump > MAX_TANGENT_DIFFERENCE and jump > before / 2:
         if curve.in_space:
             raise DeclarationError(f"space curve: the curvature jumps {place}; end the domain there, or round it off")
         raise DeclarationError(

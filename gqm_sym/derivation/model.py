@@ -227,10 +227,10 @@ class Model:
             The three components in N.
         """
         v2 = _read_v2(v2)
-        way = (self.dxds, self.dyds, self.dzds)
+        tangent = (self.dxds, self.dyds, self.dzds)
         if self.loads:
             turned = self._turned_force(v2)
-            along_x, along_y, along_z = (MASS * part for part in cross(turned, way))
+            along_x, along_y, along_z = (MASS * part for part in cross(turned, tangent))
             return along_x, along_y, along_z
         force = self.normal_force_at(v2)
         along_x, along_y, along_z = (force * part for part in self.normal)
@@ -376,5 +376,5 @@ def units_of(curve: Curve, kernel: Kernel) -> dict[str, str]:
     units = {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
     own = parameter_dimension(curve)
     names = dict.fromkeys((curve.parameter.name, *dict(curve.defaults), *dict(kernel.defaults), "g", "m"))
-    told = units if own is None else {**units, curve.parameter.name: unit_of(own)}
-    return {name: told[name] for name in names if name in told}
+    known = units if own is None else {**units, curve.parameter.name: unit_of(own)}
+    return {name: known[name] for name in names if name in known}

@@ -258,10 +258,10 @@ def _losses(
         **dict(zip(CORIOLIS, law.coriolis, strict=False)),
         **dict(zip(UPRIGHT, reversed(upright), strict=False)),
     }
-    cars_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
-    loss = dissipation(kernel, pieces, coordinates, signs, cars_load)
-    for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
-        check_real(form, where=f"the law of a body at rest that is about to move {way}")
+    mean_car_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
+    loss = dissipation(kernel, pieces, coordinates, signs, mean_car_load)
+    for direction, form in zip(("forwards", "backwards"), loss.holds, strict=True):
+        check_real(form, where=f"the law of a body at rest that is about to move {direction}")
     return loss
 
 

@@ -102,8 +102,8 @@ def _shape(mp: Any, angle: Any, mu: Any) -> tuple[Any, Any, Any]:
 
 def _waves(k: Any, tau: Any, mu: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Return the coefficients of 1, cos(2 psi), sin(2 psi), cos(4 psi) and sin(4 psi) in dx/dpsi and dz/dpsi."""
-    rest = 1 + 3 * mu * mu + 2 * mu * tau
-    both, gap = rest + k * k, rest - k * k
+    regular_part = 1 + 3 * mu * mu + 2 * mu * tau
+    both, gap = regular_part + k * k, regular_part - k * k
     x = (both + gap / 2, -both - gap, 4 * mu * k, gap / 2, -2 * mu * k)
     z = (
         -2 * mu * k * k - mu * both - mu * gap / 2,

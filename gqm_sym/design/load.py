@@ -189,35 +189,35 @@ def from_load(
     form = read_law(law, ("s", "t"), parameters, where=where, unit="1")
     by_time = "t" in {symbol.name for symbol in form.free_symbols}
     place = "t" if by_time else "s"
-    speed, gravity, way = (
+    speed, gravity, length = (
         evaluated(mp, read_positive(value, name, where=where, unit=unit))
         for value, name, unit in ((v0, "v0", "m/s"), (g, "g", "m/s**2"), (until, "until", "s" if by_time else "m"))
     )
     state = _State(evaluated(mp, read_constant(heading, "heading", where=where, unit="1")), mp.mpf(0), mp.mpf(0))
     motion = _Motion(mp, function_in(mp, place, form), speed, gravity, by_time)
     pieces: list[Piece] = []
-    at, width = mp.mpf(0), way / 4
-    while at < way:
+    u, width = mp.mpf(0), length / 4
+    while u < length:
         spend()
-        width = min(width, way - at)
+        width = min(width, length - u)
         try:
-            piece, ahead = _piece(motion, state, at, width)
+            piece, ahead = _piece(motion, state, u, width)
         except (ArithmeticError, ValueError, TypeError):
-            what = f"between {place} = {float(at):.6g} and {float(at + width):.6g}"
+            what = f"between {place} = {float(u):.6g} and {float(u + width):.6g}"
             raise DeclarationError(
                 f"{where}: law: has no finite value everywhere {what}; end the track before"
             ) from None
         if piece is None:
-            if width < MIN_SHARE * way:
+            if width < MIN_SHARE * length:
                 raise DeclarationError(
-                    f"{where}: the track ends near {place} = {float(at):.6g}, at a height of "
+                    f"{where}: the track ends near {place} = {float(u):.6g}, at a height of "
                     f"{float(state.z):.6g} m, where the law is not smooth or the body comes to rest; "
                     "end it before by until, or launch faster"
                 )
             width /= 2
             continue
         pieces.append(piece)
-        at, state, width = at + width, ahead, 2 * width
+        u, state, width = u + width, ahead, 2 * width
     return polynomial_curve(
         mp, pieces, origin=0, breaks=(), title=title or f"Track of contact force N/(m*g) = {law}, from v0 = {v0} m/s"
     )
@@ -254,7 +254,7 @@ def _piece(motion: _Motion, state: _State, at: Any, width: Any) -> tuple[Piece |
         cosines.append(-mp.fdot((turned[i], sines[k - i]) for i in range(k + 1)) / (k + 1))
         sines.append(mp.fdot((turned[i], cosines[k - i]) for i in range(k + 1)) / (k + 1))
     length = width * speeds[0] if by_time else width
-    rest = max(abs(term) for row in (x, z) for term in row[-2:]) / length
-    if max(rest, *map(abs, alpha[-2:])) > MAX_LAST_TERM or sum(z) * 2 * g >= v0 * v0:
+    last_terms = max(abs(term) for row in (x, z) for term in row[-2:]) / length
+    if max(last_terms, *map(abs, alpha[-2:])) > MAX_LAST_TERM or sum(z) * 2 * g >= v0 * v0:
         return None, state
     return Piece(0, 1, x, z), _State(sum(alpha), sum(x), sum(z))

@@ -48,7 +48,7 @@ SHARE_OF_LIMIT = sp.Rational(999, 1000)
 SEARCHED, STEP = 100.0, 1.0 / 64.0
 
 # If odd derivatives at the bottom are below this share, both sides form one smooth curve.
-SMOOTH = 1e-15
+MAX_ODD_SHARE = 1e-15
 
 
 class _Law(NamedTuple):
@@ -114,7 +114,7 @@ def from_period(
     mp = extended_precision()
     found, right = _read(law, share, g, parameters, where)
     height = _limit(found, where)
-    told = "" if height is None else f" (such a track reaches up to {float(height):.9g} m)"
+    note = "" if height is None else f" (such a track reaches up to {float(height):.9g} m)"
     if up_to is None:
         if height is None:
             raise DeclarationError(f"{where}: up_to: such a track has no greatest height; give the height in m")
@@ -139,7 +139,7 @@ def from_period(
         pieces,
         origin=count,
         breaks=() if smooth else (count,),
-        title=title or f"Track of period {law} s, up to h = {float(end):.9g} m{told}",
+        title=title or f"Track of period {law} s, up to h = {float(end):.9g} m{note}",
     )
 
 
@@ -269,12 +269,12 @@ def _side(
 
     end = top if most is None else mp.asin(top / most)
     pieces: list[Piece] = []
-    at, width = mp.mpf(0), end
+    u, width = mp.mpf(0), end
     for _ in range(MAX_HALVINGS * TERMS):
-        if at >= end:
+        if u >= end:
             return pieces
-        width = min(width, end - at)
-        terms, resolved = interpolated(mp, rows, at, at + width)
+        width = min(width, end - u)
+        terms, resolved = interpolated(mp, rows, u, u + width)
         if not resolved:
             width /= 2
             continue
@@ -284,7 +284,7 @@ def _side(
         if not pieces:  # the track is horizontal at the bottom
             z[0] = z[1] = mp.mpf(0)
         pieces.append(Piece(begin, 1, x, [*z, mp.mpf(0)]))
-        at += width
+        u += width
         width *= 2
     raise DeclarationError("design.from_period: law: the track is not smooth; give a smooth law, or a smaller height")
 
@@ -294,4 +294,4 @@ def _is_odd(piece: Piece) -> bool:
     smoothly.
     """
     largest = max(map(abs, piece.x))
-    return bool(max(map(abs, piece.x[2::2])) <= SMOOTH * largest)
+    return bool(max(map(abs, piece.x[2::2])) <= MAX_ODD_SHARE * largest)

@@ -127,8 +127,8 @@ def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
 
 
 def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
-    """Return the same function for a piece of a rail in space, with the derivatives of its coordinates by arc
-    length.
+    """Return the same function for a piece of a rail in space, with the derivatives of its coordinates with respect to
+    arc length.
     """
     shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
     tangent = (shape.dxds, shape.dyds, shape.dzds)
@@ -159,7 +159,9 @@ def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
     place = curve.parameter
     rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
-    return lowering.exact_function(name, "x, z and their derivatives by its own parameter.", outputs, (lowering.place,))
+    return lowering.exact_function(
+        name, "x, z and their derivatives with respect to its own parameter.", outputs, (lowering.place,)
+    )
 
 
 MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {

@@ -51,8 +51,8 @@ def with_named_exponentials(
 
 def _without_constant(potential: Expr, place: Symbol) -> Expr:
     """Return the potential without its constant term, which would only add rounding."""
-    factor, rest = potential.as_independent(place, as_Add=False)
-    return factor * rest.as_independent(place, as_Add=True)[1]
+    factor, remainder = potential.as_independent(place, as_Add=False)
+    return factor * remainder.as_independent(place, as_Add=True)[1]
 
 
 def rounded_size(form: Expr, place: Symbol) -> Expr | None:

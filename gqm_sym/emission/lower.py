@@ -250,7 +250,7 @@ class _ModelLowering(Lowering):
         if self.place in potential.free_symbols:
             return ()
         outputs = (potential, differentiate(potential, x), differentiate(potential, z))
-        doc = "U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."
+        doc = "U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."
         return (self.exact_function("effective_potential", doc, outputs, (x, z)),)
 
     def domain(self) -> ExactIR:

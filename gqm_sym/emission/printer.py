@@ -156,9 +156,9 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         return f"{self.parenthesize(base, PRECEDENCE['Pow'])}**{self.parenthesize(exponent, PRECEDENCE['Pow'])}"
 
     def _print_Mul(self, expr: Expr) -> str:
-        number, rest = expr.as_coeff_Mul()
+        number, remainder = expr.as_coeff_Mul()
         if number.is_Rational and not is_double(number):
-            return f"{self._print(number)}*{self.parenthesize(rest, PRECEDENCE['Mul'], strict=True)}"
+            return f"{self._print(number)}*{self.parenthesize(remainder, PRECEDENCE['Mul'], strict=True)}"
         return str(super()._print_Mul(expr))
 
     def _print_Rational(self, expr: Rational) -> str:

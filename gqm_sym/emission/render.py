@@ -218,8 +218,8 @@ def _batch(module: ModuleIR) -> list[str]:
 
 def body_digests(text: str) -> tuple[str, str] | None:
     """Return the body's digest as the header states it, and as computed; None if the text has no such header."""
-    first, _, rest = text.partition("\n")
-    second, _, body = rest.partition("\n")
+    first, _, following = text.partition("\n")
+    second, _, body = following.partition("\n")
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
         return None
     return second.rpartition(" body ")[2].strip(), _digest(body)

@@ -27,8 +27,8 @@ def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
             factors = Mul.make_args(part)
             mixed = next((f for f in factors if f.is_Add and f.free_symbols - held - {place}), None)
             if mixed is not None:
-                rest = factor * Mul(*(f for f in factors if f is not mixed))
-                waiting = [rest * term for term in mixed.args] + waiting
+                remainder = factor * Mul(*(f for f in factors if f is not mixed))
+                waiting = [remainder * term for term in mixed.args] + waiting
                 continue
             held |= part.free_symbols - {place}
         parts[part] = parts.get(part, S.Zero) + factor

@@ -88,8 +88,8 @@ def _track_in_space(motion: "Motion", path: "State") -> "Figure":
     draw_in_space(view, path, path.normal_force, FORCE_LABEL)
     times = [("launch", 0.0), *((event.kind, event.t) for event in _shown_events(motion) if isfinite(event.t))]
     for kind, time in times:
-        at = motion.state(min(time, horizon(motion)))
-        view.plot(at.x, at.y, at.z, label=kind, zorder=9, **_marker(kind))
+        state = motion.state(min(time, horizon(motion)))
+        view.plot(state.x, state.y, state.z, label=kind, zorder=9, **_marker(kind))
     finished(view, "x (m)", "y (m)")
     return figure
 

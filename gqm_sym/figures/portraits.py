@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# The number of grid points across a portrait. Each extremum is located by ZOOMS nested grids of as many points.
+# The number of grid points across a portrait. Each extremum is located by NESTED_GRIDS nested grids of as many points.
 GRID_POINTS = 1601
-ZOOMS = 3
+NESTED_GRIDS = 3
 ENERGY_LEVELS = 9
 ORBIT_COLOUR, SEPARATRIX_COLOUR, LAUNCH_COLOUR = "#0072b2", "#d55e00", "#009e73"
 
@@ -251,7 +251,7 @@ def _locate(potential_at: Any, low: float, high: float, sign: int) -> float:
         values: Array = sign * potential_at(places)
         return np.where(np.isnan(values), -np.inf, values)
 
-    *_, peak = grid_peaks(signed, low, high, GRID_POINTS, ZOOMS)
+    *_, peak = grid_peaks(signed, low, high, GRID_POINTS, NESTED_GRIDS)
     return 0.5 * (peak.low + peak.high)
 
 

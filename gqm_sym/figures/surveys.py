@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 POINT, TRACK, BAND = "#d55e00", "#333333", "#0072b2"
 # The largest number of points that are drawn.
-MOST = 20_000
+MAX_DRAWN_POINTS = 20_000
 # The number of standard errors on each side of the band, which contains some 95 of 100 places.
 ERRORS = 2.0
 # The distance from the track at which the largest shift is drawn, as a share of the track's size.
-FAR = 0.06
+LARGEST_SHIFT_SHARE = 0.06
 MILLIMETRES = 1e3
 
 
@@ -52,15 +52,17 @@ def smoothing(curve: Any, axes: Any = None) -> "Figure":
         below.sharex(middle)
     else:
         above, middle, below = axes
-    kept = np.unique(np.linspace(0, len(report.points) - 1, MOST).astype(np.int64))
+    kept = np.unique(np.linspace(0, len(report.points) - 1, MAX_DRAWN_POINTS).astype(np.int64))
     order = np.argsort(report.places_s)
     size = float(np.ptp(report.places, axis=0).max())
-    enlarged = _round(FAR * size / report.largest_shift) if report.largest_shift > 0.0 else 1.0
+    enlarged = _round(LARGEST_SHIFT_SHARE * size / report.largest_shift) if report.largest_shift > 0.0 else 1.0
     drawn = report.places + enlarged * (report.points - report.places)
     in_space = report.points.shape[1] > 2
     above.plot(*report.places[order, :2].T, color=TRACK, linewidth=1.2, label="smooth track")
     what = f"measured points, their shifts enlarged {enlarged:g} times" if enlarged > 1.0 else "measured points"
-    above.plot(*drawn[kept, :2].T, ".", color=POINT, markersize=3, label=what, rasterized=len(kept) > MOST // 4)
+    above.plot(
+        *drawn[kept, :2].T, ".", color=POINT, markersize=3, label=what, rasterized=len(kept) > MAX_DRAWN_POINTS // 4
+    )
     above.set_aspect("equal", adjustable="datalim")
     finished(above, "x (m)", "y (m)" if in_space else "z (m)")
     above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small", frameon=False)
@@ -70,7 +72,7 @@ def smoothing(curve: Any, axes: Any = None) -> "Figure":
         ".",
         color=POINT,
         markersize=3,
-        rasterized=len(kept) > MOST // 4,
+        rasterized=len(kept) > MAX_DRAWN_POINTS // 4,
     )
     middle.axhline(0.0, color=TRACK, linewidth=0.8)
     rms = f"root mean square {MILLIMETRES * report.rms:.3g} mm, largest {MILLIMETRES * report.largest_shift:.3g} mm"

@@ -29,7 +29,7 @@ RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
 MIN_SHARE = 1e-3
 
 # Motions that lose energy are followed further than the last measured passage by this factor.
-AMPLE = 1.5
+HORIZON_FACTOR = 1.5
 
 # The largest number of steps of the solver, which takes ten from a good guess.
 MAX_STEPS = 200
@@ -192,7 +192,7 @@ class Residuals:
             return self._solved[1]
         arguments = self.arguments(x)
         if self.measured.place is not None and self._loses:
-            arguments["t_max"] = AMPLE * float(self.values.max())
+            arguments["t_max"] = HORIZON_FACTOR * float(self.values.max())
         self._solved = x.copy(), self.module.solve(**arguments)
         return self._solved[1]
 

@@ -243,7 +243,7 @@ class Kernel:
 def _refuse_clashes(first: Kernel, second: Kernel) -> None:
     names = {name for name, _ in first.terms}
     for name, _ in second.terms:
-        if name in names and name in _ONCE:
+        if name in names and name in _AT_MOST_ONCE:
             raise DeclarationError(f"kernel: {name} is given twice; give it once")
         if {name, *names} >= _EXCLUSIVE and name in _EXCLUSIVE:
             raise DeclarationError(
@@ -264,7 +264,7 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 
 
 # These forces act on a body as a whole, so that a second one is a mistake and not a sum.
-_ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame", "train"})
+_AT_MOST_ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame", "train"})
 _EXCLUSIVE = frozenset({"rolling", "coulomb"})
 
 

@@ -258,7 +258,7 @@ class SeparatedTerms(NamedTuple):
 
 
 class ExactPotential(NamedTuple):
-    """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives by x and z."""
+    """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives with respect to x and z."""
 
     effective_potential: Callable[..., Any]
 

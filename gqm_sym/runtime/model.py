@@ -50,7 +50,7 @@ ARGUMENTS = {
     "equilibria": ("between",),
 }
 
-NOTHING: Mapping[str, Any] = MappingProxyType({})
+NO_ARGUMENTS: Mapping[str, Any] = MappingProxyType({})
 
 
 @cache
@@ -96,7 +96,7 @@ class CompiledModel(Formulas):
         parameters: tuple[Any, ...],
         lam: Any,
         out: Any = None,
-        unknown: Mapping[str, Any] = NOTHING,
+        unknown: Mapping[str, Any] = NO_ARGUMENTS,
     ) -> Pass1 | Pass1InSpace | Pass1OfRider:
         """Return position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
 
@@ -129,6 +129,8 @@ class CompiledModel(Formulas):
             self.refuse("pass1", unknown)
         p = self.numbers(parameters)
         launch = read_launch(self, p, request)
+        if lam is None:
+            raise InputError(f"lam: not given; pass one place or many, as values of {self.parameter}")
         f = bind(self, p, launch)
         if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
             places, low_parts, shape = flat_doubles(lam), NO_LOW_PARTS, lam.shape
@@ -196,7 +198,7 @@ class CompiledModel(Formulas):
         return beyond
 
     def solve(
-        self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NOTHING
+        self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NO_ARGUMENTS
     ) -> "Motion":
         """Compute the motion that begins with a launch.
 
@@ -246,7 +248,7 @@ class CompiledModel(Formulas):
         lam: Any,
         client: Any,
         gradient: Any = None,
-        unknown: Mapping[str, Any] = NOTHING,
+        unknown: Mapping[str, Any] = NO_ARGUMENTS,
     ) -> "Sweep":
         """Compute one quantity over arrays of launches and parameters, on this machine or on a Dask cluster.
 
@@ -290,7 +292,7 @@ class CompiledModel(Formulas):
         launches, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
         parameters = tuple(arguments[name] for name in self.parameters)
         del arguments["point"]
-        from gqm_sym.runtime.sweep.result import told
+        from gqm_sym.runtime.sweep.result import with_arguments
 
         if gradient is not None:
             from gqm_sym.runtime.sweep.gradients import sweep_with_gradient
@@ -298,18 +300,18 @@ class CompiledModel(Formulas):
             if client is not None:
                 raise InputError("gradient: is not available in a sweep on a cluster (client); leave one of them out")
             swept = sweep_with_gradient(self, quantity, launches, parameters, lam, self.solve, gradient)
-            return told(swept, quantity, arguments)
+            return with_arguments(swept, quantity, arguments)
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on
 
             module = self.source, self.text, self.name
-            return told(sweep_on(client, module, quantity, arguments), quantity, arguments)
+            return with_arguments(sweep_on(client, module, quantity, arguments), quantity, arguments)
         from gqm_sym.runtime.sweep.sweep import sweep
 
-        return told(sweep(self, quantity, launches, parameters, lam, self.solve), quantity, arguments)
+        return with_arguments(sweep(self, quantity, launches, parameters, lam, self.solve), quantity, arguments)
 
     def equilibria(
-        self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NOTHING
+        self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NO_ARGUMENTS
     ) -> "tuple[Equilibrium, ...]":
         """Return the places at which a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
 

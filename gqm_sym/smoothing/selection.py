@@ -15,23 +15,24 @@ from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.splines import ORDER, Array, Basis, Fit, Smoother
 
 # The number of pieces of the coarsest grid of knots, and the factor by which it grows from one grid to the next.
-COARSEST = 8
-FINER = 4
-# A grid is used for widths of at least this many of its pieces, and the next coarser one from FINER times as many on.
+COARSEST_PIECES = 8
+REFINEMENT = 4
+# A grid is used for widths of at least this many of its pieces, and the next coarser one from REFINEMENT times
+# as many on.
 PIECES = 2.0
 # The ratio of one tried width to the next. The criteria are so flat that no width in between is much better.
 RATIO = 1.12
 # The smallest width that is tried, in typical distances of points, for which the spline interpolates them.
-LEAST = 0.003
+MIN_WIDTH = 0.003
 # The smallest distance between knots at the points, as a share of the usual distance between points.
-APART = 0.05
+MIN_KNOT_DISTANCE = 0.05
 # The cost of a fitted number in the criteria. For the places of points it would be 1. Curvature requires somewhat more
 # smoothing, and cross-validation with 1 sometimes takes noise for bends (Kim and Gu 2004: 1.4).
-CHARGE = 1.4
+PARAMETER_COST = 1.4
 # Grids finer than this many pieces are tried as long as they find better widths.
-ENOUGH = 2000
+ENOUGH_PIECES = 2000
 # The value of cross-validation for points that are met exactly.
-TINY = 1e-300
+MIN_SCORE = 1e-300
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,10 +81,10 @@ class Criterion:
     def __call__(self, fit: Fit) -> float:
         """Return the logarithm of the function that is smallest for the best spline."""
         if self.deviation is not None:
-            total = fit.residual + 2.0 * CHARGE * self.across * self.deviation**2 * fit.freedom
-            return float(np.log(max(total / self.count, TINY)))
-        left = 1.0 - CHARGE * fit.freedom / self.count
-        return float(np.log(max(fit.residual / self.count, TINY)) - 2.0 * np.log(left)) if left > 0.0 else np.inf
+            total = fit.residual + 2.0 * PARAMETER_COST * self.across * self.deviation**2 * fit.freedom
+            return float(np.log(max(total / self.count, MIN_SCORE)))
+        left = 1.0 - PARAMETER_COST * fit.freedom / self.count
+        return float(np.log(max(fit.residual / self.count, MIN_SCORE)) - 2.0 * np.log(left)) if left > 0.0 else np.inf
 
 
 def choose(u: Array, points: Array, period: float | None, deviations: Sequence[float | None]) -> Choice:
@@ -131,7 +132,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
                     score=scores[k],
                     places=places,
                 )
-        if basis.size > ENOUGH and not better:
+        if basis.size > ENOUGH_PIECES and not better:
             break
     if not best:
         raise DeclarationError(
@@ -145,14 +146,14 @@ def _grids(u: Array, low: float, high: float, closed: bool) -> Iterator[tuple[Ar
     """Yield knots, the smallest width for which they are used, and the places of points if these are the knots."""
     length = high - low
     usual = max(float(np.median(np.diff(np.sort(u)))), length / (4.0 * len(u)))
-    pieces = COARSEST
-    while length / pieces > FINER * usual and pieces * FINER < len(u):
+    pieces = COARSEST_PIECES
+    while length / pieces > REFINEMENT * usual and pieces * REFINEMENT < len(u):
         yield np.linspace(low, high, pieces + 1), PIECES * length / pieces, None
-        pieces *= FINER
-    places = _apart(u, APART * usual, high if closed else None)
+        pieces *= REFINEMENT
+    places = _apart(u, MIN_KNOT_DISTANCE * usual, high if closed else None)
     # These are the knots of an interpolating spline, which omits two places at each end.
     sites = np.append(places, high) if closed else np.concatenate([places[:1], places[ORDER:-ORDER], places[-1:]])
-    yield sites, LEAST * usual, places
+    yield sites, MIN_WIDTH * usual, places
 
 
 def _apart(u: Array, least: float, high: float | None) -> Array:

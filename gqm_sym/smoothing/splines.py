@@ -26,7 +26,7 @@ ORDER = 3
 # A step in the logarithm of the weight, for a derivative by central differences: errors of 1e-7 and of rounding/1e-3.
 STEP = 1e-3
 # The largest number of elements of dense matrices that are stored at a time.
-AT_ONCE = 4_000_000
+MAX_DENSE_ELEMENTS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,8 +185,8 @@ class Smoother:
         """Return the spline for a weight."""
         factor = self._factor(weight)
         coefficients = self._solved(factor, self._sums)
-        # The derivative of the matrix by log(weight) is its roughness part, and the trace of its solution is the
-        # derivative of log(det).
+        # The derivative of the matrix with respect to log(weight) is its roughness part, and the trace of its solution
+        # is the derivative of log(det).
         more, less = (np.log(self._factor(weight * np.exp(step))[-1]).sum() for step in (STEP, -STEP))
         change = coefficients - self._reference
         gained = float((change * (self._product @ change - 2.0 * self._left)).sum())
@@ -215,7 +215,7 @@ class Smoother:
         """
         rows = self.basis.rows(u, derivative)
         spread: Array = np.empty(len(u))
-        at_once = max(1, AT_ONCE // self.basis.size)
+        at_once = max(1, MAX_DENSE_ELEMENTS // self.basis.size)
         for start in range(0, len(u), at_once):
             part = rows[start : start + at_once].toarray().T
             spread[start : start + at_once] = np.einsum("ij,ij->j", part, self._solved(fit.factor, part))

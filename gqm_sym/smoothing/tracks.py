@@ -18,37 +18,37 @@ import numpy as np
 from gqm_sym.budgets import spend
 from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.report import Smoothing
-from gqm_sym.smoothing.selection import APART, Choice, choose
+from gqm_sym.smoothing.selection import MIN_KNOT_DISTANCE, Choice, choose
 from gqm_sym.smoothing.splines import Array, Smoother
 
 # The number of coordinates of a track that is not in space.
 PLANE = 2
 # The number of fits; after the second little changes.
-ROUNDS = 4
+FITS = 4
 LAST = 2
 # The distance from an end within which the largest third derivative is found, in widths.
-REACH = 6.0
+END_WIDTHS = 6.0
 # The number of Newton steps to the place nearest to a point.
 STEPS = 4
 # The smallest value used for the derivative of a distance, as a share of its value on a straight track.
-STEEP = 0.3
+MIN_SLOPE_SHARE = 0.3
 # The number of nodes for the length of half a piece of the spline.
 NODES = 6
 # The number of points of the smoothed track in a width, for which the interpolant has the curvature to some 1e-4.
-A_WIDTH = 4.0
+POINTS_PER_WIDTH = 4.0
 # The smallest number of points of a smoothed track, and of places at which its errors are stated.
-FEWEST = 16
+MIN_POINTS = 16
 # A point is an outlier if its distance from the track is this many times the usual one, and this share of the usual
 # chord.
-STRAY = 10.0
-OFF = 0.1
+OUTLIER_RATIO = 10.0
+OUTLIER_SHARE = 0.1
 # The standard deviation of a normal variable, in medians of its absolute value.
 MEDIAN = 1.4826
 # A track that turns by more than this within its width, or from point to point, is out of order.
-SHARPEST = 0.5 * pi
+MAX_TURN = 0.5 * pi
 # The largest number of places at which errors are stated, and the limit of work for them.
 PLACES = 2000
-WORK = 100_000_000
+MAX_WORK = 100_000_000
 
 
 class _Track(NamedTuple):
@@ -159,14 +159,14 @@ def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
     lengths = np.concatenate([[0.0], np.cumsum(_length(np.diff(around, axis=0)))])
     dimension = points.shape[1]
     u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
-    for count in range(1, ROUNDS + 1):
+    for count in range(1, FITS + 1):
         deviations = [deviation]
-        if deviation is not None and count <= ROUNDS - LAST:
+        if deviation is not None and count <= FITS - LAST:
             deviations = [None, sqrt(dimension / (dimension - 1)) * deviation]
         choice = choose(u, points, period, deviations)
         track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
         u = _nearest(track, points)
-        if count < ROUNDS:
+        if count < FITS:
             u, period = _measured(track, u)
     return track._replace(u=u)
 
@@ -181,7 +181,7 @@ def _nearest(track: _Track, points: Array) -> Array:
         square = np.square(first).sum(axis=1)
         slope = square - np.where(u == inside, (off * second).sum(axis=1), 0.0)
         farthest = np.sqrt(np.square(off).sum(axis=1) / square)
-        u = u + np.clip((off * first).sum(axis=1) / np.maximum(slope, STEEP * square), -farthest, farthest)
+        u = u + np.clip((off * first).sum(axis=1) / np.maximum(slope, MIN_SLOPE_SHARE * square), -farthest, farthest)
     return u
 
 
@@ -228,11 +228,11 @@ def _places(track: _Track, closed: bool) -> Array:
     if choice.places is not None and choice.width < np.median(np.diff(choice.places)):
         period = basis.high - basis.low
         inner = np.sort(low + np.remainder(choice.places - low, period)) if closed else choice.places
-        least = APART * float(np.median(np.diff(inner)))
+        least = MIN_KNOT_DISTANCE * float(np.median(np.diff(inner)))
         inner = inner[(inner > low + least) & (inner < high - least)]
         places = np.concatenate([[low], inner, [high]])
     else:
-        places = np.linspace(low, high, max(FEWEST, ceil(A_WIDTH * (high - low) / choice.width)) + 1)
+        places = np.linspace(low, high, max(MIN_POINTS, ceil(POINTS_PER_WIDTH * (high - low) / choice.width)) + 1)
     return places[:-1] if closed else places
 
 
@@ -242,11 +242,11 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
     fit = choice.fit
     across = track.spline.c.shape[1] - 1
     estimate = sqrt(fit.residual / (across * max(len(shifts) - fit.freedom, 1.0)))
-    most = max(FEWEST, min(PLACES, WORK // choice.smoother.basis.size))
-    told = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
-    first, second = track.spline(told, 1), track.spline(told, 2)
+    most = max(MIN_POINTS, min(PLACES, MAX_WORK // choice.smoother.basis.size))
+    reported = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+    first, second = track.spline(reported, 1), track.spline(reported, 2)
     speed = _length(first)
-    lengths, _ = _measured(track._replace(u=told), told)
+    lengths, _ = _measured(track._replace(u=reported), reported)
     scatter = estimate if deviation is None else deviation
     return Smoothing(
         given=deviation,
@@ -258,7 +258,8 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
         degrees_of_freedom=fit.freedom,
         s=lengths,
         curvature=_across(first, second) / speed**3,
-        curvature_error=np.hypot(scatter * choice.smoother.spread(fit, told, 2), _end_errors(track, told)) / speed**2,
+        curvature_error=np.hypot(scatter * choice.smoother.spread(fit, reported, 2), _end_errors(track, reported))
+        / speed**2,
         points=np.empty((0, across + 1)),
         places=np.empty((0, across + 1)),
         places_s=_measured(track, track.u)[0],
@@ -280,7 +281,9 @@ def _end_errors(track: _Track, u: Array) -> Array:
     if basis.closed:
         return errors
     for end, sign in ((basis.low, 1.0), (basis.high, -1.0)):
-        near = np.clip(end + sign * np.linspace(0.0, REACH, 10 * int(REACH)) * choice.width, basis.low, basis.high)
+        near = np.clip(
+            end + sign * np.linspace(0.0, END_WIDTHS, 10 * int(END_WIDTHS)) * choice.width, basis.low, basis.high
+        )
         largest = float(_length(track.spline(near, 3)).max())
         x = np.maximum(sign * (u - end), 0.0) / choice.width
         turn = 0.5 * sqrt(3.0) * x
@@ -294,7 +297,7 @@ def _check_shifts(shifts: Array, points: Array, rows: Sequence[int], deviation: 
     usual = max(MEDIAN * float(np.median(shifts)), deviation or 0.0)
     worst = int(shifts.argmax())
     chord = float(np.median(_length(np.diff(points, axis=0))))
-    if shifts[worst] > max(STRAY * usual, OFF * chord):
+    if shifts[worst] > max(OUTLIER_RATIO * usual, OUTLIER_SHARE * chord):
         raise DeclarationError(
             f"sampled: row {rows[worst]}: is {shifts[worst]:.3g} m from the smooth track, where the points scatter by "
             f"{usual:.3g} m; leave it out if it is stray, or give the standard deviation as smoothing"
@@ -306,7 +309,7 @@ def _check_turns(track: _Track, report: Smoothing, rows: Sequence[int]) -> None:
     k = int(np.abs(report.curvature).argmax())
     usual = float(np.median(np.abs(np.diff(track.u))))
     turn = abs(float(report.curvature[k])) * max(report.width, usual)
-    if turn > SHARPEST:
+    if turn > MAX_TURN:
         row = rows[int(np.abs(report.places_s - report.s[k]).argmin())]
         raise DeclarationError(
             f"sampled: row {row}: the smooth track turns by {turn * 180.0 / pi:.0f} degrees there within "

@@ -25,7 +25,7 @@ ModelAt: TypeAlias = Callable[[tuple[str, ...]], Any]
 
 
 def explain(
-    detail: Any, tree: MapNode, mistakes: Mistakes, model_at: ModelAt, *, spoilt: Collection[Mark] = ()
+    detail: Any, tree: MapNode, mistakes: Mistakes, model_at: ModelAt, *, refused_places: Collection[Mark] = ()
 ) -> None:
     """Record a mistake that pydantic found, with our message.
 
@@ -39,7 +39,7 @@ def explain(
         The record of the file's mistakes.
     model_at
         A function that returns the model of the mapping at a place of the file.
-    spoilt
+    refused_places
         Places at which something could not be read; consequences of that are not reported.
     """
     loc = tuple(detail["loc"])
@@ -51,7 +51,7 @@ def explain(
     label = f"{path}: " if path else ""
     # The place of an empty value is on some later line, so its key is reported.
     value_mark = mark if isinstance(node, Scalar) and not node.text else node.mark
-    if {mark, node.mark} & set(spoilt):
+    if {mark, node.mark} & set(refused_places):
         return
     if kind == "gqm":
         column = detail["ctx"]["column"]

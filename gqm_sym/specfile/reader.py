@@ -94,10 +94,10 @@ class _Reader:
         try:
             CurveFile.model_validate(self.data)
         except ValidationError as error:
-            spoilt = self.mistakes.places()
+            refused_places = self.mistakes.places()
             for detail in error.errors(include_url=False, include_input=False):
                 self.bad.append(detail["loc"])
-                explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
+                explain(detail, self.tree, self.mistakes, model_at, refused_places=refused_places)
         curve, kernel = self._curve(), self._kernel()
         declared = {name: self._section(Parameter, "parameters", name) for name in self._declared()}
         if curve is not None and kernel is not None:

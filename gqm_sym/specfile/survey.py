@@ -12,9 +12,9 @@ from xml.parsers import expat
 
 from gqm_sym.arguments import file_path, short
 from gqm_sym.errors import InputError
-from gqm_sym.specfile.beside import ROW_LIMIT, read_beside, read_rows
+from gqm_sym.specfile.companion_files import ROW_LIMIT, read_companion, read_rows
 
-WANTED = "a CSV file with columns x, z, or x, y, z, perhaps with roll, or a GPX file"
+EXPECTED_COLUMNS = "a CSV file with columns x, z, or x, y, z, perhaps with roll, or a GPX file"
 """A description of files of points, for messages."""
 # The columns of a table without names, by the number of columns.
 _UNNAMED = {2: ("x", "z"), 3: ("x", "y", "z"), 4: ("x", "y", "z", "roll")}
@@ -24,7 +24,7 @@ _PLACES = ("trkpt", "rtept")
 EQUATOR, FLATTENING = 6378137.0, 1.0 / 298.257223563
 # The largest distance of a track from its first point in m; the Earth's curvature displaces a place by some d**3/(6
 # R**2).
-FARTHEST = 50_000.0
+MAX_DISTANCE = 50_000.0
 
 
 class Survey(NamedTuple):
@@ -71,13 +71,13 @@ def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
     try:
         file = file.resolve(strict=True)
     except (OSError, ValueError, RuntimeError):
-        raise InputError(f"read_track: path: there is no file {short(str(file))}; give {WANTED}") from None
+        raise InputError(f"read_track: path: there is no file {short(str(file))}; give {EXPECTED_COLUMNS}") from None
     found = surveyed(file.name, file.parent)
     rows = found.rows
     if found.roll is not None:
         rows = [[*row, angle] for row, angle in zip(rows, found.roll, strict=True)]
     if not rows:
-        raise InputError(f"{file.name!r}: has no points; give {WANTED}")
+        raise InputError(f"{file.name!r}: has no points; give {EXPECTED_COLUMNS}")
     width = len(rows[0])
     for k, row in enumerate(rows, found.first_line):
         if len(row) != width or width not in _UNNAMED:
@@ -98,7 +98,7 @@ def surveyed(name: str, folder: Path) -> Survey:
     InputError
         If the file does not contain points.
     """
-    text = read_beside(name, folder, wanted=WANTED)
+    text = read_companion(name, folder, wanted=EXPECTED_COLUMNS)
     if name.lower().endswith(".gpx"):
         return Survey(_local(name, _Reader(name).read(text)), None, 1)
     header, rows = read_rows(name, text)
@@ -230,9 +230,9 @@ def _local(name: str, places: Sequence[Sequence[float]]) -> list[list[float]]:
         turn = radians(longitude) - start
         away = out * cos(turn) - first[0]
         rows.append([out * sin(turn), (along - first[1]) * cos(north) - away * sin(north), height])
-        if (far := hypot(*rows[-1][:2])) > FARTHEST:
+        if (far := hypot(*rows[-1][:2])) > MAX_DISTANCE:
             raise InputError(
                 f"{name!r}, point {count}: is {far / 1e3:.3g} km from the first; a track goes no further than "
-                f"{FARTHEST / 1e3:.0f} km, as the Earth is round"
+                f"{MAX_DISTANCE / 1e3:.0f} km, as the Earth is round"
             )
     return rows

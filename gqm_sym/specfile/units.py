@@ -48,8 +48,8 @@ def expected_units(
         elif unit_of(found.get(name)):
             units.setdefault(name, unit_of(found[name]))
     last = {name: unit_of(own) for name, own in found_dimensions(formulas, known).items()}
-    told = {name: unit for name, unit in last.items() if unit and name not in {*given, *formulas.variables}}
-    return {**told, **units}
+    inherited = {name: unit for name, unit in last.items() if unit and name not in {*given, *formulas.variables}}
+    return {**inherited, **units}
 
 
 def _by_role(data: Mapping[str, Any]) -> dict[str, str]:

@@ -145,7 +145,7 @@ class FitPlan:
             for name, value in found.estimates.items()
         }
         rms = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in found.residuals.items()}
-        told = {
+        content = {
             "title": self.title,
             "curve": self.name,
             "estimates": estimates,
@@ -157,7 +157,7 @@ class FitPlan:
             "rms_of_residuals": rms,
             "fixed": self.fixed,
         }
-        return json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _finite(value: float) -> float | None:

@@ -19,7 +19,7 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.literals.units import check_unit, read_unit
 from gqm_sym.parameters import in_si
 from gqm_sym.specfile import Spec, read_spec
-from gqm_sym.specfile.beside import path_beside, read_beside, read_rows
+from gqm_sym.specfile.companion_files import companion_path, read_companion, read_rows
 from gqm_sym.specfile.explain import explain
 from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
@@ -98,15 +98,15 @@ class StudyReader(ABC, Generic[P]):
         try:
             return schema.model_validate(plain(self.tree))
         except ValidationError as error:
-            spoilt = self.mistakes.places()
+            refused_places = self.mistakes.places()
             for detail in error.errors(include_url=False, include_input=False):
-                explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
+                explain(detail, self.tree, self.mistakes, model_at, refused_places=refused_places)
             return None
 
     def curve(self, name: str) -> tuple[Spec, Model] | None:
         """Return the curve file and its model; mistakes in the curve file are reported as its own."""
         try:
-            path = path_beside(name, self.folder, wanted="a curve file")
+            path = companion_path(name, self.folder, wanted="a curve file")
         except InputError as error:
             self.mistakes.add(*locate(self.tree, str(error), ("curve",)))
             return None
@@ -123,7 +123,7 @@ class StudyReader(ABC, Generic[P]):
         """Yield the columns of a table in SI units."""
         name, units = table.file, table.units
         try:
-            text = read_beside(name, self.folder, wanted="a CSV file whose first line names its columns")
+            text = read_companion(name, self.folder, wanted="a CSV file whose first line names its columns")
             header, rows = read_rows(name, text)
             columns = _columns(name, header, rows)
         except InputError as error:

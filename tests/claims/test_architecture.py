@@ -1,4 +1,6 @@
-"""Who imports whom: the table of ARCHITECTURE.md, held against the imports as they stand."""
+"""The table of ARCHITECTURE.md says which unit imports which; these tests compare it with the imports of the
+package.
+"""
 
 import ast
 import sys
@@ -51,7 +53,7 @@ LAYERS = (
     {"errors"},
 )
 
-# A motion is drawn and converted by what lies above it, as pandas and xarray do it: these imports alone go upwards.
+# As in pandas and xarray, a motion has methods for what lies above it: these imports alone go upwards.
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
     ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
@@ -63,13 +65,13 @@ PRESENTATION_HOOKS = {
     ("runtime/sweep/result.py", "gqm_sym.export.datasets"),  # Sweep.to_pandas, Sweep.to_xarray
 }
 
-# Not above the runtime though it lies in a layer above it: they know it by name only.
+# These units are not above the runtime, though they lie in a layer above it, because they know it by name only.
 KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters", "expressions"}
 
-# No folder of the package holds more files than a reader takes in at a glance.
+# No folder of the package holds more files than a reader can survey.
 MAX_FILES = 16
 
-# Files of the runtime without a test file of their name in their room, and the tests that would fail with them.
+# These files of the runtime have no test file of their name in their room; the tests named would fail with them.
 DIFFERENCES = "runtime/arithmetic/divided_differences/test_differences.py"
 TESTED_THROUGH = {
     "arithmetic/clenshaw.py": "runtime/motion/test_sampler.py",
@@ -200,7 +202,7 @@ TESTED_THROUGH = {
     "vocabulary.py": DIFFERENCES,
 }
 
-# Packages that only some parts import.
+# Only some parts import these packages.
 ONLY_IN = {
     "distributed": {"runtime"},
     "jax": {"jax"},
@@ -235,16 +237,16 @@ ONLY_IN = {
     "xarray": {"cli", "export", "studies"},
 }
 
-# Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
+# These are imported when exact digits, splines, pictures, datasets or units are asked for, never when a module loads.
 ONLY_INSIDE_FUNCTIONS = {
     *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "torch", "xarray"),
 }
 
 
 class Import(NamedTuple):
-    """One import: by which file of which unit, of what, and whether it waits for a call.
+    """One import: the file and the unit that import, what they import, and whether the import waits for a call.
 
-    What only a type checker reads waits for ever.
+    An import that only a type checker reads waits for ever.
     """
 
     file: str
@@ -260,7 +262,7 @@ def _unit(parts: Sequence[str]) -> str:
 
 
 def _parts(path: Path) -> tuple[str, ...]:
-    """The dotted name of a file's module below the package; the front of a folder has the folder's name."""
+    """Return the dotted name of a file's module below the package; the front of a folder has the folder's name."""
     parts = path.relative_to(PACKAGE).with_suffix("").parts
     return parts[:-1] if parts[-1] == "__init__" else parts
 
@@ -291,7 +293,9 @@ FILES = {
 
 
 def _modules(target: str, names: Sequence[str]) -> Iterator[str]:
-    """The modules that ``from target import names`` needs: submodules where the names are some, else the target."""
+    """Return the modules that ``from target import names`` needs: submodules where the names are some, else the
+    target.
+    """
     for name in names or [""]:
         inside = (*target.split(".")[1:], name)
         yield f"{target}.{name}" if inside in FILES else target
@@ -299,7 +303,7 @@ def _modules(target: str, names: Sequence[str]) -> Iterator[str]:
 
 @cache
 def _imports() -> tuple[Import, ...]:
-    """Every import of the package."""
+    """Return every import of the package."""
     return tuple(_read_imports())
 
 
@@ -317,7 +321,7 @@ def _read_imports() -> Iterator[Import]:
 
 
 def _upward(rows: Iterable[Import]) -> list[str]:
-    """The imports that do not go downwards; the package's front imports all units, waiting."""
+    """Return the imports that do not go downwards; the package's front imports all units, but its imports wait."""
     wrong = []
     for row in rows:
         if not row.target.startswith("gqm_sym.") or not row.unit or (row.file, row.target) in PRESENTATION_HOOKS:
@@ -330,25 +334,27 @@ def _upward(rows: Iterable[Import]) -> list[str]:
 
 
 def test_every_unit_has_its_place() -> None:
-    """A new file or folder of the package is put into the table before anything imports it."""
+    """A new file or folder of the package must be entered in the table before anything imports it."""
     assert {_unit(parts) for parts in FILES if parts} == set(LEVEL)
 
 
 def test_imports_go_downwards() -> None:
-    """No unit imports one beside or above it but for the presentation hooks."""
+    """Except for the presentation hooks, no unit imports a unit beside or above it."""
     assert _upward(_imports()) == []
 
 
 @pytest.mark.parametrize("unit", sorted(set(LEVEL) - {"cli"}))
 def test_an_upward_import_is_noticed(unit: str) -> None:
-    """An import of the command line, the highest unit, from any other fails, also where it waits."""
+    """If any unit imports the command line, which is the highest one, the check fails, also for an import that
+    waits.
+    """
     file = next(path for parts, path in FILES.items() if parts and _unit(parts) == unit)
     row = Import(file.relative_to(PACKAGE).as_posix(), unit, "gqm_sym.cli.gen", True)
     assert _upward([row]) != []
 
 
 def test_there_are_no_import_circles() -> None:
-    """No file imports itself through others: waiting imports count, and those for type checkers; hooks do not."""
+    """No file imports itself through others; imports that wait and those for type checkers count, hooks do not."""
     graph: dict[str, set[str]] = {}
     names = {path.relative_to(PACKAGE).as_posix(): ".".join(("gqm_sym", *parts)) for parts, path in FILES.items()}
     for row in _imports():
@@ -358,20 +364,22 @@ def test_there_are_no_import_circles() -> None:
 
 
 def test_no_folder_holds_too_many_files() -> None:
-    """A folder that outgrows its reader is cut into rooms."""
+    """A folder with more files than a reader can survey must be divided into rooms."""
     counts = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES.values())
     assert {folder: count for folder, count in counts.items() if count > MAX_FILES} == {}
 
 
 def _untested(files: Iterable[str], through: dict[str, str]) -> list[str]:
-    """Files of the runtime that have neither tests of their own nor a row in the table, or a row that is wrong."""
+    """Return the files of the runtime that have neither tests of their own nor a row in the table, and wrong rows."""
     own = {file: f"runtime/{Path(file).parent.as_posix()}/test_{Path(file).name}" for file in files}
     missing = {file for file, test in own.items() if (ROOT / "tests" / test).is_file() == (file in through)}
     return sorted(missing | {file for file, test in through.items() if not (ROOT / "tests" / test).is_file()})
 
 
 def test_one_can_find_the_tests_of_each_file_of_the_runtime() -> None:
-    """They lie in the room of its name, or the table says where they are; a file has one of both, and rows are true."""
+    """The tests of a file lie in the room of its name, or the table says where they are; each row of the table is
+    true.
+    """
     runtime = {
         path.relative_to(PACKAGE / "runtime").as_posix() for parts, path in FILES.items() if parts[:1] == ("runtime",)
     }
@@ -391,7 +399,7 @@ def test_each_room_says_what_it_is_for() -> None:
 
 
 def test_the_front_loads_nothing_heavy() -> None:
-    """Of the package, ``import gqm_sym`` loads only the errors at once."""
+    """At first, ``import gqm_sym`` loads no other part of the package than the errors."""
     loaded = {row.target for row in _imports() if not row.unit and not row.waits}
     outside = {target for target in loaded if target.split(".")[0] not in sys.stdlib_module_names}
     assert outside <= {"gqm_sym.errors"}
@@ -399,13 +407,13 @@ def test_the_front_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize("package", ONLY_IN)
 def test_a_package_is_imported_where_it_belongs(package: str) -> None:
-    """Each dependency has its units; what they need of it, others ask them for."""
+    """Only the units listed for a dependency import it; other units call these."""
     users = {row.unit.split(".")[0] for row in _imports() if row.target.split(".")[0] == package}
     assert users <= ONLY_IN[package]
 
 
 def test_no_other_package_is_imported() -> None:
-    """The dependencies are those of the table above and the standard library."""
+    """The package imports nothing but the dependencies of the table above and the standard library."""
     names = {row.target.split(".")[0] for row in _imports()}
     assert names - sys.stdlib_module_names - {"gqm_sym"} <= set(ONLY_IN)
 

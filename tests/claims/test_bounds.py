@@ -1,7 +1,7 @@
 """Bounds hold near separatrices, where a turning point is known to fewer digits than a double has.
 
-The truth is the time of flight to a place by Gauss-Legendre rules with forty digits: the motion is asked for that time,
-and must be at that place within the bound that it states.
+The true time of flight to a place is computed by Gauss-Legendre rules with forty digits. The motion is asked for its
+place at that time, which must be the true one within the bound that it states.
 """
 
 import random
@@ -17,10 +17,10 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 
 G = mpf("9.81")
-# Shares of the phase angle from the launch to the turning point.
+# Places are tested at these shares of the phase angle from the launch to the turning point.
 SHARES = (0.003, 0.05, 0.3, 0.7, 0.95, 1.0)
 
-# Curve, force, effective potential, ds/dlam, and the top of the barrier.
+# A row has the curve, the force, the effective potential, ds/dlam, and the top of the barrier.
 WELLS: dict[str, tuple[Any, Any, Callable[[Any], Any], Callable[[Any], Any], float]] = {
     "potential": (
         gqm.Curve.graph("u**2/2", parameter="u"),
@@ -47,7 +47,7 @@ WELLS: dict[str, tuple[Any, Any, Callable[[Any], Any], Callable[[Any], Any], flo
 
 
 def drawn(count: int) -> list[tuple[str, str, str, int]]:
-    """Launches from rest and with speed that all but reach a barrier."""
+    """Draw launches from rest and with speed that nearly reach a barrier."""
     draw, out = random.Random(19), []
     while len(out) < count:
         name = draw.choice(list(WELLS))
@@ -68,7 +68,7 @@ NAMED = [("potential", "707/1000", "0", 1), ("double well", "1.4141", "0", 1), (
 
 @pytest.fixture(scope="module")
 def wells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
-    """The module of each well."""
+    """Return the module of each well."""
     folder: Path = tmp_path_factory.mktemp("wells")
     return {
         name: gqm.build(gqm.derive(curve, force), name=name.replace(" ", "_"), folder=folder)

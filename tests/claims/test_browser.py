@@ -1,4 +1,4 @@
-"""Reports in a real browser: formulas laid out, figures drawn, nothing fetched, nothing to complain of."""
+"""A real browser lays out the formulas of a report and draws its figures; it fetches nothing and reports no errors."""
 
 import json
 import os
@@ -18,7 +18,7 @@ from gqm_sym.cli import tool
 CURVES = ROOT / "curves"
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 BROWSER = next((found for name in NAMES if (found := shutil.which(name))), "")
-# The browser itself is to ask nobody for anything.
+# The browser itself must not use the network.
 QUIET = (
     "--no-first-run",
     "--disable-background-networking",
@@ -28,7 +28,7 @@ QUIET = (
 
 pytestmark = pytest.mark.skipif(not BROWSER, reason=f"no browser: none of {', '.join(NAMES)} is installed")
 
-# Into a copy of the page: its own layout, as the page's title.
+# This script is added to a copy of the page, and writes the page's layout into its title.
 MEASURE = """<script>
 addEventListener("load", () => {
 const box = (element) => { const b = element.getBoundingClientRect(); return [b.width, b.height]; };
@@ -61,7 +61,7 @@ def browse(page: Path, *options: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module", params=["pendulum", "circle_coulomb"])
 def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of an example, with all of it in one file."""
+    """Return the report of an example, all of it in one file."""
     path = tmp_path_factory.mktemp("report") / f"{request.param}.html"
     assert tool.main(["report", str(CURVES / f"{request.param}.yaml"), "-o", str(path)]) == 0
     return path
@@ -78,7 +78,9 @@ def measured(page: Path, text: str) -> tuple[dict[str, Any], str]:
 
 
 def test_the_page_is_laid_out(page: Path) -> None:
-    """Fractions are taller than letters, figures have their size, nothing sticks out, is fetched or complained of."""
+    """Fractions are taller than letters, figures have their size, nothing exceeds the page or is fetched, and there are
+    no error messages.
+    """
     text = page.read_text(encoding="utf-8")
     seen, said = measured(page, text)
     assert seen["fetched"] == []
@@ -92,7 +94,7 @@ def test_the_page_is_laid_out(page: Path) -> None:
 
 
 def test_what_is_wrong_would_be_seen(tmp_path: Path) -> None:
-    """A page that fetches something and fails is caught doing so."""
+    """The check detects a page that fetches something and fails."""
     text = "<html><body><img src='http://127.0.0.1:9/x.png'/><script>nothing()</script></body></html>"
     seen, said = measured(tmp_path / "bad.html", text)
     assert seen["fetched"] == ["http://127.0.0.1:9/x.png"]
@@ -100,7 +102,7 @@ def test_what_is_wrong_would_be_seen(tmp_path: Path) -> None:
 
 
 def test_the_picture_has_the_figures(page: Path) -> None:
-    """Both colours of the curves are somewhere in it."""
+    """Both colours of the curves occur in the picture."""
     import matplotlib.image
 
     picture = page.with_name("page.png")

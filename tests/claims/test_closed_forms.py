@@ -1,4 +1,4 @@
-"""V² of dissipative motion in closed form: against numerical integration of the textbook equation at 30 digits."""
+"""Closed forms of V² of dissipative motion agree with a numerical integration of the textbook equation at 30 digits."""
 
 import json
 from collections.abc import Callable
@@ -16,15 +16,15 @@ import gqm_sym as gqm
 from gqm_sym.derivation.forces.particular_solution import particular_solution
 
 DIGITS = 30
-# Of mpmath's quadrature, of the largest W on the way.
+# The tolerance of mpmath's quadrature, relative to the largest W on the way.
 AGREED = mpf(10) ** -25
-# Of the runtime's march in doubles, of the largest V².
+# The tolerance of the runtime in doubles, relative to the largest V².
 MARCHED = 4e-15
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """A model with a closed form, values, the same in definitions, and a stretch of the curve."""
+    """A model with a closed form, its values as numbers and as definitions, and an interval of the curve."""
 
     curve: Callable[[], gqm.Curve]
     force: Callable[[], gqm.Kernel]
@@ -50,7 +50,7 @@ GRAVITY = gqm.Gravity()
 
 
 def half(kappa: mpf) -> mpf:
-    """A droplet's resistance."""
+    """Return a droplet's resistance."""
     return abs(kappa) / 2
 
 
@@ -212,7 +212,7 @@ CLOSED = {
 
 
 def derived(row: Row) -> gqm.Model:
-    """The model of a row."""
+    """Return the model of a row."""
     return gqm.derive(row.curve(), row.force())
 
 
@@ -250,7 +250,7 @@ def test_closed_form_is_the_integral(row: Row) -> None:
     ],
 )
 def test_elsewhere_it_is_an_integral(curve: Callable[[], gqm.Curve], force: Callable[[], gqm.Kernel]) -> None:
-    """Elsewhere the closed form is an integral; the model says so, and its text can be read."""
+    """If there is no closed form, V² is given as an integral; the model says so, and its text can be read."""
     model = gqm.derive(curve(), gqm.Gravity() + force())
     assert model.speed_squared_form == "quadrature"
     assert model.speed_squared.has(sp.Integral)
@@ -261,7 +261,7 @@ def test_elsewhere_it_is_an_integral(curve: Callable[[], gqm.Curve], force: Call
 
 
 def test_the_integral_is_the_paper_s_second_example() -> None:
-    """W where N first vanishes, from the reference tables (there N < 0 at launch)."""
+    """W is correct at the first place where N vanishes, which the reference tables give (N < 0 at launch)."""
     cases = json.loads((DATA / "paper_cases.json").read_text(encoding="ascii"))["cases"]
     (case,) = (case for case in cases if case["id"] == "example2_cubic_coulomb")
     event = case["expected"]["events"][0]
@@ -274,7 +274,7 @@ def test_the_integral_is_the_paper_s_second_example() -> None:
 
 
 def test_a_law_that_is_not_linear_is_an_equation() -> None:
-    """Under a law that is not linear, V² has a name but no form, and A contains it as W."""
+    """Under a law that is not linear in W, V² has a name but no closed form, and A contains it as W."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity() + gqm.CoulombFriction() + gqm.RotatingFrame())
     assert model.speed_squared_form == "equation"
     assert "not linear" in model.notes[-1]
@@ -284,7 +284,7 @@ def test_a_law_that_is_not_linear_is_an_equation() -> None:
 
 
 def test_conservative_forms_stay_as_they_are() -> None:
-    """Conservative forms have no signs and no notes; V**2 of a launch that just loses contact in a loop is 5 g L."""
+    """Conservative forms have no signs and no notes; a launch that just loses contact in a loop has V**2 = 5 g L."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity())
     assert (model.speed_squared_form, model.notes, model.dissipation) == ("closed", (), None)
     length, g = sp.Symbol("L", real=True), sp.Symbol("g", real=True)
@@ -293,7 +293,7 @@ def test_conservative_forms_stay_as_they_are() -> None:
 
 
 def test_liftoff_speed_under_friction() -> None:
-    """The launch speed for which N vanishes at a place puts N to zero there."""
+    """The liftoff speed at a place is the launch speed for which N vanishes there."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity() + gqm.CoulombFriction())
     force = model.normal_force.subs(model.v0, sp.sqrt(model.liftoff_speed_squared))
     at = {"theta": 2, "lam0": sp.Rational(1, 3), "L": 2, "mu": sp.Rational(1, 5), "g": 10, "m": 3}
@@ -318,7 +318,7 @@ X, A, K = sp.symbols("x a k", real=True)
     ],
 )
 def test_particular_solutions(source: sp.Expr, decay: sp.Expr, solution: sp.Expr | None) -> None:
-    """U' + Q U = P where U is a sum of products of functions in P and Q, and None elsewhere."""
+    """U' + Q U = P is solved if U is a sum of products of functions in P and Q; otherwise the result is None."""
     found = particular_solution(source, decay, X)
     assert (found is None) == (solution is None)
     if solution is not None:
@@ -326,7 +326,7 @@ def test_particular_solutions(source: sp.Expr, decay: sp.Expr, solution: sp.Expr
 
 
 def test_the_march_follows_the_closed_form() -> None:
-    """V² that the runtime marches to is the closed form's, on a leg each way and past a change of sides."""
+    """V² of the runtime agrees with the closed form on a leg in each direction and beyond a change of contact sign."""
     for name, lam0, v0, v, places in (
         ("drag", "-2", "0", 1, ("-1.9", "-1", "0", "1.25", "1.45")),
         ("drag", "1.5", "4", -1, ("1.4", "0.5", "-1")),

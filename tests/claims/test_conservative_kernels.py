@@ -1,4 +1,4 @@
-"""Motions under every conservative force: the reference tables, and laws that have closed forms."""
+"""Motions under every conservative force agree with the reference tables and with laws that have closed forms."""
 
 import json
 from collections.abc import Callable
@@ -17,18 +17,19 @@ from problems import DIGITS, number
 
 import gqm_sym as gqm
 
-# Half periods and periods are the doubles nearest to the truth. Worst measured: 0.49.
+# Half periods and periods are the doubles nearest to the true values. Worst measured: 0.49.
 NEAREST = 0.51
-# Of the motion's extent or its largest speed, to thousands of periods; worst measured: 1.7e-15 (speeds), else 1.0e-15.
+# The tolerance relative to the motion's extent or its largest speed, up to thousands of periods. Worst measured:
+# 1.7e-15 (speeds), otherwise 1.0e-15.
 POSITION = 2e-15
-# V**2, N and so on of the largest of their kind; worst measured: 2.5e-16.
+# The tolerance of V**2, N and so on relative to the largest of their kind. Worst measured: 2.5e-16.
 SAMPLE = 1e-15
-# Turning points, of the extent, and the time to the first; worst measured: 8e-17 and 5e-17.
+# The tolerance of turning points relative to the extent, and of the time to the first. Worst measured: 8e-17 and 5e-17.
 TURNING = 2.3e-16
 TIME = 2.3e-16
 
-# Of where the planet is, which after thousands of turns is a large angle; and of the largest V**2 and N.
-# Worst measured: 3.4e-16 and 5.5e-16.
+# The tolerance of a planet's place, which after thousands of turns is a large angle, and of V**2 and N relative to the
+# largest. Worst measured: 3.4e-16 and 5.5e-16.
 KEPLER_POSITION = 1e-15
 KEPLER_FIELD = 2e-15
 
@@ -36,12 +37,14 @@ ModuleNamed = Callable[[str], ModuleType]
 
 
 def circle() -> gqm.Curve:
-    """The circle of the tables, its angle from the downward vertical."""
+    """Return the circle of the tables, whose angle is measured from the downward vertical."""
     return gqm.families.circle(parameter="lam")
 
 
 def kepler_ellipse() -> gqm.Curve:
-    """An orbit about the origin, by the eccentric anomaly E from the nearest point (e is Euler's number)."""
+    """Return an orbit about the origin in terms of the eccentric anomaly E from the nearest point (e is Euler's
+    number).
+    """
     return gqm.Curve.parametric(x="a*(cos(E) - ecc)", z="a*sqrt(1 - ecc**2)*sin(E)", parameter="E", period="2*pi")
 
 
@@ -74,7 +77,7 @@ WRITTEN_OUT = "g*z - Omega**2*x**2/2 - k/sqrt(x**2 + (z - 3)**2)"
 
 @pytest.fixture(scope="session")
 def module_named(generated_folder: Path) -> ModuleNamed:
-    """Give the generated module of a row of MODELS."""
+    """Return the generated module of a row of MODELS."""
     built: dict[str, ModuleType] = {}
 
     def module(name: str) -> ModuleType:
@@ -122,19 +125,19 @@ def extent(rows: list[dict[str, str]], *names: str) -> float:
 
 
 def places(case: PaperCase) -> list[dict[str, str]]:
-    """All places on the orbit that the table names."""
+    """Return all places on the orbit that the table names."""
     rows = case.expected
     return [*rows["turning_points"], *rows["positions"], *rows["pass1"]]
 
 
 def test_the_cases_are_all_here() -> None:
-    """Rolling, rotating frame and the spiral."""
+    """The tables contain cases of rolling, of the rotating frame and of the spiral."""
     assert len(CASES) == 5
 
 
 @EVERY_CASE
 def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNamed) -> None:
-    """Kind, turning points and half period, and when the first is met."""
+    """The kind, the turning points, the half period and the time of the first turn agree with the tables."""
     motion = module_named(case.slug).solve(**case.launch)
     expected = case.expected
     assert motion.kind == "libration"
@@ -149,7 +152,7 @@ def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNam
 
 @EVERY_CASE
 def test_positions(case: PaperCase, module_named: ModuleNamed) -> None:
-    """lam, x, z and v, early and after thousands of periods."""
+    """lam, x, z and v agree with the tables, early and after thousands of periods."""
     motion = module_named(case.slug).solve(**case.launch)
     rows = places(case)
     lam = max(*(abs(float(row["lam"])) for row in rows), extent(rows, "lam"))
@@ -166,7 +169,7 @@ def test_positions(case: PaperCase, module_named: ModuleNamed) -> None:
 
 @EVERY_CASE
 def test_speed_field(case: PaperCase, module_named: ModuleNamed) -> None:
-    """V**2, N and kappa at the sampled places, of the largest among them."""
+    """V**2, N and kappa agree with the tables at the sampled places, relative to the largest value."""
     rows = case.expected["pass1"]
     field = module_named(case.slug).pass1([row["lam"] for row in rows], **case.launch)
     for ours, theirs in (("v2", "V2"), ("normal_force", "N"), ("kappa", "kappa"), ("x", "x"), ("z", "z")):
@@ -188,7 +191,7 @@ def orbital(e: str) -> dict[str, Any]:
 
 
 def orbital_period() -> mpf:
-    """Kepler's third law."""
+    """Return the period by Kepler's third law."""
     with mp.workdps(DIGITS):
         return 2 * mp.pi * mp.sqrt(number(HALF_AXIS) ** 3 / number(ATTRACTION))
 
@@ -202,7 +205,7 @@ def eccentric_anomaly(e: str, t: float) -> mpf:
 
 @ECCENTRICITIES
 def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
-    """V**2 = k*(2/r - 1/a) all round, and N is zero to rounding."""
+    """V**2 is k*(2/r - 1/a) all round, and N is zero to rounding."""
     lams = np.linspace(-3.0, 3.0, 61)
     field = module_named("kepler").pass1(lams, **orbital(e))
     with mp.workdps(DIGITS):
@@ -216,7 +219,7 @@ def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
 
 @ECCENTRICITIES
 def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None:
-    """The third law, and where it is at any time."""
+    """A planet obeys the third law, and Kepler's equation gives its place at any time."""
     motion = module_named("kepler").solve(**orbital(e))
     period = orbital_period()
     assert motion.kind == "circulation"
@@ -228,7 +231,7 @@ def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None
 
 @ECCENTRICITIES
 def test_the_centre_may_be_anywhere(e: str, module_named: ModuleNamed) -> None:
-    """The same orbit with the centre an expression in a parameter: same period, still no need of a track."""
+    """If the centre is an expression in a parameter, the period is the same and the track is still not needed."""
     launch = orbital(e) | {"b": f"({HALF_AXIS})*sqrt(1 - ({e})**2)", "f2": f"(({HALF_AXIS})*{e})**2"}
     del launch["ecc"]
     launch["k_sun"] = launch.pop("k")
@@ -243,7 +246,7 @@ def test_the_centre_may_be_anywhere(e: str, module_named: ModuleNamed) -> None:
 
 @pytest.mark.parametrize(("lam0", "v0"), [("3", "0"), ("-1.2", "0.001"), ("0", "25"), ("-0.96", "1e-6")])
 def test_a_harmonic_well_is_isochronous(lam0: str, v0: str, module_named: ModuleNamed) -> None:
-    """On any line the half period is pi/w and x(t) a sine, whatever the amplitude and the launch."""
+    """On any line the half period is pi/w and x(t) is a sine, whatever the amplitude and the launch."""
     w, lowest = number("1.3"), number("-24/25")
     motion = module_named("harmonic_line").solve(lam0, v0, w="1.3")
     with mp.workdps(DIGITS):
@@ -277,11 +280,11 @@ SUM_LAUNCH = {"lam0": "-0.3", "v0": "1.1", "a": "2", "b": "1", "Omega": "0.8", "
 def test_a_sum_of_forces_is_the_potential_written_out(
     summed: str, written: str, more: dict[str, str], module_named: ModuleNamed
 ) -> None:
-    """Closed forms, field and motion are the same."""
+    """A sum of forces and its potential written out have the same closed forms, field and motion."""
     ours, theirs = MODELS[summed](), MODELS[written]()
     for form in ("speed_squared", "normal_force", "tangential_acceleration", "kappa"):
         difference = getattr(ours, form) - getattr(theirs, form)
-        for k in (1, 2, 3):  # at places where no term is special, for such forms are equal if they are so there
+        for k in (1, 2, 3):  # Such forms are equal if they are equal at places where no term is special.
             values = {
                 symbol: sp.Rational(7 + 3 * i, 11 + k)
                 for i, symbol in enumerate(sorted(difference.free_symbols, key=str))
@@ -305,7 +308,7 @@ def test_a_sum_of_forces_is_the_potential_written_out(
 @ECCENTRICITIES
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 def test_a_planet_never_changes_sides(e: str, contact: str, module_named: ModuleNamed) -> None:
-    """N = 0 all round is no change of sign, and no loss of contact."""
+    """If N is 0 all round, N does not change its sign and contact is not lost."""
     motion = module_named("kepler").solve(**orbital(e), contact=contact)
     assert motion.kind == "circulation"
     assert motion.events == ()
@@ -313,7 +316,7 @@ def test_a_planet_never_changes_sides(e: str, contact: str, module_named: Module
 
 @pytest.mark.parametrize("factor", ["4/5", "6/5"])
 def test_off_speed_the_track_carries_what_is_missing(factor: str, module_named: ModuleNamed) -> None:
-    """Launched at f times the orbital speed, N = m κ (f² - 1) v0²: W differs by a constant, and N was zero."""
+    """A body launched at f times the orbital speed has N = m κ (f² - 1) v0², because W differs by a constant."""
     e = "3/5"
     launch = orbital(e)
     speed = number(launch["v0"])
@@ -331,13 +334,13 @@ def test_off_speed_the_track_carries_what_is_missing(factor: str, module_named: 
 
 
 def test_through_the_centre_nothing_is_nan(generated_folder: Path) -> None:
-    """A line through the centre of attraction: the fall ends there, and a launch from there is refused."""
+    """On a line through the centre of attraction the fall ends at the centre, and a launch from there is refused."""
     model = gqm.derive(gqm.Curve.graph("x/2"), gqm.CentralForce())
     module = gqm.build(model, name="through_the_centre", folder=generated_folder)
     motion = module.solve("1", k="2")
     assert motion.kind == "transit"
     assert motion.direction == -1
-    # r'' = -k/r**2 from rest at r0 = sqrt(5)/2: it takes pi/2*sqrt(r0**3/(2*k)).
+    # From rest at r0 = sqrt(5)/2, r'' = -k/r**2 takes pi/2*sqrt(r0**3/(2*k)).
     with mp.workdps(DIGITS):
         fall = mp.pi / 2 * mp.sqrt((mp.sqrt(5) / 2) ** 3 / 4)
         half = motion.state(float(fall) / 2)

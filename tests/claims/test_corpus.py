@@ -1,4 +1,4 @@
-"""The corpus of famous curves: every explicit one, through the public interface and as YAML."""
+"""Every explicit curve of the corpus of famous curves is tested through the public interface and as YAML."""
 
 import json
 from collections.abc import Callable
@@ -16,19 +16,20 @@ from paths import DATA
 
 import gqm_sym as gqm
 
-# Of the scale of each: turning points and times; what pass1 fills; a position at any t, also after 1000 periods.
+# The tolerances, relative to the scale of each: turning points and times; what pass1 fills; a position at any t, also
+# after 1000 periods.
 TURNING = 1e-14
 PERIOD_ULPS = 2.0
 TIME = 1e-14
 SAMPLE = 1e-13
 POSITION = 8e-15
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 ORBIT_POINTS = 401
 
-# Solved from their YAML files too; of the others the text of the module is compared.
+# These are solved from their YAML files too; for the others the text of the module is compared.
 SOLVED_FROM_YAML = ("Cardioid", "Lissajous curves", "Parabola")
 
 Expected = dict[str, Any]
@@ -36,7 +37,7 @@ Expected = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FamousCurve:
-    """An entry of the corpus, its numbers text."""
+    """An entry of the corpus, with its numbers as text."""
 
     name: str
     kind: str
@@ -48,16 +49,16 @@ class FamousCurve:
 
     @property
     def slug(self) -> str:
-        """Its name as an identifier."""
+        """Return the name as an identifier."""
         return "corpus_" + "".join(c if c.isalnum() else "_" for c in self.name.lower())
 
     @property
     def ends(self) -> dict[str, Any]:
-        """The period of a closed curve, the regular range of another."""
+        """Return the period of a closed curve, or the regular range of another one."""
         return {"domain": self.domain} if self.period is None else {"period": self.period}
 
     def declare(self) -> gqm.Curve:
-        """Declare it in the kind the corpus gives."""
+        """Declare the curve in the kind that the corpus gives."""
         given = {"parameter": self.parameter, **self.ends}
         if self.kind == "parametric":
             x, z = self.texts
@@ -65,11 +66,11 @@ class FamousCurve:
         return getattr(gqm.Curve, self.kind)(*self.texts, **given)
 
     def derive(self) -> gqm.Model:
-        """Derive its motion under gravity."""
+        """Derive the motion under gravity."""
         return gqm.derive(self.declare(), gqm.Gravity(), parameters=dict(self.parameters))
 
     def yaml(self, launch: Expected) -> str:
-        """Spell it as a curve file."""
+        """Write the curve as a curve file."""
         keys = {"parametric": ("x", "z"), "graph": ("z",), "polar": ("r",)}[self.kind]
         said = {**dict(zip(keys, self.texts, strict=True)), "parameter": self.parameter}
         curve = [f"    {key}: {value}" for key, value in said.items()]
@@ -97,7 +98,7 @@ def _flow(value: str | tuple[str, str]) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FamousMotion:
-    """A launch on a famous curve, and what it must come to."""
+    """A launch on a famous curve, and the expected results."""
 
     curve: FamousCurve
     count: int
@@ -108,12 +109,12 @@ class FamousMotion:
 
     @property
     def slug(self) -> str:
-        """Curve and number."""
+        """Return the curve's slug and a number."""
         return f"{self.curve.slug.removeprefix('corpus_')}_{self.count}"
 
     @property
     def start(self) -> dict[str, Any]:
-        """Arguments of ``module.solve``, all of them exact."""
+        """Return the arguments of ``module.solve``, all of them exact."""
         return {key: self.launch[key] for key in ("lam0", "v0", "direction")} | {"m": self.m, "g": self.g}
 
     def __hash__(self) -> int:
@@ -148,7 +149,7 @@ MotionOf = Callable[[FamousMotion], Any]
 
 
 def of_kind(*kinds: str) -> dict[str, Any]:
-    """Arguments of ``parametrize``: the motions of these kinds by their slugs."""
+    """Return arguments of ``parametrize``: the motions of these kinds by their slugs."""
     motions = [motion for motion in MOTIONS if motion.expect["kind"] in kinds]
     return {"argvalues": motions, "ids": [motion.slug for motion in motions]}
 
@@ -159,7 +160,7 @@ EVERY_CURVE = pytest.mark.parametrize("curve", CURVES, ids=[curve.slug for curve
 
 @pytest.fixture(scope="session")
 def famous_module(generated_folder: Path) -> ModuleOf:
-    """Give the generated module of a famous curve."""
+    """Return the generated module of a famous curve."""
     built: dict[str, ModuleType] = {}
 
     def module(curve: FamousCurve) -> ModuleType:
@@ -172,7 +173,7 @@ def famous_module(generated_folder: Path) -> ModuleOf:
 
 @pytest.fixture(scope="session")
 def famous_motion(famous_module: ModuleOf) -> MotionOf:
-    """Give a motion of the corpus, solved once."""
+    """Return a motion of the corpus, solved once."""
     solved: dict[str, Any] = {}
 
     def motion(famous: FamousMotion) -> Any:
@@ -194,7 +195,9 @@ class Scale:
 
 @cache
 def scale(famous: FamousMotion) -> Scale:
-    """Largest |lam| or the orbit's range of it, extent of the orbit in the plane, largest speed."""
+    """Return the largest |lam| or the orbit's range of it, the extent of the orbit in the plane, and the largest
+    speed.
+    """
     expect, lam0 = famous.expect, float(famous.launch["lam0"])
     if expect["kind"] == "libration":
         low, high = (float(text) for text in expect["turning_points"])
@@ -215,7 +218,7 @@ def scale(famous: FamousMotion) -> Scale:
 
 
 def coordinates(curve: FamousCurve, lams: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places of the curve as SymPy and NumPy give them."""
+    """Return places of the curve as SymPy and NumPy give them."""
     lam = sp.Symbol(curve.parameter)
     given = {name: sp.Rational(value) for name, value in curve.parameters}
     forms = [sp.sympify(text, locals={curve.parameter: lam}).subs(given) for text in curve.texts]
@@ -228,7 +231,7 @@ def coordinates(curve: FamousCurve, lams: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def test_all_explicit_curves_are_here() -> None:
-    """25 curves in the three kinds, 36 motions of three kinds."""
+    """The corpus has 25 curves of three kinds, and 36 motions of three kinds."""
     assert len(CURVES) == 25
     assert {curve.kind for curve in CURVES} == {"parametric", "graph", "polar"}
     assert {motion.expect["kind"] for motion in MOTIONS} == {"libration", "circulation", "transit"}
@@ -236,11 +239,11 @@ def test_all_explicit_curves_are_here() -> None:
 
 @pytest.mark.parametrize("famous", **of_kind("libration"))
 def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
-    """A libration goes between two turning points, met in order, half a period apart."""
+    """A libration goes between two turning points, which it meets in order, half a period apart."""
     motion, expect, of = famous_motion(famous), famous.expect, scale(famous)
     assert motion.kind == "libration"
     met = list(zip(expect["turning_points"], expect["turning_points_xz"], strict=True))
-    # A launch from rest is at the first of them, and falls in the direction of the other.
+    # A launch from rest is at the first turning point, and the body moves in the direction of the other.
     if (famous.launch["direction"] > 0) is not (famous.launch["v0"] == "0"):
         met.reverse()
     assert len(motion.turning_points) == 2
@@ -255,7 +258,7 @@ def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module:
 
 @pytest.mark.parametrize("famous", **of_kind("circulation"))
 def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """A circulation goes round again and again, each time in the loop time."""
+    """A circulation passes its place again after each loop time."""
     motion = famous_motion(famous)
     assert motion.kind == "circulation"
     assert len(motion.turning_points) == 0
@@ -264,14 +267,14 @@ def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
 
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """The first time at the given place; beyond it the body may turn, or leave."""
+    """The first time at the given place is correct; beyond it the body may turn or leave."""
     expected = famous.expect["transit_time"]
     assert error(famous_motion(famous).time_at(famous.launch["to"]), expected) <= TIME * float(expected)
 
 
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> None:
-    """A compiled loop answers the same, also for bodies that leave the curve."""
+    """A compiled loop gives the same times, also for bodies that leave the curve."""
     swept = famous_module(famous.curve).sweep("time_at", lam=famous.launch["to"], **famous.start)
     assert swept.route_counts() == {"single": 1}
     expected = famous.expect["transit_time"]
@@ -280,7 +283,7 @@ def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> No
 
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
-    """ds, kappa, V**2 and N at the sampled places, of the largest among the samples."""
+    """ds, kappa, V**2 and N are correct at the sampled places, relative to the largest value among the samples."""
     samples = famous.expect["samples"]
     field = famous_module(famous.curve).pass1([row["lam"] for row in samples], **famous.start)
     for name in ("ds", "kappa", "v2", "normal_force"):
@@ -291,7 +294,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
 
 @EVERY_MOTION
 def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """lam, x, z and v at each time; a periodic motion's last time is more than 1000 periods late."""
+    """lam, x, z and v are correct at each time; a periodic motion's last time is more than 1000 periods late."""
     motion, of = famous_motion(famous), scale(famous)
     rows = famous.expect["positions"]
     states = motion.state([row["t"] for row in rows])
@@ -306,7 +309,7 @@ def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
 
 @EVERY_MOTION
 def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """No position, early or late, is off by more than ``error_bound`` says."""
+    """No position, early or late, has a larger error than ``error_bound`` says."""
     motion = famous_motion(famous)
     for row in famous.expect["positions"]:
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
@@ -314,7 +317,7 @@ def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf
 
 @EVERY_MOTION
 def test_the_error_bound_is_useful(famous: FamousMotion, famous_motion: MotionOf) -> None:
-    """The error bound is at most a hundred times what is lost. The worst ratio measured is 31."""
+    """The error bound is at most a hundred times the error. The worst ratio measured is 31."""
     rows = [(row["t"], row["lam"]) for row in famous.expect["positions"]]
     assert overstatement(famous_motion(famous), rows, scale(famous).lam) <= USEFUL
 
@@ -328,7 +331,7 @@ def first_launch(curve: FamousCurve) -> FamousMotion:
 def test_a_curve_file_gives_the_same_module(
     curve: FamousCurve, famous_module: ModuleOf, generated_folder: Path, tmp_path: Path
 ) -> None:
-    """Byte by byte, whether declared in Python or in YAML; and the launch is read as it stands."""
+    """The module is the same byte by byte, whether declared in Python or in YAML, and the launch is read as written."""
     famous_module(curve)
     path = tmp_path / "curve.yaml"
     launch = first_launch(curve).launch
@@ -343,7 +346,7 @@ def test_a_curve_file_gives_the_same_module(
 
 @pytest.mark.parametrize("name", SOLVED_FROM_YAML)
 def test_a_curve_file_gives_the_same_digits(name: str, tmp_path: Path) -> None:
-    """Curve file, module, motion: half period and late position from the file alone."""
+    """The half period and a late position can be computed from the curve file alone."""
     famous = next(motion for motion in MOTIONS if motion.curve.name == name)
     path = tmp_path / "curve.yaml"
     path.write_text(famous.curve.yaml(famous.launch), encoding="utf-8")

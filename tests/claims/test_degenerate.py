@@ -1,4 +1,4 @@
-"""Digits at the edges of what doubles can tell: near separatrices, tiny, flat, eccentric, far from unit size, late."""
+"""Digits are right for extreme motions: near separatrices, tiny, flat, eccentric, far from unit size, and late."""
 
 import json
 import math
@@ -19,18 +19,19 @@ from problems import TRACKS, Track
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 
-# Half periods: nearly all within 1 unit in the last place, all within 2. Worst measured: 0.5.
+# The tolerances of half periods: nearly all are within 1 unit in the last place, all within 2. Worst measured: 0.5.
 MOST_ULPS, MOST_SHARE = 1.0, 0.95
 ALL_ULPS = 2.0
 
-# Positions at any time, of their scales (MATHS, section 7). A short arc far from the origin has coordinates that are
-# rounded to more than that of its extent: to so many units in the last place of the coordinate and of the parameter.
+# The tolerances of positions at any time, relative to their scales (MATHS, section 7). The coordinates of a short arc
+# far from the origin are rounded to more than that of its extent: to so many units in the last place of the coordinate
+# and of the parameter.
 POSITION = 8e-15
 COORDINATE_ULPS = 2.0
 
 TURNING_POINT_ULPS = 1.0
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 OWN = (
@@ -47,7 +48,7 @@ Expected = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edge:
-    """A launch, and what it must come to."""
+    """A launch, and the expected results."""
 
     slug: str
     track: str
@@ -77,7 +78,7 @@ MotionOf = Callable[[Edge], Any]
 
 @pytest.fixture(scope="module")
 def edge_motion(generated_folder: Path) -> MotionOf:
-    """Give a motion of the table, solved once."""
+    """Return a motion of the table, solved once."""
     built: dict[str, ModuleType] = {}
     solved: dict[str, Any] = {}
 
@@ -95,7 +96,7 @@ def edge_motion(generated_folder: Path) -> MotionOf:
 
 @cache
 def coordinates(track: Track) -> Callable[..., tuple[mpf, mpf, mpf]]:
-    """x, z and ds of a track, from SymPy."""
+    """Return x, z and ds of a track, from SymPy."""
     names = sp.symbols([track.parameter, *track.parameters], real=True)
     known = {symbol.name: symbol for symbol in names}
     x, z = (sp.sympify(text, locals=known, rational=True) for text in (track.x, track.z))
@@ -103,14 +104,14 @@ def coordinates(track: Track) -> Callable[..., tuple[mpf, mpf, mpf]]:
 
 
 def test_the_table_has_what_is_hard() -> None:
-    """Periodic motions and passages, near and far from everything."""
+    """The table has periodic motions and passages of each extreme kind."""
     assert len(EDGES) >= 45
     assert {edge.expected["kind"] for edge in EDGES} == {"libration", "circulation", "transit"}
 
 
 @EVERY_EDGE
 def test_kind_and_turning_points(edge: Edge, edge_motion: MotionOf) -> None:
-    """The motion is what the exact launch makes it, between the doubles nearest to its turning points."""
+    """The motion has the kind of the exact launch, and its turning points are the doubles nearest to the exact ones."""
     motion, expected = edge_motion(edge), edge.expected
     assert motion.kind == expected["kind"]
     points = sorted(expected.get("turning_points", ()), key=float)
@@ -120,7 +121,7 @@ def test_kind_and_turning_points(edge: Edge, edge_motion: MotionOf) -> None:
 
 
 def test_periods(edge_motion: MotionOf) -> None:
-    """Half periods and loop times are right to the last place, but for a few to the last but one."""
+    """Half periods and loop times are right to the last place, a few of them to the last but one."""
     lost = []
     for edge in PERIODIC:
         motion, expected = edge_motion(edge), edge.expected
@@ -134,7 +135,7 @@ def test_periods(edge_motion: MotionOf) -> None:
 
 @EVERY_EDGE
 def test_positions(edge: Edge, edge_motion: MotionOf) -> None:
-    """lam, x, z and v at any time, early, late, and where the body rushes."""
+    """lam, x, z and v are right at any time: early, late, and at times of fast motion."""
     motion, rows = edge_motion(edge), edge.expected["positions"]
     track = CURVES[edge.track]
     state = motion.state([row["t"] for row in rows])
@@ -156,7 +157,7 @@ def test_positions(edge: Edge, edge_motion: MotionOf) -> None:
 
 @EVERY_EDGE
 def test_the_error_bound_is_honest(edge: Edge, edge_motion: MotionOf) -> None:
-    """No position is off by more than ``error_bound`` says."""
+    """No position has a larger error than ``error_bound`` says."""
     motion = edge_motion(edge)
     for row in edge.expected["positions"]:
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
@@ -164,13 +165,15 @@ def test_the_error_bound_is_honest(edge: Edge, edge_motion: MotionOf) -> None:
 
 @EVERY_EDGE
 def test_the_error_bound_is_useful(edge: Edge, edge_motion: MotionOf) -> None:
-    """The error bound is at most a hundred times what is lost. The worst ratio measured is 63."""
+    """The error bound is at most a hundred times the error. The worst ratio measured is 63."""
     rows = [(row["t"], row["lam"]) for row in edge.expected["positions"]]
     assert overstatement(edge_motion(edge), rows, edge.lam_scale) <= USEFUL
 
 
 def test_separatrices_are_ill_conditioned_and_say_so(edge_motion: MotionOf) -> None:
-    """A launch to 1e-14 of a hilltop magnifies its own rounding; the quadrature has nothing to do with it."""
+    """A launch within 1e-14 of a hilltop magnifies its own rounding error; the condition number says so, and the
+    quadrature adds nothing.
+    """
     for edge in EDGES:
         motion = edge_motion(edge)
         assert motion.quadrature_error < 1e-14
@@ -180,7 +183,7 @@ def test_separatrices_are_ill_conditioned_and_say_so(edge_motion: MotionOf) -> N
 
 @pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9])
 def test_a_swing_that_almost_reaches_the_top(short: float, module_of: Callable[[str], ModuleType]) -> None:
-    """Launched at the bottom it turns where the energy is spent, to the last place of that number."""
+    """A body launched at the bottom turns at the place that its energy determines, to the last place of that number."""
     v0 = math.sqrt(4 * 9.81) * (1.0 - short)
     motion = module_of("circle").solve(0, v0, L=1)
     with mp.workdps(40):
@@ -192,7 +195,7 @@ def test_a_swing_that_almost_reaches_the_top(short: float, module_of: Callable[[
 @pytest.mark.parametrize("g", ["9.81", 9.81, 6.3221])
 @pytest.mark.parametrize("v0", [3e-3, 1.2e-7, 5.8e-12, 2.3e-14])
 def test_a_slow_launch_from_a_bottom(v0: float, g: Any, module_of: Callable[[str], ModuleType]) -> None:
-    """The bottom is no barrier that was cleared. Found by ``make soak``: turning points 35 times as far out."""
+    """The bottom is not taken for a barrier that was passed. ``make soak`` found turning points 35 times as far out."""
     with mp.workdps(60):
         height = mpf(v0) ** 2 / (2 * mpf(g))
         flat, round_ = height ** (mpf(1) / 4), mpf(2) * mp.acosh(1 + height / 2)
@@ -211,9 +214,10 @@ def test_a_slow_launch_from_a_bottom(v0: float, g: Any, module_of: Callable[[str
 
 @pytest.mark.parametrize("v0", [1e-2, 1e-5, 1e-7, 1e-10])
 def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], ModuleType]) -> None:
-    """The launch and its turning point are one place in doubles, and some time apart: sin(lam/2) = k*sn(u).
+    """Although the launch and its turning point are the same place in doubles, the time between them is right:
+    sin(lam/2) = k*sn(u).
 
-    Found beside what ``make soak`` found: positions after it were off by up to 1e-9.
+    Beside what ``make soak`` found, positions after it had errors of up to 1e-9.
     """
     motion = module_of("circle").solve(1.0, v0, 1, L=1, g="9.81")
     with mp.workdps(40):
@@ -230,7 +234,7 @@ def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], Module
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("exponent", [15, 17, 20, 30])
 def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str], ModuleType]) -> None:
-    """A launch next to the top is right on either side, wherever the nearest double lies (on one side it failed)."""
+    """A launch next to the top is right on either side, whichever double is nearest (on one side it failed)."""
     near = f"1/10**{exponent}"
     motion, other = (module_of("circle").solve(f"{side}*(pi {sign} {near})", L=1) for sign in "-+")
     with mp.workdps(100):
@@ -244,6 +248,8 @@ def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str]
 
 
 def test_nearer_to_the_top_than_can_be_told(module_of: Callable[[str], ModuleType]) -> None:
-    """A body launched there is refused with what would be right, where V**2 was divided by although it was zero."""
+    """A launch nearer to the top than doubles can resolve is refused, and the message says what would be right (V**2
+    was divided by although it was zero).
+    """
     with pytest.raises(SolutionError, match="launch a little farther from the equilibrium"):
         module_of("circle").solve("pi - 1/10**45", L=1).lam(1.0)

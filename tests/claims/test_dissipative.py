@@ -1,4 +1,6 @@
-"""Motions that lose energy: the reference cases through all their legs, closed forms, and where motions end."""
+"""Motions that lose energy agree with the reference cases on all legs and with closed forms, and end where they
+should.
+"""
 
 import json
 import math
@@ -22,9 +24,9 @@ CASES = {case["id"]: case for case in json.loads((DATA / "paper_cases.json").rea
 LOSING = [case for case in CASES if case.startswith(("example2", "table2_3", "table2_4", "table2_5"))]
 KINDS = {"turning_point": "turn", "N_zero_crossing": "contact-sign", "final_rest": "rest"}
 
-# What the work asks for; of a place relative to the leg it ends, of V**2 and N relative to their largest.
+# The tolerance of places relative to the leg that they end, and of V**2 and N relative to their largest value.
 ASKED = 1e-13
-# Of closed forms: a few roundings of a time or place, times what the number of legs and slow tops amplify.
+# The tolerance of closed forms: a few roundings of a time or place, times the amplification by many legs and slow tops.
 FEW = 2e-14
 G = 9.81
 
@@ -32,24 +34,24 @@ Build = Callable[..., ModuleType]
 
 
 def circle() -> Any:
-    """A full circle, its angle from the bottom."""
+    """Return a full circle, whose angle is measured from the bottom."""
     return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
 
 
 @pytest.fixture(scope="module")
 def dragged(build: Build) -> ModuleType:
-    """A circle with quadratic drag."""
+    """Return a circle with quadratic drag."""
     return build("dragged_circle", circle(), gqm.QuadraticDrag(b="c"))
 
 
 @pytest.fixture(scope="module")
 def rubbed(build: Build) -> ModuleType:
-    """A circle with friction."""
+    """Return a circle with friction."""
     return build("rubbed_circle", circle(), gqm.CoulombFriction(mu="mu"))
 
 
 def reference(build: Build, name: str) -> tuple[Any, dict[str, Any]]:
-    """The motion of a reference case and what is known of it."""
+    """Return the motion of a reference case and what is known of it."""
     case = CASES[name]
     known, given, launch = case["kernel"]["params"], case["curve"], case["initial"]
     force = {
@@ -74,7 +76,7 @@ def reference(build: Build, name: str) -> tuple[Any, dict[str, Any]]:
 
 @pytest.mark.parametrize("name", LOSING)
 def test_reference_cases_through_all_their_legs(name: str, build: Build) -> None:
-    """Events, positions and passages are those of two independent methods, on every leg; the bound of lam holds."""
+    """Events, positions and passages agree with two independent methods on every leg, and the bound of lam holds."""
     motion, expected = reference(build, name)
     events = [event for event in motion.events if event.kind != "horizon"]
     assert [event.kind for event in events] == [KINDS[row["kind"]] for row in expected["events"]]
@@ -109,14 +111,16 @@ def test_reference_cases_through_all_their_legs(name: str, build: Build) -> None
 
 
 def _travelled(motion: Any, t: float) -> float:
-    """Length of the path up to a time, from arc lengths at the ends of legs."""
+    """Return the length of the path up to a time, from the arc lengths at the ends of legs."""
     times = [leg.t_end for leg in motion.legs if leg.t_end < t]
     return float(np.abs(np.diff(motion.state(np.array([0.0, *times, t])).s)).sum())
 
 
 @pytest.mark.parametrize("name", [name for name in LOSING if "coulomb" in name])
 def test_work_of_friction_is_the_energy_lost(name: str, build: Build) -> None:
-    """Friction's power, integrated over time by a Gauss rule of its own, is what the energy falls by on each leg."""
+    """On each leg, the energy decreases by the integral of friction's power over time, computed by a separate Gauss
+    rule.
+    """
     motion, _ = reference(build, name)
     mass, mu = float(CASES[name]["m"]), float(CASES[name]["kernel"]["params"]["mu"])
     nodes, weights = np.polynomial.legendre.leggauss(60)
@@ -124,7 +128,7 @@ def test_work_of_friction_is_the_energy_lost(name: str, build: Build) -> None:
     lost, work = [], []
     for leg in motion.legs:
         if abs(leg.lam_end) > 3.0:
-            continue  # runs away for ever
+            continue  # the body moves away for ever
         half = 0.5 * (leg.t_end - leg.t_start)
         state = motion.state(leg.t_start + half * (1.0 + nodes))
         work.append(half * float(weights @ (mu * np.abs(state.normal_force * state.v))))
@@ -136,18 +140,20 @@ def test_work_of_friction_is_the_energy_lost(name: str, build: Build) -> None:
 
 
 def test_ten_thousand_legs(dragged: ModuleType) -> None:
-    """Drag alone goes on for ever; leg 10000 ends where the closed form of V**2 says, as exactly as leg 1."""
-    # Each leg from where the one before it ended: along them roundings add up as in any start that is not exact.
+    """With drag alone the motion has no end; leg 10000 ends at the place of the closed form of V**2, as exactly as leg
+    1.
+    """
+    # Each leg is compared from the end of the one before, because roundings add up as in any start that is not exact.
     count = 10000
     motion = dragged.solve(lam0=1, c="0.01")
     assert motion.t_end == math.inf
     motion.lam(10000.0)
-    assert [leg.end for leg in motion.legs] == ["turn"]  # whatever has been asked for
+    assert [leg.end for leg in motion.legs] == ["turn"]  # whatever was asked before
     turns = dragged.solve(lam0=1, c="0.01", t_max=10000).turning_points
     with mp.workdps(25):
         k, worst = mpf("0.02"), mpf(0)
         for before, turn in list(pairwise(turns[: count + 1]))[::7]:
-            # On a leg from -a to b: e^(k th) (k sin th - cos th) is the same at both ends.
+            # On a leg from -a to b, e^(k th) (k sin th - cos th) is the same at both ends.
             amplitude = abs(mpf(before))
             start = mp.exp(-k * amplitude) * (-k * mp.sin(amplitude) - mp.cos(amplitude))
             b = abs(mpf(turn))
@@ -161,14 +167,16 @@ def test_ten_thousand_legs(dragged: ModuleType) -> None:
 
 
 def test_laps_then_libration_then_rest(rubbed: ModuleType) -> None:
-    """Fast round a circle with friction: laps, until the top is no longer reached; lam runs on; V**2 as integrated."""
+    """A fast body makes laps of a circle with friction until it no longer reaches the top; lam keeps counting, and V**2
+    agrees with an integration.
+    """
     motion = rubbed.solve(lam0=0, v0=30, mu="0.1")
     assert motion.legs[-1].end == "rest"
     turns = motion.turning_points
     assert turns[0] > 4.0 * math.pi
     last = motion.legs[-1].lam_end
     assert abs(last - 2.0 * math.pi * round(last / (2.0 * math.pi))) <= math.atan(0.1)
-    # While N > 0: W' = -2 g sin - 2 mu (W + g cos), whose solution is elementary.
+    # While N > 0, W' = -2 g sin - 2 mu (W + g cos) has an elementary solution.
     with mp.workdps(30):
         mu, g, place = mpf("0.1"), mpf("9.81"), mpf(12)
         k = 2 * mu
@@ -182,7 +190,9 @@ def test_laps_then_libration_then_rest(rubbed: ModuleType) -> None:
 
 
 def test_rest_and_release(rubbed: ModuleType) -> None:
-    """A slope that holds keeps the body; one that does not lets it go the way it falls, whatever was asked."""
+    """A body stays on a slope that friction holds it on; on a steeper one it moves downhill, whatever direction was
+    requested.
+    """
     held = rubbed.solve(lam0="0.0996", mu="0.1")
     assert held.kind == "rest"
     assert [event.kind for event in held.events] == ["rest"]
@@ -198,7 +208,9 @@ def test_rest_and_release(rubbed: ModuleType) -> None:
 
 @pytest.mark.parametrize(("contact", "v0", "at_once"), [("above", 6, False), ("below", 6, True), ("above", 20, None)])
 def test_contact_from_one_side(contact: str, v0: int, at_once: bool | None, rubbed: ModuleType) -> None:
-    """A body inside a loop leaves it where N vanishes, at once if the track would have to pull, never if fast."""
+    """A body inside a loop leaves it where N vanishes: at once if the track would have to pull, and never if it is
+    fast.
+    """
     motion = rubbed.solve(lam0=0, v0=v0, mu="0.05", contact=contact, t_max=0.6)
     if at_once is None:
         assert motion.legs[-1].end == "horizon"
@@ -223,7 +235,7 @@ def test_contact_sign_ends_no_leg_without_friction(dragged: ModuleType) -> None:
 
 
 def test_launch_where_the_contact_force_vanishes(build: Build) -> None:
-    """If N = 0 at launch, its sign is the one that follows, the same on both sides of exactly zero."""
+    """If N is 0 at launch, the contact sign is that of N afterwards, the same on both sides of exactly zero."""
     module = build("cubic_rubbed", gqm.Curve.graph("x**3", parameter="x"), gqm.CoulombFriction(mu="mu"))
     speed = math.sqrt(G * (1.0 + 9e-4) / 0.6)  # kappa V**2 + g dx/ds = 0 at x = -0.1
     places = [
@@ -236,8 +248,8 @@ def test_launch_where_the_contact_force_vanishes(build: Build) -> None:
 
 
 def test_approach_to_the_top(dragged: ModuleType) -> None:
-    """With exactly the speed that leads to rest at the top, the top is never reached; times on the way are as
-    integrated.
+    """A body with exactly the speed that leads to rest at the top never reaches it; its times on the way agree with an
+    integration.
     """
     with mp.workdps(40):
         k, g = mpf("0.2"), mpf("9.81")
@@ -254,13 +266,13 @@ def test_approach_to_the_top(dragged: ModuleType) -> None:
 
 
 def test_drag_on_straight_tracks(build: Build) -> None:
-    """On a level track V falls as 1/(1 + c v0 t) for ever; down a slope it tends to the terminal speed."""
+    """On a level track V falls as 1/(1 + c v0 t) without end; on a slope it tends to the terminal speed."""
     level = build("level_dragged", gqm.Curve.graph("0*x", parameter="x"), gqm.QuadraticDrag(b="c"))
     motion, t = level.solve(lam0=0, v0=3, c="0.1"), np.array([0.1, 1.0, 10.0, 1000.0])
     assert motion.lam(t) == pytest.approx(10.0 * np.log1p(0.3 * t), rel=FEW)
     assert motion.state(t).v == pytest.approx(3.0 / (1.0 + 0.3 * t), rel=FEW)
     assert motion.time_at(20) == pytest.approx(math.expm1(2.0) / 0.3, rel=FEW)
-    # A run through many powers of ten of V**2 had a table that was no better than its whole width.
+    # A run over many powers of ten of V**2 had a table with errors as large as its width.
     late = np.logspace(-1, 6, 8)
     assert np.all(motion.error_bound(late) <= 1e-14 * (10.0 + motion.lam(late)))
     slope = build("slope_dragged", gqm.Curve.graph("-x/2", parameter="x"), gqm.QuadraticDrag(b="c"))
@@ -271,7 +283,7 @@ def test_drag_on_straight_tracks(build: Build) -> None:
 
 
 def test_slow_launch_keeps_its_digits(build: Build) -> None:
-    """Down a straight slope with friction: the time is elementary, and a slow launch keeps it."""
+    """On a straight slope with friction the time is elementary, and a slow launch keeps its digits."""
     module = build("slope_rubbed", gqm.Curve.graph("-x", parameter="x"), gqm.CoulombFriction(mu="mu"))
     pull = G * 0.75 / math.sqrt(2.0)
     for v0 in (1.0, 1e-3, 1e-5, 1e-7):
@@ -284,7 +296,7 @@ def test_slow_launch_keeps_its_digits(build: Build) -> None:
 
 @pytest.mark.parametrize("v0", ["1e-3", "1e-7", "1e-9", "1e-12"])
 def test_slow_launch_on_a_bend_keeps_its_digits(v0: str, rubbed: ModuleType) -> None:
-    """Down a circle with friction, W elementary and integrated in 30 digits: no launch is too slow."""
+    """On a circle with friction W is elementary; times integrated with 30 digits show that no launch is too slow."""
     motion = rubbed.solve(lam0=1, v0=v0, direction=-1, mu="0.1")
     with mp.workdps(30):
         k, g, start = mpf("0.2"), mpf("9.81"), mpf(v0) ** 2
@@ -295,14 +307,14 @@ def test_slow_launch_on_a_bend_keeps_its_digits(v0: str, rubbed: ModuleType) -> 
         w = lambda x: part(x) + rest * mp.exp(k * x)  # noqa: E731
         behind = mp.sqrt(start / (2 * g * mp.sin(1) - k * (start + g * mp.cos(1))))
         for place in (0.999, 0.9, 0.25):
-            # With 1 - x = y (y + 2 behind) what is integrated is smooth.
+            # With 1 - x = y (y + 2 behind) the integrand is smooth.
             stop = mp.sqrt(behind**2 + (1 - mpf(place))) - behind
             pace = lambda y: 2 * (y + behind) / mp.sqrt(w(1 - y * (y + 2 * behind)))  # noqa: E731
             assert motion.time_at(place) == pytest.approx(float(mp.quad(pace, [0, stop])), rel=FEW)
 
 
 def test_droplet_over_kinks(build: Build) -> None:
-    """The droplet's resistance has a kink at each inflection: its work is c_d times the turning angle."""
+    """The droplet's resistance has a kink at each inflection, and its work is c_d times the turning angle."""
     module = build(
         "well_droplet", gqm.Curve.graph("x**4/4 - x**2/2", parameter="x"), gqm.SurfaceTension(gamma="0.3", ell_c=1)
     )
@@ -311,7 +323,7 @@ def test_droplet_over_kinks(build: Build) -> None:
     slope = lambda x: math.atan(x**3 - x)  # noqa: E731
 
     def turned(x: float) -> float:
-        """The turning angle from 1.7 down to x, every bit counted positive."""
+        """Return the turning angle from 1.7 to x, of which every part counts as positive."""
         marks = [1.7, *(m for m in (bend, -bend) if m > x), x]
         return sum(abs(slope(b) - slope(a)) for a, b in pairwise(marks))
 
@@ -361,7 +373,9 @@ def test_laws_of_the_user(law: str, build: Build) -> None:
 
 
 def test_a_viscous_law_on_the_level(build: Build) -> None:
-    """The body slows down for ever, and comes to v0/c from where it was launched; it was refused at any speed."""
+    """The body slows down for ever, and approaches a place at the distance v0/c from the launch (it was refused at any
+    speed).
+    """
     law = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
     module = build("level_viscous", gqm.Curve.graph("0*x", parameter="x"), law)
     for lam0, v0, c in ((1.0, 0.5, 0.3), (-2.0, 1e-7, 1.9), (0.0, 3.0, 40.0)):
@@ -422,7 +436,7 @@ def test_cusps_at_places_that_are_not_zero(name: str, loss: str, build: Build) -
 
 
 def test_ends_at_a_cusp(build: Build) -> None:
-    """Down an arch of a cycloid to its cusp, where V**2 is what friction left of the height."""
+    """After an arch of a cycloid the body ends at its cusp, with the V**2 that friction left of the height."""
     module = build("arch_rubbed", gqm.families.cycloid(), gqm.CoulombFriction(mu="mu"))
     motion = module.solve(lam0="pi", v0=1, mu="0.1", R=1)
     assert [leg.end for leg in motion.legs] == ["contact-sign", "cusp"]
@@ -431,7 +445,7 @@ def test_ends_at_a_cusp(build: Build) -> None:
 
 
 def test_pass1_is_the_launch_leg(rubbed: ModuleType, dragged: ModuleType) -> None:
-    """V**2 on the launch leg up to its first turn, through changes of contact sign; not a number beyond and behind."""
+    """pass1 gives V**2 on the launch leg up to its first turn, through changes of contact sign, and NaN elsewhere."""
     lam = np.array([-0.5, 0.0, 0.5, 1.5, 1.9, 2.5])
     rows = rubbed.pass1(lam, lam0=0, v0=6.3, mu="0.1")
     assert np.isnan(rows.v2).tolist() == [True, False, False, False, False, True]
@@ -447,7 +461,7 @@ def test_pass1_is_the_launch_leg(rubbed: ModuleType, dragged: ModuleType) -> Non
 
 
 def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) -> None:
-    """Places never reached, times beyond the rest and before the launch, are refused with the reason."""
+    """Places that are never reached, times after the rest and times before the launch are refused with the reason."""
     for module, given in ((rubbed, {"mu": "0.1"}), (dragged, {"c": "0.1"})):
         motion = module.solve(lam0=1, **given)
         with pytest.raises(gqm.GQMError, match="never at"):
@@ -459,7 +473,7 @@ def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) ->
 
 
 def test_a_motion_of_too_many_legs(dragged: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Legs are kept: a motion that would need memory without end says how far it got; what was asked before stays."""
+    """A motion of so many legs that memory would not suffice says how far it got, and keeps its earlier answers."""
     monkeypatch.setattr(driver, "MAX_STORED", 40)
     motion = dragged.solve(0.3, c="1e-6")
     early = motion.lam(5.0)

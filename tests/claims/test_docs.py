@@ -29,7 +29,7 @@ WITH_CODE = [
 def test_code_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The blocks of a page are one program; an output that is shown below a block is what that block prints."""
+    """The blocks of a page form one program, and an output shown below a block is what that block prints."""
     blocks = BLOCK.findall(page.read_text(encoding="utf-8"))
     monkeypatch.chdir(tmp_path)
     program = tmp_path / "program.py"
@@ -50,7 +50,7 @@ def test_the_pages_are_some() -> None:
 
 
 def test_every_notebook_is_in_the_index() -> None:
-    """The site lists it, and README links to it."""
+    """The site's index and the README list every notebook."""
     index, readme = ((ROOT / name).read_text(encoding="utf-8") for name in ("docs/index.md", "README.md"))
     for notebook in (ROOT / "notebooks").glob("*.ipynb"):
         assert f"made/{notebook.stem}" in index
@@ -58,7 +58,7 @@ def test_every_notebook_is_in_the_index() -> None:
 
 
 def test_the_example_file_is_right(tmp_path: Path) -> None:
-    """The curve file of the how-to solves, and the mistake shown is what is said of it."""
+    """The curve file of the how-to solves, and the mistake shown gives the message that the page prints."""
     page = (DOCS / "howto" / "files.md").read_text(encoding="utf-8")
     (text,) = [text for language, text in BLOCK.findall(page) if language == "yaml"]
     (mistake,) = [text for language, text in BLOCK.findall(page) if language == "text"]
@@ -82,7 +82,7 @@ def test_the_example_sweep_is_right(tmp_path: Path) -> None:
 
 
 def test_what_is_cited_as_maths_is_a_page() -> None:
-    """Docstrings, comments and generated modules name sections of it that exist."""
+    """Docstrings, comments and generated modules cite sections of the page on mathematics that exist."""
     page = (DOCS / "concepts" / "maths.md").read_text(encoding="utf-8")
     headings = set(re.findall(r"^## (\d)\. ", page, re.MULTILINE))
     files = [path for folder in ("gqm_sym", "generated", "tests") for path in (ROOT / folder).rglob("*.py")]
@@ -97,7 +97,7 @@ EXAMPLES = [path for path in sorted((ROOT / "gqm_sym").rglob("*.py")) if ">>> " 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_examples_in_docstrings(path: Path) -> None:
-    """Each gives what stands below it."""
+    """Each example gives the output that stands below it."""
     name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
     ran = doctest.testmod(importlib.import_module(name))
     assert ran.attempted > 0

@@ -1,4 +1,6 @@
-"""Launches at the edges of what is allowed: lips, corners, nodes, and numbers that are none."""
+"""Launches at the edges of what is allowed are answered or refused: at ends of tracks, corners, nodes, and with odd
+numbers.
+"""
 
 import math
 from collections.abc import Callable, Iterator
@@ -30,7 +32,7 @@ BALL = gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build a module once, by its name."""
+    """Return a module, built once for each name."""
     folder: Path = tmp_path_factory.mktemp("edges")
     built: dict[str, ModuleType] = {}
 
@@ -53,13 +55,15 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
         {"lam0": "pi/2 + 1/2", "v0": "sqrt(2*981/100)"},
     ],
 )
-def test_from_lip_to_lip(launch: dict[str, Any], build: Build) -> None:
-    """A body released at a lip of a half pipe comes to the other lip: two quarter swings and a metre at full speed."""
+def test_from_end_to_end(launch: dict[str, Any], build: Build) -> None:
+    """A body released at one end of a half pipe reaches the other end after two quarter swings and a metre at full
+    speed.
+    """
     motion = build("half_pipe", HALF_PIPE, gqm.Gravity()).solve(**launch)
     assert motion.kind == "libration"
     low, high = sorted(motion.turning_points)
     assert (low, high) == pytest.approx((0.0, math.pi + 1.0), abs=1e-15)
-    # In extended precision the turn is a rounding beyond the lip (-1.7e-54), where the track has no value.
+    # In extended precision the turn is a rounding (1.7e-54) beyond the end of the track, where the track has no value.
     assert 0.0 <= low < high <= motion.problem.high
     places = motion.lam(np.linspace(0.0, motion.period, 9))
     assert motion.problem.low <= places.min() < places.max() <= motion.problem.high
@@ -69,8 +73,8 @@ def test_from_lip_to_lip(launch: dict[str, Any], build: Build) -> None:
 
 
 @pytest.mark.parametrize("lam0", [0, "2*sqrt(2)"])
-def test_from_lip_to_lip_of_planes(lam0: Any, build: Build) -> None:
-    """The same on two planes: four times the time down one of them."""
+def test_from_end_to_end_of_planes(lam0: Any, build: Build) -> None:
+    """On two planes the same takes four times the time down one of them."""
     motion = build("vee", VEE, gqm.Gravity()).solve(lam0)
     assert motion.kind == "libration"
     assert motion.half_period == pytest.approx(2 * math.sqrt(4 / 9.81), rel=1e-15)
@@ -79,16 +83,16 @@ def test_from_lip_to_lip_of_planes(lam0: Any, build: Build) -> None:
 @pytest.mark.parametrize(
     ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
 )
-def test_losses_keep_a_body_from_the_other_lip(name: str, force: Any, build: Build) -> None:
-    """With losses the body turns before the other lip, at mirrored places from either side."""
+def test_losses_keep_a_body_from_the_other_end(name: str, force: Any, build: Build) -> None:
+    """With losses the body turns before the other end, at mirrored places from either side."""
     module = build(name, HALF_PIPE, gqm.Gravity() + force)
     left, right = (module.solve(lam0).turning_points[:2] for lam0 in (0, "pi + 1"))
     assert left[1] < math.pi + 1.0
     assert left[1] == pytest.approx(math.pi + 1.0 - right[1], abs=1e-14)
 
 
-def test_a_faster_body_leaves_over_the_lip(build: Build) -> None:
-    """A body with some speed at the lip does not turn there; one that just reaches it does."""
+def test_a_faster_body_leaves_over_the_end(build: Build) -> None:
+    """A body with some speed at the end does not turn there; one that just reaches the end does."""
     module = build("half_pipe", HALF_PIPE, gqm.Gravity())
     assert module.solve(0, "1/1000").events[-1].kind == "domain-end"
     bowl = build("bowl", gqm.Curve.graph("x**2", parameter="x", domain=(-1, 1)), gqm.Gravity())
@@ -98,7 +102,9 @@ def test_a_faster_body_leaves_over_the_lip(build: Build) -> None:
 
 
 def test_nothing_lies_beyond_the_ends_of_a_track(build: Build) -> None:
-    """pass1 gives NaN there; formulas go on, with the sign of V**2 that they have."""
+    """pass1 gives NaN beyond the ends of a track; a curve with formulas continues, with the sign of V**2 that they
+    have.
+    """
     rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/10")
     tracks = (("vee", VEE, gqm.Gravity()), ("half_pipe", HALF_PIPE, gqm.Gravity()), ("rough", HALF_PIPE, rough))
     for name, curve, force in tracks:
@@ -114,7 +120,9 @@ def test_nothing_lies_beyond_the_ends_of_a_track(build: Build) -> None:
 
 
 def test_the_time_at_a_turning_point_given_exactly(build: Build) -> None:
-    """The offset of a place from a turning point is that of the exact numbers: half of its digits are in the time."""
+    """The distance of a place from a turning point is that of the exact numbers; half of its digits determine the
+    time.
+    """
     swing = build("swing", gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi"), gqm.Gravity())
     motion = swing.solve(0, "sqrt(2*981/100)")
     quarter = motion.half_period / 2
@@ -144,7 +152,7 @@ def test_a_body_that_slips_at_launch_begins_to_slip_once(build: Build) -> None:
 
 
 def test_the_contact_force_before_a_node(build: Build) -> None:
-    """N keeps its sign up to the node of a lemniscate, although the curvature is 0/0 in the equation there."""
+    """N keeps its sign up to the node of a lemniscate, although the formula of the curvature is 0/0 there."""
     curve = gqm.Curve.implicit("(x**2 + z**2)**2 - x**2 + z**2", start=(1, 0))
     lemniscate = build("lemniscate", curve, gqm.Gravity())
     for contact, first in (("bilateral", ["singular-point"]), ("above", ["singular-point"])):
@@ -160,7 +168,9 @@ def test_a_ball_does_not_roll_over_corners(build: Build) -> None:
 
 
 def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
-    """Waves that become ever narrower: the ball fits where it is launched, and not where it comes to."""
+    """In waves that become ever narrower, a ball that fits at its launch but not at places that it reaches is refused
+    at once.
+    """
     waves = build("narrower", gqm.Curve.graph("-x + sin(x**2/20)", parameter="x"), BALL)
     with pytest.raises(SolutionError, match=r"does not fit into the track at x = 45\.9.* where it comes after 6\.46"):
         waves.solve(0, 1)
@@ -168,7 +178,7 @@ def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
 
 
 def test_floats_of_points_mean_their_binary_values() -> None:
-    """Every digit of a float is kept, so that the track goes through the very point; text stays as it is written."""
+    """Every digit of a float is kept, so that the track passes through the given point; text stays as it is written."""
     floats = gqm.Curve.sampled([(k / 10, (k / 10) ** 2) for k in range(-7, 8)])
     for given, kept in zip(range(-7, 8), floats.definition.points.splitlines(), strict=True):
         for value, text in zip((given / 10, (given / 10) ** 2), kept.split(), strict=True):
@@ -178,7 +188,7 @@ def test_floats_of_points_mean_their_binary_values() -> None:
     assert gqm.Curve.sampled([(2**60, 0), (0, 2**60 + 1)], kind="linear").definition.points.endswith(str(2**60 + 1))
 
 
-# What is given for a number: extremes, and what is none.
+# These values are given for numbers: extreme ones, and some that are no numbers.
 ODD: tuple[Any, ...] = (
     *(5e-324, 1e-320, 1e17, -1e17, 1e155, 1e300, math.nan, math.inf, -math.inf, True, np.bool_(True), 10**400, 1j),
     *("", "x", "1e400", "nan", "1/0", "(-1)**(1/2)", "0.25 ", b"1", Fraction(1, 3), Decimal("0.1"), Decimal("NaN")),
@@ -189,7 +199,7 @@ ODD: tuple[Any, ...] = (
 
 
 def calls(module: ModuleType, odd: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Calls with an odd number for one argument, by the argument's name."""
+    """Yield calls with an odd number for one argument, by the argument's name."""
     given = {name: 1 for name, default in module.PARAMETERS.items() if default is None}
     yield "lam0", lambda: module.solve(odd, **given).state(1e-3)
     for name in ("v0", "direction", "t_max", "g"):
@@ -218,7 +228,7 @@ def test_odd_numbers_are_answered_or_refused(name: str) -> None:
 
 
 def test_one_element_is_an_array_and_none_is_a_number() -> None:
-    """Arrays of no dimension are numbers; those of one element stay arrays of one element, in every answer."""
+    """Arrays of no dimension are numbers, and arrays of one element stay arrays in every answer."""
     from generated import circle, circle_coulomb, kepler
 
     for module in (circle, circle_coulomb, kepler):
@@ -243,7 +253,7 @@ def test_an_interval_of_too_many_events_is_refused() -> None:
 
 
 def test_what_is_no_model_is_refused_by_name() -> None:
-    """The argument is named, and what it must be."""
+    """An argument that is no model is named, and the message says what it must be."""
     for given in (None, "circle", gqm.Gravity()):
         with pytest.raises((GQMError, TypeError), match="model"):
             gqm.emit(given, name="none")
@@ -254,7 +264,9 @@ def test_what_is_no_model_is_refused_by_name() -> None:
     ("name", "force"), [("vee", gqm.Gravity()), ("rough_vee", gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))]
 )
 def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, build: Build) -> None:
-    """Its speed kept, the body passes each corner between two turns, and a leg ends there; at rest on it it stays."""
+    """A moving body keeps its speed at each corner between two turns, and a leg ends there; a body at rest on a corner
+    stays.
+    """
     motion = build(name, VEE, force).solve(1)
     first = [(event.kind, event.lam) for event in motion.events[:4] if event.kind == "corner"]
     assert first == [("corner", pytest.approx(math.sqrt(2), rel=1e-15))] * 2
@@ -267,7 +279,7 @@ def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, b
 
 
 def test_at_rest_at_a_cusp(build: Build) -> None:
-    """A body stays where the tangent of the cusp is level, as nothing moves it, and falls from any other cusp."""
+    """A body stays at a cusp with a level tangent, because no force moves it, and falls from any other cusp."""
     deltoid = gqm.Curve.parametric(x="2*cos(t) + cos(2*t)", z="2*sin(t) - sin(2*t)", parameter="t", period="2*pi")
     nephroid = gqm.Curve.parametric(x="3*cos(t) - cos(3*t)", z="3*sin(t) - sin(3*t)", parameter="t", period="2*pi")
     for name, curve, level in (("deltoid", deltoid, ("0",)), ("nephroid", nephroid, ("0", "pi"))):
@@ -286,7 +298,7 @@ def test_at_rest_at_a_cusp(build: Build) -> None:
 
 @pytest.mark.parametrize("height", ["1/1000", "1/100"])
 def test_a_very_flat_bowl(height: str, build: Build) -> None:
-    """Released on z = x**20 a body takes up to 10**26 s to the other side, by the beta function."""
+    """On z = x**20 a body takes up to 10**26 s to the other side, as the beta function says."""
     motion = build("flat_bowl", gqm.Curve.graph("x**20", parameter="x"), gqm.Gravity()).solve(height)
     a, power = mpf(1) / int(height.split("/")[1]), mpf(1) / 20
     half = 2 * a**-9 * mp.sqrt(mp.pi / (2 * G)) * mp.gamma(1 + power) / mp.gamma(mpf(1) / 2 + power)
@@ -300,7 +312,7 @@ ANGLES = ("pi", "-3*pi", "pi/2", "-pi/2", "pi/3", "2*pi/3", "5*pi/6", "pi/7", "1
 
 @pytest.mark.parametrize("alpha", ANGLES)
 def test_an_inclination_means_what_its_text_says(alpha: Any, build: Build) -> None:
-    """Bodies thrown up an incline turn after v0/(g sin(alpha)), and never where the text says that it is level.
+    """Bodies thrown up an incline turn after v0/(g sin(alpha)), and never if the text says that it is level.
 
     The sine of the double nearest to pi is 1.2e-16, and that of pi is 0.
     """

@@ -1,4 +1,4 @@
-"""The oldest versions that are tried are those that are promised."""
+"""The oldest versions that are tested are those that the requirements promise."""
 
 import ast
 import re
@@ -18,7 +18,9 @@ def release(version: str) -> tuple[int, ...]:
 
 
 def test_the_oldest_are_the_lower_bounds() -> None:
-    """Every requirement of the package, and of the extras that tests need, once and exactly."""
+    """Every requirement of the package, and of the extras that tests need, is tested at its lower bound, exactly and
+    once.
+    """
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     promised = [*project["dependencies"], *(line for name in TRIED for line in project["optional-dependencies"][name])]
     bounds = dict(re.fullmatch(r"([\w.-]+)>=([\d.]+)", line).groups() for line in promised)  # type: ignore[union-attr]

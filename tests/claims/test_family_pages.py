@@ -1,4 +1,4 @@
-"""Every family has a page of documentation that is what its derivation says."""
+"""Every family has a page of documentation, which agrees with its derivation."""
 
 import runpy
 

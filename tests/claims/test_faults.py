@@ -1,4 +1,6 @@
-"""Full disks, killed runs, damaged caches, old modules: correct output, or one clear error and nothing half done."""
+"""Full disks, killed runs, damaged caches and old modules lead to correct output or to one clear error, and leave
+nothing half done.
+"""
 
 import ctypes
 import errno
@@ -31,7 +33,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 
 def interruptible() -> None:
-    """Take Ctrl-C as from a terminal, also where the tests run in the background: jobs there begin by ignoring it."""
+    """Accept Ctrl-C as from a terminal, also if the tests run as a background job, which begins by ignoring it."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
@@ -55,18 +57,18 @@ def python(
 
 
 def unprivileged() -> None:
-    """Give up root's right to write what is read-only; others do not have it."""
+    """Give up root's right to write what is read-only; other users do not have it."""
     ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
 
 
 def names_in(folder: Path) -> list[str]:
-    """List a folder."""
+    """Return the names in a folder."""
     return sorted(entry.name for entry in folder.iterdir())
 
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    """Give the text of a small module."""
+    """Return the text of a small module."""
     return gqm.emit(gqm.derive(gqm.Curve.graph("6*x**2"), gqm.Gravity()), name="bowl")
 
 
@@ -84,14 +86,16 @@ def yaml(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Give a cache folder that nothing else uses."""
+    """Return a cache folder that nothing else uses."""
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
 @pytest.fixture
 def function(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Callable[[float], float]]:
-    """Make an entry point that adds a number, from a source file that is always the same to numba, or of some time."""
+    """Return an entry point that adds a number, from a source file that numba takes for the same, or with a given
+    time.
+    """
     monkeypatch.setattr(jit, "MAX_PYTHON_TIME", 0.0)
 
     def make(number: float, time: int = 1_000_000_000) -> Callable[[float], float]:
@@ -122,7 +126,7 @@ def _damage(cache: Path, pattern: str, content: Callable[[bytes], bytes]) -> Non
 def test_a_damaged_cache_is_made_anew(
     content: Callable[[bytes], bytes], cache: Path, function: Callable[[float], Any]
 ) -> None:
-    """Files that were cut off or overwritten cost a compilation, and are whole afterwards."""
+    """Files that were cut off or overwritten cost a compilation, and are complete afterwards."""
     assert function(2.0)(1.0) == 3.0
     _damage(cache, "*.nbc", content)
     assert function(2.0)(1.0) == 3.0
@@ -134,7 +138,7 @@ def test_a_damaged_cache_is_made_anew(
 def test_a_cache_of_other_code_is_not_used(
     cache: Path, function: Callable[[float], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another runtime at the same place, with the same times and sizes, gets code of its own."""
+    """Another runtime at the same place, with the same times and sizes, gets machine code of its own."""
     assert function(2.0)(1.0) == 3.0
     monkeypatch.setattr(jit, "stamp_for", lambda _: "another")
     assert function(5.0)(1.0) == 6.0
@@ -143,7 +147,7 @@ def test_a_cache_of_other_code_is_not_used(
 def test_killed_between_two_files_of_the_cache(
     cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An edit whose code was never kept is not answered by the code from before it."""
+    """An edit whose code was never stored is not answered by the machine code before it."""
     assert function(2.0)(1.0) == 3.0
     with monkeypatch.context() as patch:
         patch.setattr(IndexDataCacheFile, "_save_data", lambda *_: None)
@@ -154,14 +158,14 @@ def test_killed_between_two_files_of_the_cache(
 def test_two_at_once_keep_their_own_code(
     cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two versions that are kept at the same time, the one while the other is, are not taken for each other."""
+    """Two versions that are stored at the same time are not mistaken for each other."""
     save, waiting = IndexDataCacheFile._save_data, ["once"]
 
     def save_later(self: Any, name: str, data: Any) -> None:
         if waiting:
             waiting.clear()
             for index in cache.rglob("*.nbi"):
-                index.unlink()  # as if the other had looked before it was written
+                index.unlink()  # the same happens as if the other process had looked before it was written
             with monkeypatch.context() as patch:
                 patch.setattr(jit, "stamp_for", lambda _: "another")
                 assert function(5.0)(1.0) == 6.0
@@ -199,7 +203,7 @@ def test_a_cache_that_cannot_be_written(
 
 
 def test_no_folder_for_a_cache(monkeypatch: pytest.MonkeyPatch, function: Callable[[float], Any]) -> None:
-    """If nothing can be written at all, everything works, but is compiled anew in every process."""
+    """If nothing can be written, everything works, but is compiled anew in every process."""
     monkeypatch.setattr(KeyedCache._impl_class, "_locator_classes", [])
     assert jit.COMPILER.cache_of(function(2.0)) is None
     assert function(2.0)(1.0) == 3.0
@@ -209,7 +213,7 @@ def test_no_folder_for_a_cache(monkeypatch: pytest.MonkeyPatch, function: Callab
 
 
 def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> None:
-    """Names that the runtime no longer has are not asked for before the version: the message says what to run."""
+    """The version is checked before names that the runtime no longer has; the message says which command to run."""
     path = tmp_path / "old.py"
     old = text.replace(f"interface={INTERFACE})", f"interface={INTERFACE - 1})")
     imports = "from gqm_sym.runtime.vocabulary import ("
@@ -233,7 +237,7 @@ write_module(text, path)
 load(path, "small").effective_potential.compile()
 print("compiled")
 """
-# As gqm-gen writes them, with one function instead of seven.
+# The file is written as by gqm-gen, with one function instead of seven.
 SMALL = f"""from numba import carray
 
 from gqm_sym.runtime import compiler
@@ -251,7 +255,9 @@ def effective_potential(n, places, p, out):
 
 
 def test_four_processes_at_once(tmp_path: Path) -> None:
-    """All write and compile the same module, with one cache: each gets it whole, and nothing is left beside it."""
+    """Four processes write and compile the same module with one cache; each gets all of it, and no other files
+    remain.
+    """
     source, path = tmp_path / "text", tmp_path / "out" / "small.py"
     source.write_text(SMALL, encoding="utf-8")
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -275,7 +281,7 @@ sys.exit(main(["-q", *sys.argv[1:]]))
 
 
 def test_killed_while_writing(yaml: Path, text: str) -> None:
-    """The module that was there stays whole; the next run writes the new one."""
+    """If a run is killed while writing, the old module stays whole, and the next run writes the new one."""
     out = yaml.parent / "out"
     target = out / "bowl.py"
     write_module(text, target)
@@ -324,7 +330,7 @@ def test_interrupted_while_deriving(yaml: Path) -> None:
 
 
 RING = "name: ring\ncurve: {implicit: {F: x**2 + z**2 - 1, start: [0, -1]}}\nkernel: {gravity: {}}\n"
-# What is interrupted, the how-manieth call of it (a module is written first), and the command.
+# A row has what is interrupted, in which call of it (a module is written first), and the command.
 STAGES = {
     "a chart": ("gqm_sym.runtime.launch.formulas.Formulas.charted", 1, ["solve", "ring.yaml"]),
     "a figure": ("os.fsync", 2, ["plot", "ring.yaml", "ring.svg"]),
@@ -360,7 +366,7 @@ def test_interrupted_at_work(stage: str, tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written(yaml: Path) -> None:
-    """The error names it; what is in it stays."""
+    """If a folder cannot be written, the error names it, and its contents stay."""
     out = yaml.parent / "out"
     out.mkdir()
     out.chmod(0o555)
@@ -374,7 +380,7 @@ def test_a_folder_that_cannot_be_written(yaml: Path) -> None:
 
 @pytest.fixture(scope="module")
 def generated(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Give what a process with the tests' own settings writes."""
+    """Return what a process with the tests' own settings writes."""
     folder = tmp_path_factory.mktemp("plain")
     (folder / "bowl.yaml").write_text(FILE, encoding="utf-8")
     command = GENERATE + "sys.exit(main(sys.argv[1:]))"

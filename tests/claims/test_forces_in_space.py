@@ -1,4 +1,4 @@
-"""Frames that turn and tracks that push to one side only, on space curves, beside Newton's law and DOP853."""
+"""Rotating frames and tracks that push to one side only, on space curves, agree with Newton's law and DOP853."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -14,13 +14,13 @@ from gqm_sym.errors import DeclarationError, LaunchError, SolutionError
 Build = Callable[[str, Any, Any], ModuleType]
 Vector = np.ndarray[Any, np.dtype[np.float64]]
 
-# DOP853 at its tightest is right to some 1e-12 over a few seconds.
+# With its tightest tolerances DOP853 is right to some 1e-12 over a few seconds.
 INTEGRATED = 3e-11
 
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build a module once."""
+    """Return a module, built once."""
     folder, built = tmp_path_factory.mktemp("forces_in_space"), {}
 
     def module(name: str, curve: Any, force: Any) -> ModuleType:
@@ -32,13 +32,13 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 
 class Newton:
-    """A bead on a curve r(u) in a frame that turns about the z axis, by its forces as vectors."""
+    """A bead on a curve r(u) in a frame that rotates about the z axis, with its forces as vectors."""
 
     def __init__(self, curve: Callable[[float], tuple[Any, Any, Any]], omega: float = 0.0, mu: float = 0.0) -> None:
         self.curve, self.omega, self.mu = curve, np.array([0.0, 0.0, omega]), mu
 
     def forces(self, u: float, rate: float) -> tuple[Vector, Vector, Vector]:
-        """The contact force, the tangent and the applied force, per unit mass."""
+        """Return the contact force, the tangent and the applied force, per unit mass."""
         place, first, second = (np.array(row) for row in self.curve(u))
         tangent, velocity = first / np.linalg.norm(first), first * rate
         applied = np.array([0.0, 0.0, -9.81]) - np.cross(self.omega, np.cross(self.omega, place) + 2.0 * velocity)
@@ -46,7 +46,7 @@ class Newton:
         return missing - tangent * (tangent @ missing), tangent, applied
 
     def __call__(self, _: float, state: Vector) -> list[float]:
-        """The rates of u, du/dt and the energy lost."""
+        """Return the rates of u, du/dt and the energy lost."""
         u, rate, _ = state
         _, first, second = (np.array(row) for row in self.curve(u))
         contact, tangent, applied = self.forces(u, rate)
@@ -63,7 +63,7 @@ class Newton:
 
 
 def viviani(u: float) -> tuple[Any, Any, Any]:
-    """Viviani's curve with a radius of 1, and its first two derivatives."""
+    """Return Viviani's curve with a radius of 1, and its first two derivatives."""
     return (
         (1.0 + np.cos(u), np.sin(u), 2.0 * np.sin(u / 2)),
         (-np.sin(u), np.cos(u), np.cos(u / 2)),
@@ -75,20 +75,22 @@ VIVIANI = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter=
 
 
 def vectors(found: Any) -> Any:
-    """The contact force as rows of vectors."""
+    """Return the contact force as rows of vectors."""
     return np.stack([found.normal_x, found.normal_y, found.normal_z], axis=1)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_a_frame_that_turns(mu: float, build: Build) -> None:
-    """Places and the contact force with its Coriolis part, on the way there and back; friction feels that part."""
+    """Places and the contact force with its Coriolis part are right in both directions of motion, and friction includes
+    that part.
+    """
     frame = gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")
     force, name = (frame + gqm.CoulombFriction(), "rough_turning") if mu else (frame, "turning")
     module = build(name, VIVIANI, force)
     numbers = {"mu": mu} if mu else {}
     motion, newton = module.solve(-2, 4, t_max=30, **numbers), Newton(viviani, 1.5, mu)
     turn = motion.legs[0].t_end
-    # DOP853 cannot pass the jump of friction at a turn; without friction it is asked far beyond.
+    # DOP853 cannot pass the jump of friction at a turn; without friction it is asked for times far beyond.
     times = np.array([0.1, 0.4, 0.7, 0.95]) * (turn if mu else motion.period)
     truth, state = newton.follow(-2.0, 4.0, times).y, motion.state(times)
     contact = np.array([newton.forces(*column[:2])[0] for column in truth.T])
@@ -121,14 +123,14 @@ def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> N
 
 
 def test_a_hoop_that_turns_is_the_planar_one(build: Build) -> None:
-    """A hoop in a plane through the axis moves as the planar curve; the track carries the Coriolis force as well."""
+    """A hoop in a plane through the axis moves as the planar curve; the track also balances the Coriolis force."""
     force = gqm.Gravity() + gqm.RotatingFrame(Omega=2)
     flat = gqm.derive(gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u"), force)
     model = gqm.derive(gqm.Curve.space(x="3/5*sin(u)", y="4/5*sin(u)", z="-cos(u)", parameter="u"), force)
     assert model.speed_squared == flat.speed_squared
     hoop = build("turning_hoop", model.curve, force).solve("1/2", 1)
     state = hoop.state(np.linspace(0.0, hoop.period, 7))
-    # In the plane V**2 + (4*sin(u) - ...) balances; across it 2*Omega*V*dx/ds.
+    # In the plane V**2 + (4*sin(u) - ...) balances; across it the force is 2*Omega*V*dx/ds.
     sideways = 2.0 * 2.0 * state.v * np.cos(state.lam)
     in_plane = state.v2 + 9.81 * np.cos(state.lam) + 4.0 * np.sin(state.lam) ** 2
     assert state.normal_force == pytest.approx(np.hypot(in_plane, sideways), rel=4e-15)
@@ -136,7 +138,7 @@ def test_a_hoop_that_turns_is_the_planar_one(build: Build) -> None:
 
 
 def hill(u: float) -> tuple[Any, Any, Any]:
-    """A hill in a bend, and its derivatives."""
+    """Return a hill in a bend, and its derivatives."""
     return (
         (10.0 * u, 4.0 * np.sin(u / 2), 3.0 * np.cos(u)),
         (10.0, 2.0 * np.cos(u / 2), -3.0 * np.sin(u)),
@@ -145,7 +147,7 @@ def hill(u: float) -> tuple[Any, Any, Any]:
 
 
 def upright(u: float, roll: float) -> Vector:
-    """The upward direction of riders at a roll angle from the level."""
+    """Return the upward direction of riders at a roll angle from the level."""
     tangent = np.array(hill(u)[1])
     tangent /= np.linalg.norm(tangent)
     left = np.cross([0.0, 0.0, 1.0], tangent)
@@ -155,7 +157,9 @@ def upright(u: float, roll: float) -> Vector:
 
 @pytest.mark.parametrize("mu", [0.0, 0.05])
 def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
-    """Contact is lost where the contact force has no part along the upward direction any more, as DOP853 finds."""
+    """Contact is lost at the place that DOP853 finds, where the contact force has no component along the upward
+    direction.
+    """
     curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="3*cos(u)", parameter="u", roll="u/10")
     rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/20")
     module = build("rough_groove", curve, rough) if mu else build("groove", curve, gqm.Gravity())
@@ -187,7 +191,9 @@ def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
 
 
 def test_random_space_curves_with_friction(build: Build) -> None:
-    """Places, speeds, contact forces and what friction takes, up to the first turn of launches on twelve curves."""
+    """On twelve curves, places, speeds, contact forces and the energy lost to friction are right up to the first
+    turn.
+    """
     curve = gqm.Curve.space(
         x="a*cos(u) + b*sin(2*u)", y="c*sin(u) + d*cos(2*u)", z="h*cos(u + f) + k*sin(3*u)", parameter="u"
     )
@@ -219,7 +225,7 @@ def test_random_space_curves_with_friction(build: Build) -> None:
 
 
 def test_sides_that_nothing_tells_are_refused(build: Build) -> None:
-    """One error says what to declare."""
+    """If nothing determines the sides of a track, one error says what to declare."""
     module = build(
         "coordinated_hill", gqm.Curve.space(x="u", y="u**2", z="u**3", parameter="u", roll="coordinated"), gqm.Gravity()
     )

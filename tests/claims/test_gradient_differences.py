@@ -1,4 +1,6 @@
-"""Gradients of periods by every variable against differences of periods of 45 digits, for each conservative force."""
+"""Gradients of periods with respect to every variable agree with differences of periods of 45 digits, for each
+conservative force.
+"""
 
 import inspect
 from fractions import Fraction
@@ -12,11 +14,11 @@ from paths import ROOT
 
 from gqm_sym.loading import load
 
-# The step of a difference, whose error is that of its square, and the digits of the periods.
+# The step of a difference, whose error is in proportion to its square, and the digits of the periods.
 STEP, DIGITS = Fraction(1, 10**11), 45
 ULP = 2.0**-52
 
-# A module for each force and for each kind of curve, with the places of launch.
+# There is a module for each force and for each kind of curve, with the places of launch.
 LAUNCHES = {
     "catenary": (0.5, 2.0),
     "circle": (-2.0, 2.0),
@@ -37,7 +39,7 @@ LAUNCHES = {
 @settings(max_examples=2, deadline=None)
 @given(data=st.data())
 def test_gradients_of_periods(name: str, data: Any) -> None:
-    """They are right to two units in the last place."""
+    """Gradients of periods are right to two units in the last place."""
     module, (low, high) = load(str(ROOT / "generated" / f"{name}.py"), name), LAUNCHES[name]
     share, speed = data.draw(st.integers(1, 255)), data.draw(st.integers(1, 64))
     arguments = inspect.signature(module.solve).parameters
@@ -52,5 +54,5 @@ def test_gradients_of_periods(name: str, data: Any) -> None:
     found = module.solve(**{name: str(value) for name, value in values.items()}).gradient("period", by)[by]
     with mp.workdps(DIGITS):
         truth = (period(STEP) - period(-STEP)) / (2 * mpf(STEP.numerator) / STEP.denominator)
-        # Where it vanishes, the difference is 1e-22, the square of the step.
+        # Where the derivative vanishes, the difference is 1e-22, the square of the step.
         assert abs(found - truth) <= 2.0 * ULP * abs(truth) + 1e-20, (by, values)

@@ -1,4 +1,4 @@
-"""Files and texts meant to do harm: none runs anything, leaves its folder, or takes much time or memory."""
+"""Files and texts meant to do harm run no code, read nothing outside their folder, and take little time and memory."""
 
 import ast
 import contextlib
@@ -65,13 +65,13 @@ def yaml(tmp_path: Path) -> Callable[[str | bytes], Path]:
 
 @pytest.fixture
 def witness(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Give the file that code in the input would make, in the folder where it would run."""
+    """Return the file that code in the input would create, in the folder in which it would run."""
     monkeypatch.chdir(tmp_path)
     return tmp_path / "pwned"
 
 
 RUNS = "open('pwned', 'w')"
-# What would run, or reach further than arithmetic.
+# These texts would run code, or reach further than arithmetic.
 CODE = {
     "import": "__import__('os').system('touch pwned')",
     "attributes": "().__class__.__base__.__subclasses__()",
@@ -93,7 +93,7 @@ CODE = {
     "a name of SymPy's": "Symbol('x').func",
     "a private name": "_x + __class__",
 }
-# What would take all time or memory.
+# These texts would take all time or memory.
 GIANTS = {
     "a tower": "9**9**9**9",
     "a tower of names": "x**9**9**9**9",
@@ -111,7 +111,7 @@ GIANTS = {
     "angles": "h*x + " + "+".join(f"cos({k}*pi/9973)" for k in range(200)),
     "signs of sums": "h*x + " + "+".join(f"abs(sqrt(2)-{k}/7)" for k in range(200)),
 }
-# What is not what it looks like.
+# These texts are not what they look like.
 LOOKS = {
     "Cyrillic": "\u0445**2",
     "Greek": "\u03c7*h",
@@ -135,7 +135,7 @@ ATTACKS = {**CODE, **GIANTS, **LOOKS}
 def test_no_expression_does_harm(
     attack: str, key: str, yaml: Callable[[str | bytes], Path], witness: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Wherever an expression can stand, an attack is read as arithmetic or refused at once; the command ends with 2."""
+    """An attack in place of any expression is read as arithmetic or refused at once; the command then exits with 2."""
     path = yaml(file(**{key: ATTACKS[attack]}))
     refused = ""
     with confined():
@@ -145,7 +145,7 @@ def test_no_expression_does_harm(
             refused = str(error)
     assert refused or attack in GIANTS
     assert not witness.exists()
-    # What took too long may take less the second time: SymPy remembers.
+    # A text that took too long may take less time when repeated, because SymPy caches results.
     if refused and "not done after" not in refused:
         assert gen.main(["-o", str(path.parent / "out"), str(path)]) == 2
         assert [entry.name for entry in path.parent.iterdir()] == ["a.yaml"]
@@ -156,7 +156,7 @@ def test_no_expression_does_harm(
 
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_expression_does_harm_in_python(attack: str, witness: Path) -> None:
-    """The same from Python: a curve, a potential and an argument of a family read no more than arithmetic."""
+    """In Python too, a curve, a potential and an argument of a family are read as arithmetic only."""
     text = ATTACKS[attack]
     for declare in (
         lambda: gqm.Curve.graph(text, parameter="x"),
@@ -232,7 +232,7 @@ TREES = {
 def test_no_tree_does_harm(
     attack: str, yaml: Callable[[str | bytes], Path], witness: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """YAML that would construct, repeat or nest is refused at once, with a mistake in printable text."""
+    """YAML that would construct, repeat or nest objects is refused at once, with a message in printable text."""
     path = yaml(TREES[attack])
     with confined(), pytest.raises(SpecFileError):
         gqm.read_spec(path)
@@ -351,7 +351,7 @@ fragments = st.lists(st.one_of(st.sampled_from(FRAGMENTS), st.text(max_size=3)),
 @settings(max_examples=150)
 @given(text=fragments)
 def test_no_expression_takes_long(text: str) -> None:
-    """Whatever the text, it is read within a second and 200 MB, or refused."""
+    """Any text is read within a second and 200 MB, or refused."""
     with confined(), contextlib.suppress(GQMError):
         read_expression(text, where="t")
 
@@ -366,7 +366,7 @@ def test_no_file_takes_long(text: str, start: int, cut: int, yaml: Callable[[str
         gqm.read_spec(path)
 
 
-# What grows when it is derived or emitted, though it is short when it is read.
+# These expressions are short when read, and grow when they are derived or emitted.
 GROWING = {
     "a chain": "sin(" * 24 + "x" + ")" * 24,
     "kinks": "abs(" * 20 + "x" + ")-1" * 20,
@@ -376,7 +376,7 @@ GROWING = {
 
 @pytest.mark.parametrize("attack", GROWING)
 def test_what_grows_is_given_up(attack: str) -> None:
-    """A curve whose formulas cannot be held is refused by a message that says where and what to do."""
+    """A curve with formulas too large for memory is refused by a message that says where and what to do."""
     refused = (EmissionError, BudgetError, DeclarationError)
     with confined(30.0), pytest.raises(refused, match=r"by shorter expressions|a corner"):
         gqm.emit(gqm.derive(gqm.Curve.graph(GROWING[attack], parameter="x"), gqm.Gravity()), name="grown")
@@ -386,7 +386,7 @@ def test_what_grows_is_given_up(attack: str) -> None:
     "name", ["../up", "a/b", "/elsewhere/up", "..", ".", "a\\b", "C:up", "~", "$HOME", "con.", "a b"]
 )
 def test_no_name_leaves_its_folder(name: str, yaml: Callable[[str | bytes], Path]) -> None:
-    """The name of a file's module is its file's name: no path gets into it."""
+    """A module's file name is its name alone, which no path can enter."""
     path = yaml(file().replace("name: track", f"name: {quoted(name)}"))
     assert gen.main(["-q", "-o", str(path.parent / "in"), str(path)]) == 2
     assert [entry.name for entry in path.parent.iterdir()] == ["a.yaml"]
@@ -421,7 +421,7 @@ def test_devices_are_no_curve_files(device: str) -> None:
 
 @pytest.mark.parametrize("device", ["/dev/full", "/dev/null"])
 def test_devices_are_no_modules(device: str) -> None:
-    """A module is not written to a device, and the device stays what it is."""
+    """A module is not written to a device, and the device stays as it is."""
     for force in (False, True):
         with confined(), pytest.raises(InputError, match=rf"{device}: .*device"):
             write_module("x = 1\n", device, force=force)
@@ -429,7 +429,7 @@ def test_devices_are_no_modules(device: str) -> None:
 
 
 def test_a_link_to_what_has_no_end(yaml: Callable[[str | bytes], Path], tmp_path: Path) -> None:
-    """A link in the output folder to a device or a pipe is not read; by force it is replaced."""
+    """A link in the output folder to a device or a pipe is not read; with force it is replaced."""
     os.mkfifo(tmp_path / "pipe")
     path = yaml(file())
     for end in ("/dev/zero", tmp_path / "pipe"):
@@ -447,7 +447,9 @@ def test_a_link_to_what_has_no_end(yaml: Callable[[str | bytes], Path], tmp_path
 
 
 def test_a_write_to_a_folder_fails(tmp_path: Path) -> None:
-    """A folder in the place of a file is an error and stays; nothing is left beside it."""
+    """If there is a folder in the place of the file, an error is raised, the folder stays, and no other files
+    remain.
+    """
     (tmp_path / "track.py").mkdir()
     with pytest.raises(OSError, match=r"track\.py"):
         write_text("x", tmp_path / "track.py")

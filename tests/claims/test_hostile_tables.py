@@ -1,4 +1,4 @@
-"""Files of points meant to do harm, and tracks that would take all time or memory: refused early, or bounded."""
+"""Files of points meant to do harm, and tracks that would take all time or memory, are refused early or bounded."""
 
 import os
 from collections.abc import Callable
@@ -72,7 +72,7 @@ def test_no_table_does_harm(attack: str, read: Callable[[], object], tmp_path: P
 
 
 def test_a_table_without_end(read: Callable[[], object], tmp_path: Path) -> None:
-    """A file of terabytes is not read: no more than is allowed, and nothing of a device, a pipe or a folder."""
+    """Of a file of terabytes no more is read than is allowed, and nothing of a device, a pipe or a folder."""
     table = tmp_path / "track.csv"
     table.touch()
     os.truncate(table, 1 << 42)
@@ -110,7 +110,7 @@ def test_links_that_lead_out_and_back(read: Callable[[], object], tmp_path: Path
 
 @pytest.mark.parametrize("count", [12, 20])
 def test_points_without_a_smooth_track(count: int) -> None:
-    """Points that no spline settles through are refused, in words that name what to try."""
+    """Points through which no spline converges are refused, and the message names what to try."""
     z = np.random.default_rng(0).uniform(-0.45, 0.45, count)
     points = "\n".join(f"{k} {float(height)!r}" for k, height in enumerate(z))
     with pytest.raises(SolutionError, match=r"^sampled: no smooth track .*kind 'linear'"):
@@ -118,7 +118,7 @@ def test_points_without_a_smooth_track(count: int) -> None:
 
 
 def test_a_rail_that_winds_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each piece is bounded, and so are all of them together."""
+    """The number of pieces of each part of a rail is bounded, and so is that of all parts together."""
     monkeypatch.setattr(rail, "MAX_PIECES", 1000)
     pieces = [arc(radius=1 + k, angle=12) for k in range(5)]
     assert gqm.Curve.piecewise(pieces).kind == "piecewise"
@@ -131,7 +131,7 @@ def test_a_rail_that_winds_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
         once.chart(())
 
 
-# Of a sine from 0 to 10: sqrt(2) E(10, 1/2), by mpmath.
+# The length of a sine from 0 to 10 is sqrt(2) E(10, 1/2), by mpmath.
 LENGTH = 12.252585234704537
 
 
@@ -146,7 +146,9 @@ def _wave(frequency: float) -> Callable[..., np.ndarray]:
 
 
 def test_a_curve_that_oscillates_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is given up at a number of pieces, by a message that says where; one that needs fewer is not."""
+    """A curve that oscillates without end is given up after a number of pieces, with a message that says where; one
+    that needs fewer is not.
+    """
     monkeypatch.setattr(arc_length, "MAX_PIECES", 500)
     assert rectify(_wave(1.0), np.array([0.0, 10.0]), where="wave").lengths.sum() == pytest.approx(LENGTH, rel=1e-13)
     with confined(10.0), pytest.raises(BudgetError, match=r"^chart: wave: not resolved by 500 pieces near 0\.0; give"):
@@ -154,12 +156,12 @@ def test_a_curve_that_oscillates_for_ever(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_chart_has_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Charts are made within a budget of time, which the making looks at."""
+    """Charts are made within a budget of time, which is checked while they are made."""
     with pytest.raises(BudgetError, match=r"^chart: not done after 0 s"), budget("chart", 0.0, "-"):
         rectify(_wave(1e3), np.array([0.0, 10.0]), where="wave")
 
 
 def test_points_are_decimal_numbers() -> None:
-    """Digits of other scripts are no numbers from Python either: the text goes into the module as it is."""
+    """In Python too, digits of other scripts are no numbers; other text goes into the module as it is."""
     with pytest.raises(DeclarationError, match="row 1: '\u0661' is not a decimal number"):
         gqm.Curve.sampled([("\u0661", "2"), ("2", "3")], kind="linear")

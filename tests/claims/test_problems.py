@@ -1,4 +1,4 @@
-"""The table of problems is tested itself: a wrong truth would be worse than none."""
+"""The table of problems is itself tested, because a wrong reference value would be worse than none."""
 
 import json
 
@@ -13,13 +13,13 @@ AGREEMENT = mpf(10) ** -30
 
 
 def test_every_entry_is_used() -> None:
-    """A track, a tag or a name that no problem uses is a slip of the pen."""
+    """Every track, tag and name is used by some problem; an unused one is a mistake."""
     assert {problem.track for problem in PROBLEMS.values()} == set(TRACKS)
     assert set(HARD) <= {problem.slug for problem in where(source="closed_forms.json")}
 
 
 def _declared() -> list[tuple[str, str, dict[str, str], tuple[str, str], str]]:
-    """Curves as the data files spell them: track, parameter, renamed, (x, z), id."""
+    """Yield curves as the data files spell them: track, parameter, renamed, (x, z), id."""
     rows = []
     for case in json.loads((DATA / "paper_cases.json").read_text(encoding="ascii"))["cases"]:
         if case["id"] in PAPER:
@@ -63,12 +63,12 @@ def test_samples_follow_from_the_definitions(problem: Problem) -> None:
 
 
 def test_positions_keep_the_energy(problem: Problem) -> None:
-    """The speed at each position is the one that the launch's energy leaves there."""
+    """The speed at each position follows from the launch's energy."""
     for row in problem.positions:
         with mp.workdps(50):
             lam = number(row.lam)
             kept = point(problem, TRACKS[problem.track], lam).v2
-            # The digits of lam are counted from its first, however many laps it has gone round.
+            # The error of lam is relative to all of lam, however many laps it counts.
             assert abs(number(row.v) ** 2 - kept) <= AGREEMENT * max(1, kept, abs(lam))
 
 

@@ -1,4 +1,4 @@
-"""Properties across processes: light imports, the compiled cache, and the same bytes anywhere."""
+"""Imports are light, machine code is kept, and the bytes written are the same in all processes."""
 
 import json
 import os
@@ -11,7 +11,7 @@ from paths import ROOT
 
 CURVES = sorted(path.stem for path in (ROOT / "curves").glob("*.yaml"))
 
-# Before anything else runs, make the named packages impossible to import.
+# This code runs first and makes the named packages impossible to import.
 BLOCK = """
 import sys
 
@@ -66,7 +66,7 @@ print(json.dumps(sorted(set(sys.modules) - before)))
 
 
 def run(code: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> str:
-    """Run Python code in a fresh process and give what it printed."""
+    """Run Python code in a fresh process and return what it printed."""
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=cwd,
@@ -80,7 +80,7 @@ def run(code: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> str
 
 
 def test_there_is_a_generated_module_for_each_curve() -> None:
-    """``generated/`` holds what ``curves/`` declares, no more and no less."""
+    """``generated/`` has a module for each file of ``curves/``, no more and no less."""
     generated = {path.stem for path in (ROOT / "generated").glob("*.py")} - {"__init__"}
     assert sorted(generated) == CURVES
 
@@ -94,7 +94,7 @@ def test_generated_modules_need_no_generator() -> None:
 
 
 def test_importing_a_generated_module_is_light() -> None:
-    """It loads numpy, numba and the runtime, and nothing of the generator.
+    """A generated module loads numpy, numba and the runtime, and nothing of the generator.
 
     (numba itself loads scipy where that is installed.)
     """
@@ -110,7 +110,7 @@ def test_a_second_process_compiles_nothing() -> None:
 
 
 def test_a_second_process_imports_no_more_than_it_needs() -> None:
-    """Compiled code comes without what it was compiled with, a motion without what sweeps and charts need."""
+    """Machine code is loaded without what compiled it, and a motion without what sweeps and charts need."""
     run(COMES_WITH_CODE)
     loaded = json.loads(run(COMES_WITH_CODE))
     assert "gqm_sym.runtime.motion.conservative" in loaded
@@ -127,7 +127,7 @@ def test_a_second_process_imports_no_more_than_it_needs() -> None:
 
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:
-    """One input gives one text, whatever order sets and dictionaries have: that of the committed modules."""
+    """One input gives one text, that of the committed modules, whatever order sets and dictionaries have."""
     paths = [f"curves/{name}.yaml" for name in CURVES]
     committed = [(ROOT / "generated" / f"{name}.py").read_text(encoding="utf-8") for name in CURVES]
     assert run(GENERATE, *paths, PYTHONHASHSEED="7") == "".join(committed)
@@ -153,7 +153,7 @@ def unpacked_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_wheel_holds_the_package_and_its_templates(unpacked_wheel: Path) -> None:
-    """Sources, the typing marker and the templates are shipped; tests and output are not."""
+    """The wheel contains the sources, the typing marker and the templates, but no tests and no output."""
     shipped = {path.relative_to(unpacked_wheel).as_posix() for path in unpacked_wheel.rglob("*")}
     templates = {path.name for path in (ROOT / "templates").glob("*.j2")}
     assert templates

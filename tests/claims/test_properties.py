@@ -1,4 +1,4 @@
-"""Laws that every conservative motion keeps, tried on launches that Hypothesis chooses."""
+"""Every conservative motion obeys these laws; Hypothesis chooses the launches."""
 
 import math
 from collections.abc import Callable
@@ -13,17 +13,17 @@ ModuleOf = Callable[[str], ModuleType]
 
 # Two half periods that must be the same number come from different roundings of the same inputs.
 SAME_ULPS = 4.0
-# Half periods against closed forms, at amplitudes where the separatrix is not close.
+# The tolerance of half periods against closed forms, at amplitudes away from the separatrix.
 CLOSED_FORM_ULPS = 4.0
-# Positions of the scale: one evaluation, and a comparison of two.
+# The tolerances of positions relative to their scale: for one evaluation, and for a comparison of two.
 POSITION = 1e-14
 TWO_POSITIONS = 4e-14
-# Energy per unit mass, of the largest kinetic energy.
+# The tolerance of the energy per unit mass, relative to the largest kinetic energy.
 ENERGY = 1e-14
 
 lengths = st.floats(0.1, 10.0)
 gravities = st.floats(0.5, 30.0)
-# Small swings are drawn by their exponent: there W loses its digits if anything is subtracted.
+# Small swings are drawn by their exponent, because W loses its digits there if anything is subtracted.
 small = st.floats(-8.0, -1.0).map(lambda exponent: 10.0**exponent)
 amplitudes = st.one_of(small, st.floats(0.1, 3.0))
 fractions = st.floats(0.0, 1.0)
@@ -35,7 +35,7 @@ some = settings(max_examples=40)
 def test_a_pendulum_swings_as_elliptic_integrals_say(
     module_of: ModuleOf, amplitude: float, length: float, g: float
 ) -> None:
-    """The half period is 2*K(sin(A/2))*sqrt(L/g) for the very floats given, small swings too."""
+    """The half period is 2*K(sin(A/2))*sqrt(L/g) for the given floats, for small swings too."""
     motion = module_of("circle").solve(lam0=amplitude, L=length, g=g)
     with mp.workdps(50):
         truth = pendulum_half_period(amplitude, mp.sqrt(mpf(g) / mpf(length)))
@@ -59,7 +59,7 @@ def test_a_pendulum_is_where_elliptic_functions_say(
 @some
 @given(lam0=st.floats(-1.5, 1.5), v0=st.floats(0.0, 5.0), share=st.floats(-3.0, 3.0))
 def test_energy_is_conserved(module_of: ModuleOf, lam0: float, v0: float, share: float) -> None:
-    """v**2/2 + g*z keeps its value; v**2 and the signed v belong together."""
+    """v**2/2 + g*z is constant, and v**2 is the square of the signed v."""
     assume(abs(lam0) > 1e-3 or v0 > 1e-3)
     motion = module_of("bowl").solve(lam0=lam0, v0=v0)
     at_launch = motion.state(0.0)
@@ -72,7 +72,7 @@ def test_energy_is_conserved(module_of: ModuleOf, lam0: float, v0: float, share:
 @some
 @given(lam0=st.floats(-1.0, 1.0), v0=st.floats(0.1, 3.0), share=fractions)
 def test_time_runs_both_ways(module_of: ModuleOf, lam0: float, v0: float, share: float) -> None:
-    """Launched the other way, the body is at t where it was at -t."""
+    """If the body is launched in the other direction, it is at t where it was at -t."""
     solve = module_of("bowl").solve
     forward, backward = (solve(lam0=lam0, v0=v0, direction=way) for way in (1, -1))
     low, high = sorted(forward.turning_points)
@@ -84,13 +84,13 @@ def test_time_runs_both_ways(module_of: ModuleOf, lam0: float, v0: float, share:
 @some
 @given(lam0=st.floats(0.1, 1.5), share=st.floats(0.1, 0.9))
 def test_stopped_and_sent_back_it_returns(module_of: ModuleOf, lam0: float, share: float) -> None:
-    """From any state, launched back with the same speed, the body comes back to where it began."""
+    """From any state, a body launched back with the same speed returns to where it began."""
     solve = module_of("bowl").solve
     out = solve(lam0=lam0)
     t = share * out.half_period
     there = out.state(t)
     back = solve(lam0=there.lam, v0=abs(there.v), direction=1)
-    # At the end it is at rest: an error in time shows squared, one in energy as it is.
+    # At its end the body is at rest, so that an error in time counts squared, and one in energy as it is.
     assert abs(back.lam(t) - lam0) <= 10 * TWO_POSITIONS * lam0
 
 
@@ -109,7 +109,7 @@ def test_scaling_laws(module_of: ModuleOf, amplitude: float, length: float, g: f
 @some
 @given(amplitude=amplitudes, mass=lengths)
 def test_mass_changes_the_contact_force_alone(module_of: ModuleOf, amplitude: float, mass: float) -> None:
-    """All bodies fall alike; the track carries m times as much."""
+    """All bodies fall alike, and the contact force is m times that of a unit mass."""
     solve = module_of("circle").solve
     unit, heavy = (solve(lam0=amplitude, L=1, m=m) for m in (1.0, mass))
     t = 0.3 * unit.period

@@ -1,4 +1,4 @@
-"""Random curves, forces and launches: what must hold of every motion, and agreement with an integrator.
+"""Motions on random curves under random forces obey general laws and agree with an integrator.
 
 The integrator (DOP853 of SciPy) follows dlam/dt = V/ds and dV/dt from the definitions of MATHS, section 2, with the
 signs of V and N held between events, and begins afresh at each of them.
@@ -20,13 +20,13 @@ import gqm_sym as gqm
 
 G = 9.81
 HORIZON = 3.0
-# Events closer than this to a change of what happens are not compared with the integrator.
+# Events closer than this to a change of the motion are not compared with the integrator.
 GRAZING = 1e-9
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A curve for the generator, and by hand: (x', z', x'', z'') and x."""
+    """A curve for the generator, and written by hand: (x', z', x'', z'') and x."""
 
     curve: gqm.Curve
     derivatives: Callable[[float], tuple[float, float, float, float]]
@@ -59,7 +59,7 @@ SHAPES = {
 
 @dataclass(frozen=True)
 class Force:
-    """A sum of kernels, and by hand: (F_x, F_z), resistance and drag."""
+    """A sum of kernels, and written by hand: (F_x, F_z), resistance and drag."""
 
     kernel: gqm.Kernel
     names: tuple[str, ...]
@@ -98,21 +98,21 @@ def module(shape: str, force: str, folder: str) -> ModuleType:
 
 @dataclass(frozen=True)
 class System:
-    """One pair with values, as the integrator sees it."""
+    """A pair with values, in the form that the integrator needs."""
 
     shape: Shape
     force: Force
     p: dict[str, float]
 
     def parts(self, lam: float) -> tuple[float, float, float, float]:
-        """ds, kappa, F.t and n0."""
+        """Return ds, kappa, F.t and n0."""
         dx, dz, ddx, ddz = self.shape.derivatives(lam)
         ds = np.hypot(dx, dz)
         fx, fz = self.force.push(self.shape.x(lam), self.p)
         return ds, (dx * ddz - dz * ddx) / ds**3, (fx * dx + fz * dz) / ds, (fx * dz - fz * dx) / ds
 
     def pull(self, lam: float, v: float, way: float, nu: float) -> float:
-        """The tangential acceleration while moving ``way``."""
+        """Return the tangential acceleration of a body that moves in direction ``way``."""
         _, kappa, along, n0 = self.parts(lam)
         lost = self.force.resistance(kappa, self.p)
         lost += self.p.get(self.force.drag, 0.0) * v * v
@@ -120,12 +120,12 @@ class System:
         return along - way * lost
 
     def pressure(self, lam: float, v: float) -> float:
-        """N per unit mass."""
+        """Return N per unit mass."""
         _, kappa, _, n0 = self.parts(lam)
         return n0 + kappa * v * v
 
     def follow(self, lam: float, v: float, until: float) -> tuple[float, float, float]:
-        """Return the body's place and speed after a time, and the least margin by which it missed an event."""
+        """Return the body's place and speed after a time, and the smallest margin by which it missed an event."""
         t, margin = 0.0, np.inf
         way, nu = np.sign(v), np.sign(self.pressure(lam, v))
         for _ in range(200):
@@ -163,7 +163,7 @@ class System:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """One folder for all modules of this file."""
+    """Return one folder for all modules of this file."""
     return str(tmp_path_factory.mktemp("random"))
 
 
@@ -189,7 +189,7 @@ def test_random_motion(
     other: float,
     at: float,
 ) -> None:
-    """Speeds are real, times grow, legs join, events are in order; places agree with the integrator's."""
+    """Speeds are real, times grow, legs join and events are in order; places agree with the integrator's."""
     names = FORCES[force].names
     p = dict(zip(names, (coefficient, other), strict=False))
     low, high = SHAPES[shape].places

@@ -1,4 +1,4 @@
-"""Digits against the reference tables: every conservative problem, through the public interface."""
+"""Every conservative problem of the reference tables has the right digits through the public interface."""
 
 import math
 from collections.abc import Callable
@@ -14,40 +14,41 @@ from problems import PROBLEMS, TRACKS, Problem, number, where
 MotionOf = Callable[[Problem], Any]
 ModuleOf = Callable[[str], ModuleType]
 
-# Half periods and periods, also where a barrier is close or heights agree to many digits: the double nearest to the
-# truth. Worst measured: 0.49.
+# Half periods and periods are the doubles nearest to the true values, also if a barrier is close or heights agree to
+# many digits. Worst measured: 0.49.
 NEAREST = 0.51
 
-# Positions in the first ten periods, of their scale. Worst measured: 5.0e-16.
+# The tolerance of positions in the first ten periods, relative to their scale. Worst measured: 5.0e-16.
 TEN_PERIODS = 10.0
 POSITION = 1e-15
-# Where the orbit is small and far from the origin, rounding the place and its coordinates comes in.
+# If the orbit is small and far from the origin, the rounding of the place and its coordinates is added.
 COORDINATE_ULPS = 2.0
 
-# The paper's example: lam(t) in its first period and after 1000 s, of the scale of lam. Worst measured: 1.8e-16.
+# The tolerance of lam(t) in the paper's example, in its first period and after 1000 s, relative to the scale of lam.
+# Worst measured: 1.8e-16.
 FIRST_PERIOD = 4e-16
 AFTER_1000_S = 4e-16
 
-# The speed field at a float: V**2, N, kappa, ds.
+# The tolerances of the speed field at a float: V**2, N, kappa, ds.
 FIELD_ULPS = 4.0
 # Kappa of a curve whose metric varies divides by a root cubed, and N has kappa and V**2 as factors: half a dozen
 # roundings each. Worst measured: 4.1 (ellipse) and 5.6 (ellipse).
 COMPOSED_ULPS = 6.0
 
-# A turning point is meant to be the nearest double.
+# A turning point is the nearest double.
 TURNING_POINT_ULPS = 1.0
 
-# Times of single events, relative. Worst measured: 6.3e-16.
+# The relative tolerance of times of single events. Worst measured: 6.3e-16.
 EVENT_TIME = 1e-15
 
-# What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
+# The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 EXAMPLE = PROBLEMS["example1_pendulum"]
 
 
 def named(problems: list[Problem]) -> dict[str, Any]:
-    """Arguments of ``parametrize`` that give each problem its slug."""
+    """Return arguments of ``parametrize`` that give each problem its slug."""
     return {"argvalues": problems, "ids": [problem.slug for problem in problems]}
 
 
@@ -67,7 +68,7 @@ def test_half_period(problem: Problem, motion_of: MotionOf) -> None:
 
 @pytest.mark.parametrize("problem", **named(where(loop_time=True)))
 def test_loop_time(problem: Problem, motion_of: MotionOf) -> None:
-    """The period of a circulation is the time once round."""
+    """The period of a circulation is the time of one lap."""
     period = motion_of(problem).period
     assert problem.loop_time is not None
     assert ulps(period, problem.loop_time) <= NEAREST
@@ -78,7 +79,7 @@ def test_loop_time(problem: Problem, motion_of: MotionOf) -> None:
     **named([p for p in PROBLEMS.values() if p.turning_points is not None and p.kind != "rest"]),
 )
 def test_turning_points(problem: Problem, motion_of: MotionOf) -> None:
-    """All turning points, in the order met, each the double nearest to the truth."""
+    """All turning points are the doubles nearest to the true ones, in the order in which they are met."""
     actual = motion_of(problem).turning_points
     assert problem.turning_points is not None
     assert len(actual) == len(problem.turning_points)
@@ -88,7 +89,7 @@ def test_turning_points(problem: Problem, motion_of: MotionOf) -> None:
 
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_positions(problem: Problem, motion_of: MotionOf) -> None:
-    """In the first ten periods lam, x, z and v are right to rounding, of their scales."""
+    """In the first ten periods lam, x, z and v are right to the rounding of their scales."""
     motion, track = motion_of(problem), TRACKS[problem.track]
     of = scale(problem, track)
     for row in problem.within(TEN_PERIODS):
@@ -105,7 +106,7 @@ def test_positions(problem: Problem, motion_of: MotionOf) -> None:
 
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_the_error_bound_is_honest(problem: Problem, motion_of: MotionOf) -> None:
-    """No position, early or late, is off by more than ``error_bound`` says."""
+    """No position, early or late, has a larger error than ``error_bound`` says."""
     motion = motion_of(problem)
     for row in problem.positions:
         assert error(motion.lam(row.t), row.lam) <= motion.error_bound(row.t)
@@ -113,17 +114,19 @@ def test_the_error_bound_is_honest(problem: Problem, motion_of: MotionOf) -> Non
 
 @pytest.mark.parametrize("problem", **named([p for p in where(positions=True) if p.kind != "rest"]))
 def test_the_error_bound_is_useful(problem: Problem, motion_of: MotionOf) -> None:
-    """It says at most a hundred times what is lost. Worst measured: 42."""
+    """The bound is at most a hundred times the error. The worst ratio measured is 42."""
     rows = [(row.t, row.lam) for row in problem.positions]
     assert overstatement(motion_of(problem), rows, scale(problem, TRACKS[problem.track]).lam) <= USEFUL
 
 
 def test_the_error_bound_holds_at_any_time(motion_of: MotionOf) -> None:
-    """From a millisecond to a billion seconds of the paper's example, the last digit of the answer included."""
+    """In the paper's example the bound holds from a millisecond to a billion seconds, and includes the rounding of the
+    answer.
+    """
     motion = motion_of(EXAMPLE)
     times = np.geomspace(1e-3, 1e9, 300)
     found, bounds = motion.lam(times), motion.error_bound(times)
-    # A state has the largest error on its interval of the table.
+    # A state states the largest error on its interval of the table.
     ratio = motion.state(times).error / bounds
     assert 1.0 - 1e-5 <= ratio.min() <= ratio.max() < 1.25
     with mp.workdps(50):
@@ -133,12 +136,12 @@ def test_the_error_bound_holds_at_any_time(motion_of: MotionOf) -> None:
 
 
 def test_quadrature_error_and_condition_number_are_told_apart(motion_of: MotionOf) -> None:
-    """Near a separatrix the quadrature is as good as elsewhere; it is the launch that says less and less."""
+    """Near a separatrix the quadrature is as good as elsewhere, while the launch determines less and less."""
     calm, near = motion_of(EXAMPLE), motion_of(PROBLEMS["pendulum_nearly_upright"])
     assert calm.quadrature_error < 1e-14
     assert near.quadrature_error < 1e-14
     assert calm.condition_number < 2
-    # An angle of 1e-6 below the hilltop: V**2's regular factor is the square of that at the top.
+    # At an angle of 1e-6 below the hilltop, V**2's regular factor is the square of that at the top.
     assert near.condition_number > 1e5
     rest = motion_of(PROBLEMS["pendulum_at_the_bottom"])
     assert (rest.quadrature_error, rest.condition_number) == (0.0, 1.0)
@@ -146,10 +149,10 @@ def test_quadrature_error_and_condition_number_are_told_apart(motion_of: MotionO
 
 @pytest.mark.parametrize("problem", **named(where(samples=True)))
 def test_speed_field(problem: Problem, module_of: ModuleOf) -> None:
-    """V**2, N, kappa and ds of ``pass1`` are those of the definitions, at the very floats given.
+    """V**2, N, kappa and ds of ``pass1`` agree with the definitions for the given floats.
 
-    Within units in the last place of the largest term of V**2 = v0**2 + 2*g*(z0 - z) and of
-    N = m*(g*x_s + kappa*V**2).
+    Errors are within units in the last place of the largest term of V**2 = v0**2 + 2*g*(z0 - z) and of N = m*(g*x_s +
+    kappa*V**2).
     """
     lams = np.array([float(number(row.lam)) for row in problem.samples])
     field = module_of(problem.track).pass1(lams, **problem.launch)
@@ -166,7 +169,7 @@ def test_speed_field(problem: Problem, module_of: ModuleOf) -> None:
 
 
 def terms(problem: Problem, truth: Point) -> tuple[float, float]:
-    """Largest terms of V**2 and of N at a place."""
+    """Return the largest terms of V**2 and of N at a place."""
     start = number(problem.v0) ** 2
     v2_term = max(start, abs(truth.v2 - start))
     mass = number(dict(problem.parameters).get("m", "1"))
@@ -186,7 +189,7 @@ def test_speed_field_of_the_paper_s_example(module_of: ModuleOf) -> None:
 
 
 def test_the_state_carries_the_speed_field(motion_of: MotionOf) -> None:
-    """V**2, N and kappa in ``state`` are those of the place that it names."""
+    """V**2, N and kappa in ``state`` are those of its own place."""
     for problem in where(source="paper_cases.json"):
         motion = motion_of(problem)
         for row in problem.within(1.0):
@@ -218,7 +221,7 @@ def test_the_paper_s_example_in_its_first_period(motion_of: MotionOf) -> None:
 
 
 def test_the_paper_s_example_after_1000_seconds(motion_of: MotionOf) -> None:
-    """After 454 periods lam(t) is still as near."""
+    """After 454 periods the error of lam(t) is still as small."""
     (row,) = (row for row in EXAMPLE.positions if row.t == "1000")
     allowed = AFTER_1000_S * scale(EXAMPLE, TRACKS["pendulum"]).lam
     assert error(motion_of(EXAMPLE).lam(1000), row.lam) <= allowed
@@ -229,7 +232,7 @@ def test_the_paper_s_example_after_1000_seconds(motion_of: MotionOf) -> None:
     **named([p for p in PROBLEMS.values() if any(row.t_first_passage for row in p.samples)]),
 )
 def test_first_passages(problem: Problem, motion_of: MotionOf) -> None:
-    """The first time at a place is right to the last digits, for an exact place."""
+    """The first time at a place is right to the last digits for an exact place."""
     motion = motion_of(problem)
     for row in problem.samples:
         if row.t_first_passage is not None:
@@ -268,7 +271,7 @@ def test_an_end_is_named_and_timed(problem: Problem, motion_of: MotionOf) -> Non
 
 @pytest.mark.parametrize("problem", **named(where(contact_changes=True)))
 def test_the_contact_force_changes_sign(problem: Problem, motion_of: MotionOf) -> None:
-    """Over a period each place where N changes sign is met twice, and so named among the events."""
+    """The events of a period name each place at which N changes its sign twice, because the body passes it twice."""
     met = sorted(e.lam for e in motion_of(problem).events if e.kind == "contact-sign")
     expected = sorted((*problem.contact_changes, *problem.contact_changes), key=float)
     assert len(met) == len(expected)
@@ -277,9 +280,9 @@ def test_the_contact_force_changes_sign(problem: Problem, motion_of: MotionOf) -
 
 
 def test_scalars_give_scalars_and_arrays_give_arrays(motion_of: MotionOf) -> None:
-    """A number in gives a float out; an array of any shape gives an array of that shape, the same.
+    """A number gives a float, and an array of any shape gives an array of the same shape.
 
-    Times in any order are allowed, and what is asked for together changes nothing.
+    Times in any order are allowed, and each result is independent of the others.
     """
     motion = motion_of(EXAMPLE)
     times = np.array([[3.0, 0.25], [1.5, 1000.0]])

@@ -1,4 +1,4 @@
-"""The Python reference is complete: everything that is exported stands there, and its docstring says what it takes."""
+"""The Python reference is complete: it has everything that is exported, and each docstring describes the arguments."""
 
 import inspect
 import re
@@ -22,12 +22,12 @@ from gqm_sym.smoothing import Smoothing
 
 PAGE = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
 
-# What public functions return, or attributes hold, without being exported by name.
+# Public functions return these, or attributes hold them, but they are not exported by name.
 RETURNED = (Banking, Estimate, Fit, Fourier, Rider, Sensitivity, Switch, Uncertainty)
 IN_PACKAGES = {"gqm_sym.smoothing": Smoothing, "gqm_sym.studies": studies.Plan}
-# What generated modules call, which is described in the docstrings of these modules.
+# Generated modules call these, and their docstrings describe them.
 INNER = {"CompiledModel", "compiler"}
-# What `State` inherits from `dict` and refuses.
+# `State` inherits these from `dict` and refuses them.
 OF_DICT = set(dir(dict))
 
 

@@ -1,4 +1,4 @@
-"""Loads on riders of banked tracks, against Newton's law in 40 digits and closed forms."""
+"""Loads on riders of banked tracks agree with Newton's law in 40 digits and with closed forms."""
 
 import pickle
 from collections.abc import Callable
@@ -18,35 +18,35 @@ from gqm_sym.kernels.base import DIRECTION, W
 from gqm_sym.specfile import read_spec
 
 G0 = 9.80665
-# A track that rises, falls and turns, whose tangent is never vertical.
+# This track rises, falls and turns, and its tangent is never vertical.
 WAY = {"x": "3*sin(u)", "y": "4*cos(u) + u", "z": "u**2/8 + sin(2*u)/3", "parameter": "u"}
 ROLLS: dict[str, Any] = {"angle": "u/3 - 1/4", "coordinated": "coordinated", "designed": ("coordinated", "6 + u/5")}
 
 
 def place(u: Any) -> Any:
-    """Return the place of that track."""
+    """Return the place on that track."""
     return mp.matrix([3 * mp.sin(u), 4 * mp.cos(u) + u, u**2 / 8 + mp.sin(2 * u) / 3])
 
 
 def rates(u: Any) -> tuple[Any, Any]:
-    """The first and second derivatives of the place."""
+    """Return the first and second derivatives of the place."""
     first = mp.matrix([3 * mp.cos(u), -4 * mp.sin(u) + 1, u / 4 + 2 * mp.cos(2 * u) / 3])
     second = mp.matrix([-3 * mp.sin(u), -4 * mp.cos(u), mpf(1) / 4 - 4 * mp.sin(2 * u) / 3])
     return first, second
 
 
 def cross(a: Any, b: Any) -> Any:
-    """The vector product."""
+    """Return the vector product."""
     return mp.matrix([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def dot(a: Any, b: Any) -> Any:
-    """The scalar product."""
+    """Return the scalar product."""
     return sum(a[i] * b[i] for i in range(3))
 
 
 def newton(roll: str, u: Any, w: Any, way: int, mu: Any, b: Any) -> tuple[list[Any], Any, Any]:
-    """The loads by Newton's law, the tangential acceleration, and the rider's upward direction."""
+    """Return the loads by Newton's law, the tangential acceleration, and the rider's upward direction."""
     first, second = rates(u)
     size = mp.norm(first)
     tangent, up = first / size, mp.matrix([0, 0, 1])
@@ -101,7 +101,7 @@ def test_closed_forms_against_newton(roll: str, lossy: bool) -> None:
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ModuleType]:
-    """Build a module once."""
+    """Return a module, built once."""
     folder, built = tmp_path_factory.mktemp("riders"), {}
 
     def module(name: str, curve: gqm.Curve, force: gqm.Kernel) -> ModuleType:
@@ -114,21 +114,21 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ModuleType]
 
 @pytest.fixture(scope="module")
 def rough(build: Callable[..., ModuleType]) -> ModuleType:
-    """The track above with friction and drag, banked by an angle."""
+    """Return the track above with friction and drag, banked by an angle."""
     curve = gqm.Curve.space(**WAY, roll=ROLLS["angle"], heartline="0.9")
     return build("rough", curve, gqm.Gravity() + gqm.CoulombFriction(mu="1/50") + gqm.QuadraticDrag(b="1/200"))
 
 
 @pytest.fixture(scope="module")
 def loop(build: Callable[..., ModuleType]) -> ModuleType:
-    """A vertical loop of radius R, from its bottom."""
+    """Return a vertical loop of radius R that begins at its bottom."""
     curve = gqm.Curve.space(x="R*sin(u)", y="0", z="-R*cos(u)", parameter="u", roll="coordinated", parameters={"R": 7})
     return build("loop", curve, gqm.Gravity())
 
 
 def test_states_of_a_rough_track(rough: ModuleType) -> None:
-    """States of a rough track are Newton's loads to the accuracy of doubles, in both directions; the track lies below
-    the rider.
+    """States of a rough track have Newton's loads to the accuracy of doubles, in both directions, and the track lies
+    below the rider.
     """
     motion = rough.solve(-4, 2, t_max=12)
     state = motion.state(np.array([0.2, 1.9, 4.7, 7.5, 9.5]))
@@ -160,7 +160,7 @@ def test_states_of_a_rough_track(rough: ModuleType) -> None:
 
 
 def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
-    """Friction holds the body where it stays: the loads are those of gravity alone, and their rates are zero."""
+    """If friction holds the body, the loads are those of gravity alone and their rates are zero."""
     motion = rough.solve("5/2", 1, mu="3/5")
     assert motion.legs[-1].end == "rest"
     state = motion.state(motion.t_end)
@@ -170,7 +170,9 @@ def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
 
 
 def test_a_vertical_loop(loop: ModuleType) -> None:
-    """From bottom to top six g are gained, upright all the way round; levels are passed where closed forms say."""
+    """Between top and bottom the load changes by six g, all the way round the rider is upright, and levels are crossed
+    where closed forms say.
+    """
     motion = loop.solve(0, 20)
     most, least = motion.n_vertical_max, motion.n_vertical_min
     assert most.value - least.value == pytest.approx(6 * 9.81 / G0, rel=1e-14)
@@ -196,7 +198,9 @@ def test_a_vertical_loop(loop: ModuleType) -> None:
 
 
 def test_levels_along_legs(rough: ModuleType) -> None:
-    """At every crossing the load equals the level, with losses too; the times above and below add up to the whole."""
+    """At every crossing the load equals the level, with losses too, and the times above and below add up to the
+    whole.
+    """
     motion = rough.solve(-4, 2, t_max=12)
     times = np.linspace(0.0, 12.0, 20001)
     for load, level in (("vertical", 1.05), ("lateral", 0.1), ("longitudinal", -0.05)):
@@ -209,7 +213,7 @@ def test_levels_along_legs(rough: ModuleType) -> None:
 
 
 def test_the_banking_of_a_helix(build: Callable[..., ModuleType]) -> None:
-    """On a helix curvature is horizontal: the banking is atan(kappa V**2/(g cos(slope)))."""
+    """On a helix the curvature is horizontal, so that the banking is atan(kappa V**2/(g cos(slope)))."""
     curve = gqm.Curve.space(x="5*cos(u)", y="5*sin(u)", z="-3*u", parameter="u", roll="coordinated", heartline="h")
     module = build("helix_ride", curve, gqm.Gravity())
     motion = module.solve(0, 4, h="9/10", t_max=9)
@@ -224,7 +228,7 @@ def test_the_banking_of_a_helix(build: Callable[..., ModuleType]) -> None:
 
 
 def test_a_leaning_rider_in_a_vertical_plane(build: Callable[..., ModuleType]) -> None:
-    """The plane's normal carries the force: a roll angle to the left puts a part of it to the right."""
+    """The force is along the normal of the plane, so that a roll to the left gives it a component to the right."""
     curve = gqm.Curve.space(x="u", y="0", z="u**2/2", parameter="u", roll="psi")
     model = gqm.derive(curve, gqm.Gravity())
     assert model.rider is not None
@@ -250,13 +254,15 @@ BAD: tuple[tuple[Callable[[], object], str], ...] = (
 
 @pytest.mark.parametrize(("ask", "message"), BAD)
 def test_what_is_no_banking_is_refused(ask: Callable[[], object], message: str) -> None:
-    """One error says what is wrong."""
+    """Each declaration that is no banking is refused with a reason."""
     with pytest.raises(InputError, match=message):
         ask()
 
 
 def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., ModuleType]) -> None:
-    """Loads, levels, sides and limits that are none; a roll angle where the tangent is vertical."""
+    """Loads, levels, sides and limits that do not exist are refused, and so is a roll angle where the tangent is
+    vertical.
+    """
     motion = loop.solve(0, 20)
     for arguments, message in (
         (("upwards", 1), "load: must be"),
@@ -283,7 +289,7 @@ def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., Module
 
 
 def test_a_banked_track_in_a_file(tmp_path: Path) -> None:
-    """The keys are those of Python, and the design speed is the second of a pair."""
+    """The keys in a file are those of Python, and the design speed is the second entry of a pair."""
     file = tmp_path / "banked.yaml"
     track = "x: 3*sin(u), y: 4*cos(u), z: u, parameter: u, roll: {}, heartline: 90 cm"
     text = f"name: banked\ncurve:\n  space: {{{{{track}}}}}\n"

@@ -1,4 +1,4 @@
-"""A body of finite radius: the path of its centre, derived from the track it rolls on."""
+"""The path of the centre of a body of finite radius is derived from the track on which it rolls."""
 
 from pathlib import Path
 from types import ModuleType
@@ -15,18 +15,18 @@ import gqm_sym as gqm
 from gqm_sym.errors import LaunchError, SolutionError
 
 ROUNDINGS = 8 * 2.0**-53
-# The nearest double; worst measured: 0.46.
+# Times are the nearest doubles. Worst measured: 0.46.
 NEAREST = 0.51
-# Errors of double-double arithmetic beside a curve, as shares; worst measured: 7e-18 for a thousandth of a radian and a
-# ball that all but fills its track.
+# The relative errors of double-double arithmetic beside a curve. Worst measured: 7e-18, for a thousandth of a radian
+# and a ball that nearly fills its track.
 USEFUL_ERROR = 1e-17
-# Of charted curves at t < 100 s, relative to the size of the curve.
+# The tolerance for charted curves at t < 100 s, relative to the size of the curve.
 EARLY = 1e-13
 
 
 @pytest.fixture(scope="module")
 def bowl(generated_folder: Path) -> ModuleType:
-    """A round track."""
+    """Return a round track."""
     force = gqm.Gravity() + gqm.Rolling(radius="rho")
     return gqm.build(gqm.derive(gqm.families.circle(), force), name="ball_in_a_bowl", folder=generated_folder)
 
@@ -43,7 +43,7 @@ def test_in_a_round_track_it_is_a_pendulum(bowl: ModuleType, rho: str, path: str
 
 @pytest.fixture(scope="module")
 def loop(generated_folder: Path) -> ModuleType:
-    """A round track that is known by an equation only."""
+    """Return a round track that is given by an equation only."""
     curve = gqm.Curve.implicit("x**2 + z**2 - L**2", start=(0, "-L"), parameters={"L": "5/4"})
     force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="2/5")
     return gqm.build(gqm.derive(curve, force), name="ball_in_a_loop", folder=generated_folder)
@@ -51,7 +51,7 @@ def loop(generated_folder: Path) -> ModuleType:
 
 @pytest.mark.parametrize("angle", ["1/1000000", "6/5", "29/10"])
 def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: ModuleType, angle: str) -> None:
-    """Both are the pendulum, at the same times at the same places but for the rounding of the tangent's angle."""
+    """Both are the pendulum, with the same places at the same times but for the rounding of the tangent's angle."""
     numbers = {"rho": "1/4", "beta": "2/5", "g": "9.81"}
     motion = loop.solve(sp.Rational(angle) * sp.Rational("5/4"), **numbers)
     twin = bowl.solve(angle, L="5/4", **numbers)
@@ -69,7 +69,7 @@ def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: Modu
 @pytest.mark.parametrize("rho", ["1/4", "-1/4", "-100", "0", "99/80"])
 @pytest.mark.parametrize("angle", ["1/1000", "2", "29/10", "157/50"])
 def test_times_and_turning_points_hold_their_bounds(angle: str, rho: str, loop: ModuleType) -> None:
-    """Swings on either side of a track, beside the top and of a body that almost fills the track hold their bounds."""
+    """Bounds hold for swings on either side of a track, beside the top, and of a body that nearly fills the track."""
     motion = loop.solve(sp.Rational(angle) * sp.Rational("5/4"), rho=rho, g="9.81")
     with mp.workdps(DIGITS):
         exact_angle, radius = (mpf(q.p) / q.q for q in map(sp.Rational, (angle, rho)))
@@ -106,7 +106,7 @@ def test_rounds_inside_and_outside_a_loop(loop: ModuleType) -> None:
 
 
 def test_on_a_parabola_by_its_equation(generated_folder: Path) -> None:
-    """Answers equal those on the parabola with formulas to the last place, from the same points, and in sweeps."""
+    """Answers from the same points, and in sweeps, equal those on the parabola with formulas to the last place."""
     curve = gqm.Curve.implicit("a*x**2 - z", start=(0, 0), domain=(-2, 2), parameters={"a": "3/4"})
     force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="beta")
     module = gqm.build(gqm.derive(curve, force), name="ball_by_equation", folder=generated_folder)
@@ -135,7 +135,7 @@ def test_on_a_flat_bottom(generated_folder: Path) -> None:
         motion = module.solve(point=("1/2", mp.nstr(end, 45)), rho="1/8", g="9.81")
 
         def below(at: mpf) -> tuple[mpf, mpf]:
-            """The height of the centre, and the length of its path by x."""
+            """Return the height of the centre, and the derivative of the length of its path with respect to x."""
             depth = mp.root(1 - at**4, 4)
             slope, bend = at**3 / depth**3, 3 * at**2 / depth**7
             root = mp.sqrt(1 + slope**2)
@@ -153,7 +153,7 @@ def test_on_a_flat_bottom(generated_folder: Path) -> None:
 
 @pytest.mark.parametrize("share", ["1/2", "9/10", "99/100"])
 def test_small_swings_of_a_ball_that_all_but_fills_its_loop(share: str, loop: ModuleType, bowl: ModuleType) -> None:
-    """The path of its centre has the roundings of the curve, many of its own: places lay up to seven bounds away."""
+    """The path of the centre has the rounding errors of the curve, magnified; places were up to seven bounds off."""
     numbers = {"rho": sp.Rational(share) * sp.Rational("5/4"), "beta": "2/5", "g": "9.81"}
     for angle in np.geomspace(1e-6, 1e-2, 9).tolist():
         motion = loop.solve(1.25 * angle, **numbers)
@@ -163,7 +163,7 @@ def test_small_swings_of_a_ball_that_all_but_fills_its_loop(share: str, loop: Mo
 
 
 def test_on_a_rail_of_arcs_and_a_line(generated_folder: Path) -> None:
-    """Between two arcs the centre goes straight; on each it is a pendulum of length 2 - rho."""
+    """Between two arcs the centre moves straight; on each arc it is a pendulum of length 2 - rho."""
     pieces = [gqm.arc(radius=2, angle="3/2"), gqm.line(length=3), gqm.arc(radius=2, angle="3/2")]
     force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="1/2")
     rail = gqm.Curve.piecewise(pieces, start=(0, 0), heading="-3/2")
@@ -183,7 +183,7 @@ def test_on_a_rail_of_arcs_and_a_line(generated_folder: Path) -> None:
 
 
 def test_the_centre_moves_beside_the_track() -> None:
-    """x, z, σ, κ and N of the parallel curve, by definitions; λ stays that of the track."""
+    """x, z, σ, κ and N are those of the parallel curve by definition; λ remains that of the track."""
     module, (a, beta, rho) = generated.parabola_rolling, (0.75, 0.5, 0.375)
     places, g, m = [-1.25, -0.1, 0.0, 0.625, 3.0], 9.75, 2.0
     rows = module.pass1(places, 0.5, 2, a=a, beta=beta, rho=rho, g=g, m=m)
@@ -213,12 +213,10 @@ def test_the_closed_forms_are_the_centre_s() -> None:
 
 
 def test_a_body_that_does_not_fit_is_an_error(bowl: ModuleType) -> None:
-    """A body that does not fit is refused at launch, or when it comes to such a place, but not if the motion ends
-    before.
-    """
+    """A body that does not fit is refused at launch or at such a place, but not if the motion ends before it."""
     with pytest.raises(LaunchError, match=r"this rho a body does not fit .* theta = 0\.5; launch elsewhere"):
         bowl.solve(0.5, L=1, rho=1, beta=0)
-    # kappa*rho = 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
+    # kappa*rho is 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
     launch = {"lam0": 1.5, "a": 0.5, "rho": 1.5, "beta": "2/5"}
     place = np.sqrt(1.5 ** (2 / 3) - 1)
     with pytest.raises(SolutionError, match=r"does not fit .* after .* s; give rho") as error:
@@ -237,24 +235,29 @@ def test_without_a_radius_the_curve_is_the_centre_s_path() -> None:
 
 @pytest.fixture(scope="module")
 def slippery(generated_folder: Path) -> ModuleType:
-    """A round track whose friction is known."""
+    """Return a round track with a known coefficient of friction."""
     force = gqm.Gravity() + gqm.Rolling(radius="rho", mu_static="mu_s")
     return gqm.build(gqm.derive(gqm.families.circle(), force), name="slippery_bowl", folder=generated_folder)
 
 
 def grip(theta: float, start: float, beta: float) -> float:
-    """Needed over carried: beta/(1 + beta)*sin θ against cos θ + 2 (cos θ - cos θ0)/(1 + beta), after release."""
+    """Return the required over the available friction after release: beta/(1 + beta)*sin θ against cos θ + 2 (cos θ -
+    cos θ0)/(1 + beta).
+    """
     carried = np.cos(theta) + 2 * (np.cos(theta) - np.cos(start)) / (1 + beta)
     return beta / (1 + beta) * np.sin(theta) / carried
 
 
 def test_slip_is_told_where_it_begins(slippery: ModuleType) -> None:
-    """Released where friction holds, up to the other side; the launch where it does not, and every swing's far part."""
+    """Slip events occur at the launch if friction does not hold there, otherwise on the other side, and in the outer
+    part of every swing.
+    """
     beta, start = 0.4, 1.25
     launch = {"lam0": start, "L": 2, "rho": 0.5, "beta": beta, "g": 9.81}
     worst = grip(start, start, beta)
     assert [e.kind for e in slippery.solve(**launch, mu_s=1.001 * worst).events] == ["turn", "turn"]
-    # Less than is needed at rest there: it slips at once, then rolls, and slips again beyond the mirrored place.
+    # The coefficient is less than a body at rest there needs: it slips at once, then rolls, and slips again beyond the
+    # mirrored place.
     place = 0.8
     motion = slippery.solve(**launch, mu_s=grip(place, start, beta))
     slipping = [event for event in motion.events if event.kind == "slip"]

@@ -1,4 +1,4 @@
-"""Bounds along splines through points that scatter, against the splines themselves with forty digits."""
+"""Bounds along splines through scattered points hold against the splines themselves with forty digits."""
 
 from typing import Any
 
@@ -10,17 +10,18 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.runtime.charts.sampled import DEGREE, Sampled, _made
 
-# Chebyshev points on each polynomial of a spline; with 24 the truth is wrong by 2e-9 where points scatter by 5 cm.
+# The number of Chebyshev points on each polynomial of a spline; with 24 the reference is wrong by 2e-9 if points
+# scatter by 5 cm.
 NODES = 40
 SPEED, DRAG = 4, "1/20"
 
 
 def integrals() -> tuple[list[Any], Any]:
-    """The nodes on [-1, 1], and the matrix from values there to the integrals from -1 to each node and to 1."""
+    """Return the nodes on [-1, 1], and the matrix from values there to the integrals from -1 to each node and to 1."""
     angles = [mp.pi * (2 * i + 1) / (2 * NODES) for i in range(NODES)]
 
     def antiderivative(k: int, angle: Any) -> Any:
-        """Of the Chebyshev polynomial of degree k, at the cosine of an angle."""
+        """Return the antiderivative of the Chebyshev polynomial of degree k, at the cosine of an angle."""
         if k < 2:
             return mp.cos(angle) ** (k + 1) / (k + 1)
         return mp.cos((k + 1) * angle) / (2 * (k + 1)) - mp.cos((k - 1) * angle) / (2 * (k - 1))
@@ -31,7 +32,7 @@ def integrals() -> tuple[list[Any], Any]:
 
 
 def rates_of(spline: Any, j: int, u: Any) -> list[Any]:
-    """The derivatives of the coordinates of a spline between its knots j and j + 1, by de Boor's algorithm."""
+    """Return the derivatives of the coordinates of a spline between its knots j and j + 1, by de Boor's algorithm."""
     knots, values = spline.t, [[mpf(float(c)) for c in row] for row in spline.c[j - DEGREE : j + 1]]
     rates = [[mpf(0)] * 2 for _ in values]
     for order in range(1, DEGREE + 1):
@@ -47,7 +48,7 @@ def rates_of(spline: Any, j: int, u: Any) -> list[Any]:
 
 
 def passages(spline: Any, drag: Any) -> list[tuple[Any, Any, Any]]:
-    """Arc length, time and speed at each knot, of a body that enters the track with SPEED."""
+    """Return arc length, time and speed at each knot, for a body that enters the track with SPEED."""
     knots, (nodes, matrix) = [mpf(float(knot)) for knot in spline.t], integrals()
     s, t, work, found = mpf(0), mpf(0), mpf(0), []
     for j in range(DEGREE, len(knots) - DEGREE - 1):
@@ -71,7 +72,7 @@ def passages(spline: Any, drag: Any) -> list[tuple[Any, Any, Any]]:
 @pytest.mark.filterwarnings("ignore:.*the points scatter")
 @pytest.mark.parametrize(("scatter", "drag"), [(0.01, "0"), (0.05, "0"), (0.05, DRAG)])
 def test_bounds_along_a_spline_through_scattered_points(scatter: float, drag: str) -> None:
-    """The body is where the polynomials say, within bounds that are of use; the points may be as bad as they are."""
+    """The body is at the places of the polynomials, within useful bounds, however scattered the points are."""
     x = np.linspace(0.0, 9.0, 11)
     points = np.stack([x, 0.4 * np.sin(x) - x / 3.0], axis=1)
     points += np.random.default_rng(3).normal(0.0, scatter, points.shape)

@@ -1,4 +1,4 @@
-"""The checks of ``make soak``: a right motion passes them, and one that breaks a law does not."""
+"""A right motion passes the checks of ``make soak``, and one that breaks a law does not."""
 
 import random
 import sys
@@ -25,7 +25,7 @@ SLOW = {"lam0": -1.0, "v0": 2.0116e-06, "direction": 1, "h": 0.18013, "g": 7.626
 
 @pytest.fixture(scope="module")
 def well(generated_folder: Path) -> ModuleType:
-    """Two wells with a hill between."""
+    """Return two wells with a hill between them."""
     import gqm_sym as gqm
 
     curve = gqm.Curve.graph("h*(x**4 - 2*x**2)", parameters={"h": "1/4"})
@@ -33,9 +33,9 @@ def well(generated_folder: Path) -> ModuleType:
 
 
 def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
-    """V**2 is right to a bit of the place, though pass 1 subtracts parts that are a million times as large.
+    """V**2 is right to the last bit of the place, though pass 1 subtracts terms that are a million times as large.
 
-    Found by seed 3: held against pass 1, its energy was off by 5.5e-10 of V**2, which is what pass 1 leaves.
+    Seed 3 found this: compared with pass 1, whose rounding this is, the energy seemed off by 5.5e-10 of V**2.
     """
     motion = well.solve(**SLOW)
     state = motion.state(np.linspace(0.0, motion.period, 400))
@@ -47,7 +47,7 @@ def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
     assert np.max(np.abs(state.v2 - told) - slope) <= 1e-14 * SLOW["v0"] ** 2
     assert np.max(np.abs(well.pass1(state.lam, **SLOW).v2 - told)) > 1e-10 * SLOW["v0"] ** 2
     assert soak.faults(well, SLOW, random.Random(0), closely=True) == []
-    # Doubles leave too little of so small a V**2: forty digits are taken unasked.
+    # Doubles leave too few digits of so small a V**2, so that forty digits are used without being asked for.
     loosely, unsure = soak.speed_squared(well, motion, state.lam, bit, SLOW, False, SLOW["v0"] ** 2)
     assert np.array_equal(loosely, told)
     assert np.max(unsure) <= 2e-9 * SLOW["v0"] ** 2
@@ -90,7 +90,7 @@ WRONG: dict[str, tuple[str, Callable[[Any], dict[str, Any]]]] = {
 
 @pytest.mark.parametrize("law", WRONG)
 def test_a_broken_law_is_reported(law: str, well: ModuleType) -> None:
-    """Each law is looked at."""
+    """A motion that breaks a law is reported, for each of the laws."""
     call = SLOW | {"v0": 0.5}
     motion = well.solve(**call)
     wrong = _with(motion, **WRONG[law][1](motion))
@@ -123,7 +123,7 @@ def test_a_body_at_rest_stays(well: ModuleType) -> None:
 
 
 def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:
-    """A sweep that differs by more than four units in the last place is reported."""
+    """A sweep is reported if it differs by more than four units in the last place."""
     call = SLOW | {"v0": 0.5}
     period = well.solve(**call).period
     assert soak.swept(well, call, period) == []
@@ -132,25 +132,25 @@ def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:
 
 @pytest.fixture(scope="module")
 def families(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
-    """The modules of the random curves."""
+    """Return the modules of the random curves."""
     return soak_bounds.build(tmp_path_factory.mktemp("families"))
 
 
 def test_random_librations_keep_to_their_bounds(families: dict[str, ModuleType]) -> None:
-    """A thousand places of random librations lie within the bounds that they state, and no bound is useless."""
+    """A thousand places of random librations lie within their bounds, and no bound is uselessly large."""
     tally, failed = soak_bounds.soak(85, 19, families)
     assert failed == []
     assert tally["checks"] >= 900
 
 
-# What each takes: its launch and parameters. Each lay outside its bound by a factor of 10 to 10,000.
+# Each of these launches, with its parameters, was outside its bound by a factor of 10 to 10,000.
 SMALL = {
     "balance": {"lam0": 8.8e-06, "v0": 8.8e-06, "direction": 1, "a": 1.42, "k": 0.322, "c": 43.26211180124224},
     "ring": {"lam0": -1.09e-06, "v0": 0.0, "direction": -1, "k": 0.0},
     "rolling": {"lam0": -6.8e-05, "v0": 0.0, "direction": 1, "a": 0.68, "beta": 0.42},
 }
 
-# Near a hilltop the rounding of an end is thirty of the time on the way.
+# Near a hilltop the rounding of an end is thirty roundings of the time.
 NEAR_HILLTOP = {
     "lam0": 0.013704888185852636,
     "v0": 0.0,
@@ -163,20 +163,22 @@ NEAR_HILLTOP = {
 
 @pytest.mark.parametrize("name", SMALL)
 def test_small_swings_where_large_forces_cancel(name: str, families: dict[str, ModuleType]) -> None:
-    """The turning points in doubles are off by a rounding of the forces over their small sum."""
+    """The turning points in doubles have an error of one rounding of the forces over their small sum."""
     call = SMALL[name] | {"g": 9.81}
     assert soak_bounds.faults(families[name], soak_bounds.FAMILIES[name], call) == ([], len(soak_bounds.SHARES))
 
 
 def test_the_rounding_of_an_end_near_a_hilltop_is_charged(families: dict[str, ModuleType]) -> None:
-    """The half period was off by 60 roundings, and places lay up to 4.2 times outside their bounds."""
+    """Bounds include the rounding of an end near a hilltop (the half period was off by 60 roundings, places by 4.2
+    bounds).
+    """
     family, module = soak_bounds.FAMILIES["rotating"], families["rotating"]
     assert soak_bounds.faults(module, family, NEAR_HILLTOP) == ([], len(soak_bounds.SHARES))
 
 
 @pytest.mark.parametrize("c2", [-25.952397021578278, -60.0, -8.0])
 def test_a_sharp_bottom_of_the_valley_is_resolved(c2: float, families: dict[str, ModuleType]) -> None:
-    """There ds/dx changes within a thousandth of the swing: seen from far, that was taken for noise of 1e-10."""
+    """Within a thousandth of the swing ds/dx changes; on a coarse scale this was taken for noise of 1e-10."""
     call = {"lam0": 0.9038783239624086, "c1": 0.0, "c2": c2, "c3": -0.03722067968333353, "c4": 0.014594479042941668}
     motion = families["polynomial"].solve(**call, k=0.0)
     assert motion.quadrature_error <= 1e-14
@@ -189,7 +191,7 @@ def test_a_sharp_bottom_of_the_valley_is_resolved(c2: float, families: dict[str,
 def test_a_bound_that_does_not_hold_is_reported(
     families: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Bounds a million times smaller are broken, and larger ones useless."""
+    """Bounds a million times smaller are reported as broken, and larger ones as useless."""
     family = soak_bounds.FAMILIES["ellipse"]
     module = families["ellipse"]
     call = {"lam0": 1.0, "v0": 0.0, "direction": 1, "a": 1.0, "b": 1.0, "k": 0.5, "g": 9.81}
@@ -203,14 +205,16 @@ def test_a_bound_that_does_not_hold_is_reported(
 
 @pytest.fixture(scope="module")
 def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
-    """The modules of the motions of many kinds."""
+    """Return the modules of the motions of many kinds."""
     return soak_kinds.build(tmp_path_factory.mktemp("kinds"))
 
 
 @pytest.mark.parametrize("near", [1e-1, 2.5e-3, 1e-6, 1e-10, -1e-10, -2.5e-3])
 @pytest.mark.parametrize("v0", [0.68, 1e-5, 60.0])
 def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dict[str, ModuleType]) -> None:
-    """The acceleration is a small difference of large terms, whose roundings the bound holds (3.6 times outside)."""
+    """The acceleration is a small difference of large terms, whose rounding the bound includes (errors were 3.6
+    bounds).
+    """
     for direction in (1, -1):
         launch = {"lam0": 2.339, "v0": v0, "direction": direction, "a": -0.078156, "mu": 0.078156 * (1.0 - near)}
         assert soak_kinds.slide(kinds, launch, random.Random(1)) == []
@@ -229,14 +233,14 @@ FALLING = {
 
 @pytest.mark.parametrize("case", FALLING)
 def test_slow_launches_and_ends_of_the_curve(case: str, kinds: dict[str, ModuleType]) -> None:
-    """These raised ZeroDivisionError, turned beyond the end of the curve, or lay up to 1e7 bounds away."""
+    """These launches raised ZeroDivisionError, turned beyond the end of the curve, or were up to 1e7 bounds off."""
     launch = dict(zip(("lam0", "v0", "direction", "a"), FALLING[case], strict=True))
     with mp.workdps(40):
         assert soak_kinds.fall(kinds, launch, random.Random(1))[0] == []
 
 
 def test_no_chart_is_left_through_its_end_and_come_back_to(kinds: dict[str, ModuleType]) -> None:
-    """The turn was 1e-24 m beyond the end of the curve, and the next leg began at the end."""
+    """The turn was 1e-24 m beyond the end of the curve, and the next leg began at the end; now it does not."""
     with pytest.raises(LaunchError, match="would leave through it at once"):
         kinds["planes"].solve(0.0, 4.8e-12, -1)
 
@@ -255,32 +259,36 @@ DAMPED = {
 
 @pytest.mark.parametrize("case", DAMPED)
 def test_springs_with_viscous_damping(case: str, kinds: dict[str, ModuleType]) -> None:
-    """Each lay outside its bound, or was refused because what was left of a leg had no room for a panel."""
+    """The motions lie within their bounds (they did not, or were refused because the end of a leg had no room for a
+    panel).
+    """
     launch = dict(zip(("lam0", "v0", "direction", "k", "c"), DAMPED[case], strict=True))
     assert soak_kinds.damp(kinds, launch, random.Random(1)) == []
 
 
 def test_no_speed_is_negative(kinds: dict[str, ModuleType]) -> None:
-    """The speed at a turn is not negative, although rounding left -1.8e-16 there."""
+    """The speed at a turn is not negative, although V**2 was rounded to -1.8e-16 there."""
     launch = {"lam0": -1.1087799233866897, "v0": 0.05760950449765136, "direction": 1, "t": -0.25721177667548717}
     assert kinds["wells"].solve(**launch).v_min.value == 0.0
 
 
 @pytest.mark.parametrize("seed", [160000162282092, 82690791284912, 35866620081299])
 def test_small_swings_across_the_seam_of_a_ring(seed: int, kinds: dict[str, ModuleType]) -> None:
-    """A chart is read at places less whole laps, whose rounding bounds have (turns lay up to 15 bounds away)."""
+    """A chart is read at places less whole laps, and bounds include the rounding of that (turns were up to 15 bounds
+    off).
+    """
     with mp.workdps(40):
         assert soak_kinds.rims(random.Random(seed), kinds)[0] == []
 
 
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
-    """On slopes, springs, circles, rims and coils closed forms, sweeps and threads agree; differences are reported."""
+    """On slopes, springs, circles, rims and coils, closed forms, sweeps and threads agree; differences are reported."""
     modules = kinds
     tally, failed, _ = soak_kinds.soak(110, 20, modules)
     assert failed == []
     assert tally["checks"] >= 550
     assert {kind.__name__ for kind in soak_kinds.KINDS} <= tally.keys()
-    # With gravity that is a little stronger the closed forms are those of another law.
+    # With slightly stronger gravity the closed forms are those of another law.
     monkeypatch.setattr(soak_kinds, "G", "9.8100000001")
     for kind in (soak_kinds.slides, soak_kinds.swings, soak_kinds.bounces):
         assert any(kind(random.Random(seed), modules)[0] for seed in range(20))

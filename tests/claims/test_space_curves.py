@@ -1,4 +1,4 @@
-"""Space curves against truths made elsewhere: 40-digit times and forces, closed forms, DOP853, planar motions."""
+"""Space curves agree with independent results: 40-digit times and forces, closed forms, DOP853 and planar motions."""
 
 import json
 import pickle
@@ -21,7 +21,7 @@ from gqm_sym.errors import DeclarationError, InputError
 from gqm_sym.kernels.base import DIRECTION, W
 
 ROWS = {row["name"]: row for row in json.loads((DATA / "space_curves.json").read_text(encoding="utf-8"))}
-# Those of which a module is made: the others have the same functions.
+# Modules are made for these curves; the others have the same functions.
 BUILT = ("lying_helix", "sprung_helix", "saddle_lap")
 U = sp.Symbol("u", real=True)
 
@@ -29,7 +29,7 @@ Build = Callable[[str, Any, Any], ModuleType]
 
 
 def derived(row: dict[str, Any]) -> gqm.Model:
-    """Declare and derive one of the twelve."""
+    """Return the model of one of the twelve curves."""
     x, y, z = row["curve"]
     force = gqm.Gravity() if row["potential"] == "g*z" else gqm.Potential(row["potential"])
     return gqm.derive(gqm.Curve.space(x=x, y=y, z=z, parameter="u"), force)
@@ -37,7 +37,7 @@ def derived(row: dict[str, Any]) -> gqm.Model:
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build a module once."""
+    """Return a module, built once."""
     folder, built = tmp_path_factory.mktemp("space"), {}
 
     def module(name: str, curve: Any, force: Any) -> ModuleType:
@@ -50,7 +50,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 @pytest.mark.parametrize("name", ROWS)
 def test_closed_forms_of_the_twelve(name: str) -> None:
-    """They give V**2 and the contact force, along each axis and in length, to 30 digits."""
+    """Closed forms of the twelve give V**2 and the contact force, along each axis and in length, to 30 digits."""
     row = ROWS[name]
     model, launch, g, v2 = derived(row), row["launch"], sp.Symbol("g", real=True), sp.Symbol("v2", real=True)
     known = {model.lam0: sp.Rational(launch["lam0"]), model.v0: sp.Rational(launch["v0"])}
@@ -68,7 +68,7 @@ def test_closed_forms_of_the_twelve(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*BUILT, "viviani"])
 def test_motions_of_some_of_the_twelve(name: str, build: Build) -> None:
-    """Periods to half an ulp, turning points to one, and contact forces to some roundings of their terms."""
+    """Periods are right to half an ulp, turning points to one, and contact forces to some roundings of their terms."""
     row, model = ROWS[name], None
     if name == "viviani":
         module = generated.viviani
@@ -93,7 +93,7 @@ def test_motions_of_some_of_the_twelve(name: str, build: Build) -> None:
 
 
 def test_a_state_in_space_is_that_of_pass1() -> None:
-    """Coordinates and forces at times are those at the places there; the curve itself says where that is."""
+    """Coordinates and forces at times are those at the places of these times, which agree with the curve itself."""
     motion = generated.viviani.solve("3/10")
     state = motion.state(np.linspace(0.0, 1000.0, 41))
     assert state._fields[-4:] == ("y", "normal_x", "normal_y", "normal_z")
@@ -118,7 +118,7 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
 
 
 def test_states_of_laps_and_of_legs_in_space(build: Build) -> None:
-    """After a thousand laps the body is on the curve still; along legs states at one time are those at many."""
+    """After a thousand laps the body is still on the curve; along legs, states at one time are those at many."""
     model = derived(ROWS["saddle_lap"])
     motion = build("saddle_lap", model.curve, model.force).solve("1", "5")
     late = motion.state(1000.4 * motion.period)
@@ -135,7 +135,7 @@ def test_states_of_laps_and_of_legs_in_space(build: Build) -> None:
 
 
 def helix_truth(w: str) -> tuple[mpf, mpf]:
-    """Way and time from rest to V**2 = w on the helix of radius 2 and slope 0.5 rad with mu = 0.2."""
+    """Return distance and time from rest to V**2 = w on the helix of radius 2 and slope 0.5 rad with mu = 0.2."""
     g, mu, slope = mpf("9.81"), mpf("0.2"), mpf("0.5")
     kappa = mp.cos(slope) ** 2 / 2
 
@@ -147,7 +147,9 @@ def helix_truth(w: str) -> tuple[mpf, mpf]:
 
 
 def test_a_helix_with_friction() -> None:
-    """Its law of motion has constant coefficients: way and time are integrals over V**2, and the limit is known."""
+    """The law of motion has constant coefficients, so that distance and time are integrals over V**2 with a known
+    limit.
+    """
     module = generated.helix_coulomb
     numbers = {"R": 2, "c": "-2*tan(1/2)", "mu": "0.2"}
     motion = module.solve(0, 0, t_max=300, **numbers)
@@ -167,7 +169,9 @@ def test_a_helix_with_friction() -> None:
 
 
 def test_a_helix_too_rough_holds_the_body() -> None:
-    """Uphill it stops where friction and gravity have used the energy up, and with tan(slope) < mu it stays there."""
+    """Uphill the body stops where friction and gravity have used up its energy, and with tan(slope) < mu it stays
+    there.
+    """
     motion = generated.helix_coulomb.solve(0, 10, direction=-1, R=2, c="-2*tan(1/2)", mu="0.7")
     assert [leg.end for leg in motion.legs] == ["rest"]
     assert generated.helix_coulomb.solve(0, 0, mu="0.7").kind == "rest"
@@ -177,7 +181,9 @@ def test_a_helix_too_rough_holds_the_body() -> None:
 
 
 def dop853(mu: float, b: float, lam0: float, v0: float, times: list[float]) -> Any:
-    """Newton's law in three coordinates on Viviani's curve, with friction and drag and what they take."""
+    """Integrate Newton's law in three coordinates on Viviani's curve, with friction and drag and the energy lost to
+    them.
+    """
 
     def slopes(_: float, state: Any) -> list[float]:
         u, rate, _, _ = state
@@ -197,11 +203,11 @@ def dop853(mu: float, b: float, lam0: float, v0: float, times: list[float]) -> A
 
 
 def test_friction_and_drag_against_dop853(build: Build) -> None:
-    """Place, V**2, and the work of friction and drag, through a turn."""
+    """The place, V**2, and the work of friction and drag agree with DOP853 through a turn."""
     module = build("rough_viviani", generated_curve(), gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag())
     motion = module.solve(-2.0, 4.0, mu=0.1, b=0.02, t_max=20)
     turn = motion.legs[0].t_end
-    # DOP853 cannot pass the jump of friction at a turn: it is asked before the first.
+    # DOP853 cannot pass the jump of friction at a turn, so that it is asked for times before the first.
     times = [share * turn for share in (0.1, 0.4, 0.7, 0.95)]
     truth = dop853(0.1, 0.02, -2.0, 4.0, times)
     state = motion.state(np.array(times))
@@ -210,7 +216,8 @@ def test_friction_and_drag_against_dop853(build: Build) -> None:
     assert state.v == pytest.approx(truth.y[1] * ds, abs=1e-10)
     assert motion.energy(np.array(times)).lost == pytest.approx(truth.y[2] + truth.y[3], abs=1e-10)
     assert [leg.end for leg in motion.legs][-1] == "rest"
-    # Friction takes |N| times the way, on each leg: the trapezoidal rule in the angle of a swing converges fast.
+    # The work of friction on each leg is that of |N| over the distance: the trapezoidal rule in the angle of a swing
+    # converges fast.
     lost = 0.0
     for leg in motion.legs:
         share = 0.5 - 0.5 * np.cos(np.pi * (np.arange(400) + 0.5) / 400)
@@ -221,7 +228,7 @@ def test_friction_and_drag_against_dop853(build: Build) -> None:
 
 
 def generated_curve() -> gqm.Curve:
-    """Viviani's curve with a radius of 1."""
+    """Return Viviani's curve with a radius of 1."""
     return gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter="u")
 
 
@@ -247,7 +254,7 @@ def test_a_vertical_plane_is_the_planar_case(h: str, z: str, cosine: str, sine: 
 
 
 def test_a_force_across_a_vertical_plane_makes_the_contact_force_a_vector() -> None:
-    """A curve in the plane of x and z that is pulled along y carries that pull too."""
+    """If a curve in the plane of x and z is pulled along y, the contact force balances that pull too."""
     curve = gqm.Curve.space(x="u", y="0", z="u**2/2", parameter="u")
     model = gqm.derive(curve, gqm.Gravity() + gqm.Potential("k*y + x*y"))
     assert model.normal == ()
@@ -258,7 +265,9 @@ def test_a_force_across_a_vertical_plane_makes_the_contact_force_a_vector() -> N
 
 @pytest.mark.parametrize(("cosine", "sine"), [("4/5", "3/5"), ("-5/13", "12/13")])
 def test_a_tilted_planar_curve(cosine: str, sine: str) -> None:
-    """Its motion is the planar one with the part of g in its plane; the contact force carries the other part."""
+    """The motion of a tilted planar curve is the planar one with the part of g in its plane; the contact force balances
+    the other part.
+    """
     tilted = gqm.Curve.space(x="2*cos(u)", y=f"-{sine}*sin(u)", z=f"{cosine}*sin(u)", parameter="u")
     flat = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u")
     model, plane = gqm.derive(tilted, gqm.Gravity()), gqm.derive(flat, gqm.Gravity())
@@ -275,7 +284,7 @@ def test_a_tilted_planar_curve(cosine: str, sine: str) -> None:
 
 @pytest.mark.parametrize(("cosine", "sine"), [("3/5", "4/5"), ("-5/13", "12/13")])
 def test_a_curve_turned_about_the_vertical(cosine: str, sine: str) -> None:
-    """Arc length, curvature, |N| and the law of motion stay, and the force turns with the curve."""
+    """Arc length, curvature, |N| and the law of motion do not change, and the force turns with the curve."""
     cosine, sine = sp.Rational(cosine), sp.Rational(sine)
     x, y, z = U, U**3 / 3, U**2 / 2 - U
     force = gqm.Gravity() + gqm.CoulombFriction(mu="1/5")
@@ -296,7 +305,7 @@ def test_a_curve_turned_about_the_vertical(cosine: str, sine: str) -> None:
 
 
 def test_sweeps_of_a_space_curve() -> None:
-    """They are the numbers of single motions, of the contact force too, and no state is beyond its extremes."""
+    """Sweeps give the numbers of single motions, of the contact force too, and no state exceeds its extremes."""
     lam0 = np.array([0.3, -0.5])
     for quantity in ("half_period", "normal_force_max", "normal_force_min", "v_max"):
         swept = generated.viviani.sweep(quantity, lam0=lam0).values
@@ -347,14 +356,14 @@ FORCES = (
 
 @pytest.mark.parametrize(("declare", "message"), REFUSED)
 def test_what_is_no_space_curve_is_refused(declare: Callable[[], object], message: str) -> None:
-    """One error says what is wrong."""
+    """Each declaration that is no space curve is refused with a reason."""
     with pytest.raises(InputError, match=message):
         declare()
 
 
 @pytest.mark.parametrize(("force", "message"), FORCES)
 def test_forces_that_are_not_there_yet_are_refused(force: gqm.Kernel, message: str) -> None:
-    """A sentence says so, and nothing is computed without them."""
+    """Forces that are not available yet are refused with a reason, and nothing is computed without them."""
     with pytest.raises(DeclarationError, match=message):
         gqm.derive(gqm.families.helix(), gqm.Gravity() + force)
 
@@ -366,7 +375,7 @@ def test_corners_of_space_curves_are_refused() -> None:
             gqm.derive(gqm.Curve.space(x="u", y=y, z="u**2", parameter="u"), gqm.Gravity())
 
 
-def test_a_contact_force_without_a_sign_is_told() -> None:
+def test_a_contact_force_without_a_sign() -> None:
     """Questions that need the sign of the contact force are refused; derivatives of the half period are known."""
     with pytest.raises(InputError, match="contact: 'above' needs to know which side"):
         generated.viviani.solve("3/10", contact="above")
@@ -381,7 +390,9 @@ def test_a_contact_force_without_a_sign_is_told() -> None:
 
 
 def test_losses_on_space_curves_with_cusps_are_refused() -> None:
-    """A leg does not always stop there; without losses a motion ends at the cusp, and a domain leaves the cusp out."""
+    """Losses are refused because a leg does not always stop at a cusp; without losses a motion ends there, and a domain
+    may exclude it.
+    """
     cusped = {"x": "u**2", "y": "u**3", "z": "-u**2/2", "parameter": "u"}
     with pytest.raises(DeclarationError, match="u may vanish, which is a cusp; losses of energy"):
         gqm.derive(gqm.Curve.space(**cusped), gqm.Gravity() + gqm.CoulombFriction())
@@ -391,7 +402,7 @@ def test_losses_on_space_curves_with_cusps_are_refused() -> None:
 
 
 def test_a_law_of_the_users_own_knows_y() -> None:
-    """On a space curve it is the third coordinate, in a planar one a parameter."""
+    """In a user's own law y is the third coordinate on a space curve, and a parameter on a planar one."""
     law = gqm.Kernel.law("-k*y*W*direction")
     model = gqm.derive(gqm.Curve.space(x="u", y="u**3/3", z="u**2", parameter="u"), gqm.Gravity() + law)
     assert model.parameters == ("k", "g", "m")
@@ -399,8 +410,8 @@ def test_a_law_of_the_users_own_knows_y() -> None:
     assert "y" in gqm.derive(gqm.Curve.graph("u**2", parameter="u"), gqm.Gravity() + law).parameters
 
 
-def test_closed_curves_are_found_and_their_units_told() -> None:
-    """Periods of waves, and the units of what stands in the coordinates."""
+def test_periods_of_closed_curves_and_units_of_their_parameters() -> None:
+    """The periods of waves are found, and so are the units of the parameters in the coordinates."""
     assert gqm.families.viviani().period == 4 * sp.pi
     assert gqm.families.torus_knot(p=2, q=2).period == sp.pi
     assert gqm.families.helix().period is None
@@ -413,7 +424,9 @@ def test_closed_curves_are_found_and_their_units_told() -> None:
 
 
 def test_a_central_force_in_space() -> None:
-    """Its centre has three coordinates, or lies in the plane y = 0; on a circle about it |N| is constant."""
+    """The centre of a central force has three coordinates, or lies in the plane y = 0; on a circle about it |N| is
+    constant.
+    """
     ring = gqm.Curve.space(x="3/5*cos(u)", y="sin(u)", z="4/5*cos(u)", parameter="u")
     for centre in ((0, 0), (0, 0, 0)):
         model = gqm.derive(ring, gqm.CentralForce(centre=centre))
@@ -429,7 +442,7 @@ def test_a_central_force_in_space() -> None:
 
 
 def test_droplet_on_a_helix(build: Build) -> None:
-    """Its resistance is constant, so that both legs are those of a body on an incline, up to rest in the end."""
+    """The resistance is constant, so that both legs are those of a body on an incline, until it rests."""
     module = build("droplet_on_helix", gqm.families.helix(R="2", c="3/4"), gqm.Gravity() + gqm.SurfaceTension())
     rate = mp.sqrt(4 + mpf(9) / 16)
     pull, drag = mpf("9.81") * mpf(3) / 4 / rate, mpf("0.07") * 9 * 2 / rate**2

@@ -1,4 +1,4 @@
-"""Loads on riders of tracks through measured points in space, against Newton's law and the curves of the points."""
+"""Loads on riders of tracks through measured points in space agree with Newton's law and the curves of the points."""
 
 from itertools import pairwise
 from types import ModuleType
@@ -20,19 +20,19 @@ HEIGHT = 0.9
 
 
 def ring(count: int) -> np.ndarray:
-    """Points of a tilted circle, with a roll angle that a lap increases by one turn."""
+    """Return points of a tilted circle, with a roll angle that grows by one turn in each lap."""
     u = 2.0 * np.pi * np.arange(count) / count
     places = RADIUS * np.stack([np.cos(u), np.cos(TILT) * np.sin(u), np.sin(TILT) * np.sin(u)], axis=1)
     return np.column_stack([places, 0.3 + u + 0.2 * np.sin(u)])
 
 
 def derivatives(chart: SpaceChart, s: np.ndarray) -> np.ndarray:
-    """x, y, z and the roll angle at arc lengths with their first three derivatives, as (4, 4, n)."""
+    """Return x, y, z and the roll angle at arc lengths with their first three derivatives, as (4, 4, n)."""
     return np.stack([chart.derivatives(s, order) for order in range(4)])
 
 
 def chart_of(points: np.ndarray, *, closed: bool) -> SpaceChart:
-    """The chart of points with roll angles."""
+    """Return the chart of points with roll angles."""
     text = "\n".join(" ".join(map(repr, row)) for row in points.tolist())
     chart = Sampled(text, closed=closed, in_space=True, banked=True).chart(())
     assert isinstance(chart, SpaceChart)
@@ -40,7 +40,9 @@ def chart_of(points: np.ndarray, *, closed: bool) -> SpaceChart:
 
 
 def test_charts_converge_to_their_curve() -> None:
-    """Coordinates, roll and their first three derivatives, each at its order; by whole turns a lap adds to the roll."""
+    """The coordinates, the roll and their first three derivatives converge at their orders; a lap adds whole turns to
+    the roll.
+    """
     errors = []
     for count in (48, 96, 192):
         chart = chart_of(ring(count), closed=True)
@@ -60,14 +62,16 @@ def test_charts_converge_to_their_curve() -> None:
 
 @pytest.fixture(scope="module")
 def banked() -> ModuleType:
-    """The tilted circle by 384 points, banked by an angle at each, under gravity."""
+    """Return the tilted circle through 384 points, banked by an angle at each, under gravity."""
     points = ring(384)
     curve = gqm.Curve.sampled(points[:, :3], closed=True, roll=points[:, 3], heartline="h", parameters={"h": HEIGHT})
     return transient(gqm.derive(curve, gqm.Gravity()))
 
 
 def newton(rows: Any, w: Any) -> tuple[list[Any], Any]:
-    """Loads and the rider's upward direction by Newton's law: of place, roll and their derivatives at one place."""
+    """Return loads and the rider's upward direction by Newton's law, from place, roll and their derivatives at one
+    place.
+    """
     tangent, bend = mp.matrix(rows[1][:3]), mp.matrix(rows[2][:3])
     up = mp.matrix([0, 0, 1])
     felt = w * bend + mpf("9.81") * (up - tangent * tangent[2])
@@ -94,7 +98,7 @@ def test_loads_are_those_of_newton(banked: ModuleType) -> None:
             loads, upright = newton(rows, w)
 
             def nearby(h: Any, load: int, rows: Any = rows, w: Any = w) -> Any:
-                """The load at the distance h along the track."""
+                """Return the load at the distance h along the track."""
                 ahead = [[one + h * other for one, other in zip(*pair, strict=True)] for pair in pairwise(rows)]
                 return newton(ahead, w - 2 * mpf("9.81") * rows[1][2] * h)[0][load]
 
@@ -111,7 +115,7 @@ def test_loads_are_those_of_newton(banked: ModuleType) -> None:
 
 
 def test_loads_and_levels_of_the_circle(banked: ModuleType) -> None:
-    """They are those of the circle itself, whose tangent, curvature and V**2 are known, to the points' order."""
+    """Loads and levels are those of the circle itself, with known tangent, curvature and V**2, to the points' order."""
     motion = banked.solve(0.0, 14.0)
 
     def vertical(u: np.ndarray) -> np.ndarray:
@@ -134,7 +138,7 @@ def test_loads_and_levels_of_the_circle(banked: ModuleType) -> None:
 
 
 def test_formulas_along_points() -> None:
-    """A roll angle may be a formula in arc length, with parameters, or chosen so that there is no lateral force."""
+    """A roll angle may be a formula in arc length with parameters, or the one without lateral force."""
     points = ring(48)[:, :3]
     leaning = gqm.derive(gqm.Curve.sampled(points, closed=True, roll="psi*s/5"), gqm.Gravity())
     assert leaning.units["psi"] == "1/m"
@@ -147,7 +151,7 @@ def test_formulas_along_points() -> None:
     assert gqm.Curve.sampled(table, roll="coordinated").banking.angle is None
 
 
-def test_angles_are_told_but_for_whole_turns() -> None:
+def test_angles_are_determined_up_to_whole_turns() -> None:
     """An angle that jumps by a turn from point to point is the same roll."""
     points = ring(48)
     wrapped = np.column_stack([points[:, :3], np.remainder(points[:, 3] + np.pi, 2.0 * np.pi) - np.pi])
@@ -167,13 +171,13 @@ def test_angles_are_told_but_for_whole_turns() -> None:
     ],
 )
 def test_rolls_that_are_none(options: dict[str, Any], message: str) -> None:
-    """One error says what is wrong."""
+    """Each declaration that is no roll is refused with a reason."""
     with pytest.raises(DeclarationError, match=f"^sampled: {message}"):
         gqm.Curve.sampled(ring(48)[:, :3], **options)
 
 
 @pytest.mark.parametrize("roll", ["coordinated", [0.1] * 48])
 def test_planar_tracks_are_not_banked(roll: Any) -> None:
-    """Lateral loads on riders are known for tracks in space only."""
+    """Banking of planar tracks is refused, because lateral loads on riders are known for tracks in space only."""
     with pytest.raises(DeclarationError, match=r"^sampled: roll: is for tracks in space; give rows of x, y and z"):
         gqm.Curve.sampled(ring(48)[:, [0, 2]], roll=roll)

@@ -1,4 +1,4 @@
-"""Trains against closed forms, a 30-digit truth, and the motion of the body that a short train is."""
+"""Trains agree with closed forms, with a 30-digit reference, and, if they are short, with the motion of a body."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -16,11 +16,11 @@ import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
 
 G = mpf("9.81")
-# Heights of a chart are right to a unit or two in the last place; half periods are measured to 2 of them.
+# Heights of a chart are right to a unit or two in the last place; half periods are tested to 2 of them.
 MAX_ULPS = 3.0
-# Forces are a few operations on such heights, as a share of the weight.
+# Forces are a few operations on such heights, and the tolerance is a share of the weight.
 SHARE = 1e-14
-# Times along points in space are known in doubles only: some units in the last place.
+# Times along points in space are known in doubles only, to some units in the last place.
 ROUNDING = 4e-15
 
 Build = Callable[..., ModuleType]
@@ -28,7 +28,7 @@ Build = Callable[..., ModuleType]
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build a module of a train once."""
+    """Return the module of a train, built once."""
     folder, built = tmp_path_factory.mktemp("trains"), {}
 
     def module(name: str, curve: gqm.Curve, force: Any = None, cars: int = 3) -> ModuleType:
@@ -43,12 +43,12 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 @pytest.fixture(scope="module")
 def circle(build: Build) -> ModuleType:
-    """A train on a circle."""
+    """Return a train on a circle."""
     return build("train_on_circle", gqm.families.circle())
 
 
 def weaker(length: Any, radius: Any) -> Any:
-    """Gravity of the pendulum that a train on a circle is."""
+    """Return the gravity of the pendulum that a train on a circle is equivalent to."""
     half = mpf(length) / (2 * mpf(radius))
     return G * mp.sin(half) / half
 
@@ -58,7 +58,7 @@ def weaker(length: Any, radius: Any) -> Any:
     [(1, 1, 1.2), (5, 9.5, 1.5), (2, 6, 5.0), (1, 0.1, 0.01), (3, 12, 4.0), (1, 1e-6, 1.2), (1, 2.0**-40, 2.0)],
 )
 def test_on_a_circle_it_is_a_pendulum(circle: ModuleType, radius: float, length: float, place: float) -> None:
-    """Its half period is that of a pendulum under g*sinc(l/(2*R)), also of a train so short that it is a body."""
+    """The half period is that of a pendulum under g*sinc(l/(2*R)), also for a train so short that it is a body."""
     with mp.workdps(40):
         sine = mp.sin(mpf(place) / (2 * radius))
         truth = 2 * mp.sqrt(radius / weaker(length, radius)) * mp.ellipk(sine**2)
@@ -69,19 +69,19 @@ def test_on_a_circle_it_is_a_pendulum(circle: ModuleType, radius: float, length:
 
 @pytest.mark.parametrize("angle", [0.00278, 0.0313, 0.000652])
 def test_short_trains_on_small_swings(circle: ModuleType, angle: float) -> None:
-    """A swing may end next to where an end of the train passes the lowest place (the period was off by 5.8e-12)."""
+    """A swing may end close to where an end of the train passes the lowest place (the period was off by 5.8e-12)."""
     radius, length = 0.109, 0.000566
     with mp.workdps(40):
         truth = (
             4 * mp.sqrt(radius / weaker(length, radius)) * mp.ellipk(mp.sin(mpf(angle * radius) / (2 * radius)) ** 2)
         )
         found = circle.solve(angle * radius, L=radius, length=length).period
-        # At the lowest place the chart begins and ends: a place is rounded there as the length of a lap is.
+        # The chart begins and ends at the lowest place, where a place has the rounding of the length of a lap.
         assert abs(found / truth - 1) <= ROUNDING + 2.0**-53 * 2 * mp.pi / angle
 
 
 def test_forces_on_cars(circle: ModuleType) -> None:
-    """They are those of bodies on a circle at the speed of the train, and couplings carry what gravity leaves over."""
+    """The forces are those on bodies on a circle at the speed of the train, and couplings carry the rest of gravity."""
     radius, length, cars, mass = 5.0, 4.0, 3, 900.0
     motion = circle.solve(6, L=radius, length=length, m=mass)
     times = np.array([[0.0, 0.3], [1.0, 9.0]])
@@ -98,7 +98,7 @@ def test_forces_on_cars(circle: ModuleType) -> None:
     assert not found.normal_y.any()
     assert not found.y.any()
     np.testing.assert_allclose(found.z, -radius * np.cos(angles), rtol=0, atol=1e-14)
-    # The part behind a coupling is as fast as all: its own gravity is g sinc(own length/2R) at its own middle.
+    # The part behind a coupling is as fast as the train; its own gravity is g sinc(own length/2R) at its own middle.
     for k in range(1, cars):
         behind = length * k / cars
         middle = state.lam - length / 2 + behind / 2
@@ -147,7 +147,7 @@ def test_parabola(build: Build) -> None:
 
 
 def test_across_joints(build: Build) -> None:
-    """At a joint of a rail the mean height is that of the exact heights: nothing is smoothed over a joint."""
+    """At a joint of a rail the mean height is that of the exact heights; nothing is smoothed over a joint."""
     rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle=1), gqm.line(length=3)], heading=-1)
     module = build("train_on_rail", rail)
     length = 1.25
@@ -181,7 +181,7 @@ def test_drag(build: Build) -> None:
 
 
 def test_in_space(build: Build) -> None:
-    """Along points in space a vertical track is the planar one, and sweeps are single motions."""
+    """Along points in space a vertical track gives the planar motion, and sweeps give single motions."""
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     x, z = 4 * np.cos(angle), np.sin(2 * angle) + np.sin(angle)
     flat = build("train_in_plane", gqm.Curve.sampled(np.stack([x, z], axis=1), closed=True))
@@ -190,7 +190,7 @@ def test_in_space(build: Build) -> None:
     planar, spatial = (module.solve(9, length=2.5) for module in (flat, tilted))
     assert spatial.half_period == pytest.approx(planar.half_period, rel=1e-13)
     cars, theirs = planar.cars(0.7), spatial.cars(0.7)
-    # The curvature of a spline through 60 points has some hundred roundings of these.
+    # The curvature of a spline through 60 points has some hundred roundings of the points.
     np.testing.assert_allclose(theirs.normal_force, np.abs(cars.normal_force), rtol=1e-11)
     np.testing.assert_allclose(0.6 * theirs.normal_x + 0.8 * theirs.normal_y, cars.normal_x, rtol=0, atol=1e-11)
     np.testing.assert_allclose(theirs.coupling_force, cars.coupling_force, rtol=0, atol=1e-13)
@@ -268,7 +268,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
 
 
 def test_what_riders_feel_in_each_car(build: Build) -> None:
-    """It is the acceleration of the places of the cars less gravity, along the rider's directions there."""
+    """The loads are the acceleration of the places of the cars less gravity, along the rider's directions there."""
     track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))
     module = build("train_with_riders", track, cars=5)
     motion = module.solve(40, 9, length=12)
@@ -297,7 +297,7 @@ def test_what_riders_feel_in_each_car(build: Build) -> None:
 
 
 def test_friction_on_a_helix(build: Build) -> None:
-    """All cars press alike there: the train slides as one body, to the same limit."""
+    """All cars press alike on a helix, so that the train slides as one body, to the same limit."""
     helix = gqm.families.helix(R=2, c="-2*tan(1/2)", domain=(0, 400))
     module = build("rubbing_train_on_helix", helix, gqm.CoulombFriction(mu="1/5"), cars=7)
     motion = module.solve(4, length=3, t_max=60)
@@ -306,13 +306,15 @@ def test_friction_on_a_helix(build: Build) -> None:
     one = generated.helix_coulomb.solve(0, t_max=5, R=2, c="-2*tan(1/2)", mu="0.2").state(1.5)
     assert motion.state(1.5).v == pytest.approx(one.v, rel=1e-13)
     assert cars.normal_force == pytest.approx(np.full(7, one.normal_force / 7), rel=1e-13)
-    # Each car would run like that alone.
+    # Each car would move like that alone.
     assert np.abs(cars.coupling_force).max() < 1e-12
 
 
 @pytest.mark.parametrize("in_space", [True, False])
 def test_friction_of_each_car(in_space: bool, build: Build) -> None:
-    """Each car rubs by its own contact force, as in Newton's law for all of them by DOP853; couplings add up."""
+    """Friction acts on each car by its own contact force, as in Newton's law for all cars by DOP853; couplings add
+    up.
+    """
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
     name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
@@ -322,7 +324,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     shares = (np.arange(4) + 0.5) / 4 - 0.5
 
     def pressed(s: float, w: float) -> Any:
-        """|N|/m of each car, from the formulas of the curve."""
+        """Return |N|/m of each car, from the formulas of the curve."""
         u = places(s + length * shares)
         first = np.array([20 + 0 * u, 5 * np.cos(u) * in_space, -3 * np.sin(u)])
         second = np.array([0 * u, -5 * np.sin(u) * in_space, -3 * np.cos(u)])
@@ -366,7 +368,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     assert np.abs(cars.normal_force) == pytest.approx(force / 4, rel=1e-10)
     low, high = ends(truth[0][1])
     acceleration = -9.81 * (high - low) / length - mu * force.mean()
-    # A coupling carries what the cars behind it lack: theirs is gravity over their own part of the track.
+    # A coupling balances what the cars behind it lack, which is gravity over their own part of the track.
     edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
     lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
@@ -374,7 +376,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
 
 @pytest.mark.parametrize("in_space", [True, False])
 def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
-    """The shorter a train, the nearer is its motion to that of a body with friction; of a nanometre it is that one."""
+    """A short train moves like a body with friction in the limit; at a length of a nanometre both move alike."""
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
     name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
@@ -382,7 +384,7 @@ def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
     rail = gqm.Curve.piecewise([curve])
     body = build(f"body_{in_space}", rail, gqm.CoulombFriction(), cars=0).solve(30, 12, mu="0.05", t_max=3).state(2.0)
     trains = [module.solve(30, 12, mu="0.05", length=length, t_max=3).state(2.0) for length in (2.0, 1.0, 1e-9)]
-    # The cars of a train see the square of its length.
+    # The effect of a train's length on its cars is in proportion to its square.
     wide, half, short = (abs(train.lam - body.lam) for train in trains)
     assert wide / half == pytest.approx(4.0, rel=0.05)
     assert short < 1e-12 * body.lam
@@ -391,7 +393,9 @@ def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
 
 
 def test_a_roll_in_another_parameter_than_arc_length_is_refused() -> None:
-    """It would have to be known by arc length; other rolls are kept."""
+    """A roll in another parameter is refused, because it would have to be known in arc length; other rolls are
+    accepted.
+    """
     rolled = {"x": "20*cos(u)", "y": "30*sin(u)", "z": "u", "parameter": "u", "domain": (0, 6)}
     law = gqm.Gravity() + gqm.Train(length=2)
     with pytest.raises(DeclarationError, match="roll: u/9 is in u, and the track of a train has arc length"):

@@ -1,4 +1,4 @@
-"""The runtime as plain Python: the same bits as compiled, so that what is measured and tried there counts here."""
+"""The runtime as plain Python gives the same bits as compiled code, so that measurements of one hold for the other."""
 
 import json
 import os
@@ -42,5 +42,5 @@ def _run(**environment: str) -> Any:
 
 
 def test_python_runs_what_numba_compiles() -> None:
-    """A motion, late positions, a leg with drag, a sweep and a load map; NaN where they are NaN."""
+    """A motion, late positions, a leg with drag, a sweep and a load map are the same, and NaN at the same places."""
     assert np.array_equal(_run(NUMBA_DISABLE_JIT="1"), _run(), equal_nan=True)

@@ -1,4 +1,4 @@
-"""The commands: what they print and write, and how they end."""
+"""These tests check what the commands print and write, and how they end."""
 
 import io
 import json
@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
 
 
 class Commands:
-    """Runs commands in a folder, within this process."""
+    """A folder in which commands run, within this process."""
 
     def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.folder = folder
@@ -68,14 +68,14 @@ class Commands:
         return Outcome(code, said.out, said.err)
 
     def files(self) -> list[str]:
-        """List all files there are now, hidden ones included."""
+        """Return all files in the folder, hidden ones included."""
         found = (path for path in self.folder.rglob("*") if path.is_file())
         return sorted(path.relative_to(self.folder).as_posix() for path in found)
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Commands:
-    """A folder with two right curve files, to run commands in."""
+    """Return a folder with two right curve files in which commands run."""
     monkeypatch.chdir(tmp_path)
     Path("swing.yaml").write_text(PENDULUM)
     Path("bowl.yaml").write_text(PARABOLA)
@@ -86,7 +86,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 
 
 def test_closed_forms_and_the_file_are_named(here: Commands) -> None:
-    """The closed forms, the parameters with what is known of them, and the file written."""
+    """The output has the closed forms, the parameters with what is known of them, and the file written."""
     code, out, err = here.gen("swing.yaml")
     lines = [" ".join(line.split()) for line in out.splitlines()]
     assert (code, err) == (0, "")
@@ -100,13 +100,13 @@ def test_closed_forms_and_the_file_are_named(here: Commands) -> None:
 
 
 def test_a_parameter_without_a_value_is_shown_so(here: Commands) -> None:
-    """A null among the parameters is asked for at run time."""
+    """A null among the parameters is shown as a value that is required at run time."""
     lines = [" ".join(line.split()) for line in here.gen("bowl.yaml").out.splitlines()]
     assert "a to be given at run time" in lines
 
 
 def test_a_second_run_writes_nothing(here: Commands) -> None:
-    """A current file is left alone, its time of change included."""
+    """A current file is left as it is, including its time of change."""
     here.gen("swing.yaml")
     before = Path("generated/swing.py").stat().st_mtime_ns
     assert here.gen("swing.yaml").out.endswith(f"generated{os.sep}swing.py is current\n")
@@ -122,13 +122,15 @@ def test_stdout_is_what_would_be_written(here: Commands) -> None:
 
 
 def test_another_folder(here: Commands) -> None:
-    """-o names the folder, which is made if it is missing."""
+    """-o names the folder, which is created if it is missing."""
     assert here.gen("-q", "-o", "deep/er", "swing.yaml", "bowl.yaml") == (0, "", "")
     assert here.files() == ["bowl.yaml", "deep/er/bowl.py", "deep/er/swing.py", "swing.yaml"]
 
 
 def test_check_goes_through_all_states(here: Commands) -> None:
-    """Missing, written, changed at its source, generated again, edited by hand, forced."""
+    """--check is right for a file that is missing, written, changed at its source, generated again, edited, and
+    forced.
+    """
     module = Path("generated/swing.py")
     missing = here.gen("--check", "swing.yaml")
     assert missing.code == 1
@@ -173,7 +175,7 @@ def test_check_looks_at_every_file(here: Commands) -> None:
 
 
 def test_latex(here: Commands) -> None:
-    """--latex writes the closed forms, balanced, beside the module."""
+    """--latex writes the closed forms beside the module, with balanced braces."""
     told = here.gen("--latex", "out/swing.tex", "swing.yaml").out
     assert "wrote out/swing.tex\n" in told
     text = Path("out/swing.tex").read_text()
@@ -246,7 +248,7 @@ def test_bad_input_ends_with_2_and_writes_nothing(case: tuple[str, tuple[str, ..
 
 
 def test_mistakes_of_all_files_come_together(here: Commands) -> None:
-    """Several wrong files are all reported, missing ones too, and right ones are not written."""
+    """All mistakes of several files are reported, also missing files, and right files are not written."""
     Path("one.yaml").write_text(PENDULUM.replace("swing", "1"))
     Path("two.yaml").write_text(PENDULUM.replace("gravity", "levity"))
     code, _, err = here.gen("one.yaml", "missing.yaml", ".", "swing.yaml", "two.yaml")
@@ -256,7 +258,7 @@ def test_mistakes_of_all_files_come_together(here: Commands) -> None:
 
 
 def test_two_files_of_one_name(here: Commands) -> None:
-    """Two files that would be one module are refused, with both named."""
+    """Two files that would give the same module are refused, and both are named."""
     Path("copy.yaml").write_text(PENDULUM)
     code, _, err = here.gen("swing.yaml", "copy.yaml")
     assert code == 2
@@ -305,7 +307,7 @@ def test_a_folder_that_cannot_be(here: Commands) -> None:
 
 
 def test_an_interruption_ends_with_130(here: Commands, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C is no error of the input, and shows no traceback."""
+    """Ctrl-C is not an error of the input, and shows no traceback."""
 
     def interrupted(options: object) -> int:
         raise KeyboardInterrupt
@@ -314,7 +316,7 @@ def test_an_interruption_ends_with_130(here: Commands, monkeypatch: pytest.Monke
     assert here.gen("swing.yaml") == (130, "", "gqm-gen: interrupted\n")
 
 
-def test_a_mistake_of_ours_is_one_line_too(here: Commands, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unforeseen_error_is_one_line_too(here: Commands, monkeypatch: pytest.MonkeyPatch) -> None:
     """An unforeseen error ends with exit code 3 and says where to look."""
 
     def broken(options: object) -> int:
@@ -330,7 +332,7 @@ def test_a_mistake_of_ours_is_one_line_too(here: Commands, monkeypatch: pytest.M
 
 
 def test_gqm_solve_replaces_and_asks(here: Commands) -> None:
-    """Launch and parameters can be replaced, states asked for; nothing is written."""
+    """The options replace launch and parameters and request states; nothing is written."""
     code, out, err = here.gqm(*("solve", "bowl.yaml", "--set", "a=1/2", "--lam0=-1/4", "--v0", "0.5", "--at", "0"))
     assert (code, err) == (0, "")
     rows = [line.split() for line in out.splitlines()]
@@ -353,7 +355,7 @@ WRONG_SOLVES = {
 
 @pytest.mark.parametrize("case", WRONG_SOLVES.values(), ids=WRONG_SOLVES.keys())
 def test_gqm_solve_refuses(case: tuple[tuple[str, ...], str], here: Commands) -> None:
-    """A launch that cannot be ends with 2 and one line or two."""
+    """An impossible launch ends with 2 and one line or two."""
     arguments, beginning = case
     code, out, err = here.gqm("solve", *arguments)
     assert (code, out) == (2, "")
@@ -415,7 +417,7 @@ def test_a_reader_that_leaves_is_no_error() -> None:
 
 @pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_a_figure_in_each_format(here: Commands, ending: str, begins: bytes) -> None:
-    """The same from both commands, twice the same bytes."""
+    """Both commands write the same figure, and the same bytes when repeated."""
     assert here.gen("-q", "--plot", f"one.{ending}", "swing.yaml") == (0, "", "")
     assert Path(f"one.{ending}").read_bytes().startswith(begins)
     drawn = here.gqm("plot", "swing.yaml", f"two.{ending}", "--what", "speed_and_force", "--v0", "1")
@@ -427,7 +429,7 @@ def test_a_figure_in_each_format(here: Commands, ending: str, begins: bytes) -> 
 
 
 def test_a_figure_of_no_known_format(here: Commands) -> None:
-    """The message lists the endings there are; nothing is drawn."""
+    """The message lists the known endings, and nothing is drawn."""
     code, _, err = here.gqm("plot", "swing.yaml", "swing.gif")
     assert (code, err) == (
         2,
@@ -438,7 +440,7 @@ def test_a_figure_of_no_known_format(here: Commands) -> None:
 
 
 def test_what_a_figure_goes_with(here: Commands) -> None:
-    """It needs the module that is written, and a launch that the curve has; else no motion is drawn."""
+    """A figure of a motion needs the module that is written and a possible launch; otherwise no motion is drawn."""
     for option in ("--check", "--stdout"):
         code, _, err = here.gen("--plot", "one.png", option, "swing.yaml")
         assert (code, err.splitlines()[-1]) == (
@@ -456,8 +458,8 @@ def test_what_a_figure_goes_with(here: Commands) -> None:
 
 
 def test_what_ends_a_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """An expression too deep, or too large for memory, is a failure with one line."""
-    monkeypatch.setattr("sys.stdout", io.StringIO())  # which cannot be told how to write what it lacks
+    """An expression that is nested too deeply or too large for memory ends the command with one line."""
+    monkeypatch.setattr("sys.stdout", io.StringIO())  # the message cannot say how to write what is missing
     for error, what in ((RecursionError(), "nested too deeply"), (MemoryError(), "too large")):
 
         def work(error: BaseException = error) -> int:

@@ -14,17 +14,17 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-mp.dps = 80  # before the first number below is made
+mp.dps = 80  # This is set before the first number below is made.
 
 DIGITS = 40
-SQUARED = mpf(10) ** -130  # findroot compares the square of a residual with it
+SQUARED = mpf(10) ** -130  # findroot compares the square of a residual with this.
 G = mpf(981) / 100
 
 Row = dict[str, Any]
 
 
 def text(value: mpf) -> str:
-    """``value`` to the digits that are kept."""
+    """Return ``value`` as text, with the digits that are kept."""
     return mp.nstr(value, DIGITS, strip_zeros=False, min_fixed=-6, max_fixed=6)
 
 
@@ -43,7 +43,7 @@ def integral(f: Callable[[mpf], mpf], ends: list[mpf]) -> mpf:
 
 
 def graded(width: mpf, end: mpf) -> list[mpf]:
-    """Give ends of panels from 0 to ``end`` for a peak at 0 that is ``width`` wide."""
+    """Return ends of panels from 0 to ``end`` for a peak at 0 that is ``width`` wide."""
     knots = [mpf(0)]
     while width < end / 2:
         knots.append(width)
@@ -52,13 +52,13 @@ def graded(width: mpf, end: mpf) -> list[mpf]:
 
 
 def fold(t: str, lap: mpf) -> tuple[int, mpf]:
-    """Split a time into whole laps and what is left."""
+    """Split a time into whole laps and the remainder."""
     laps = int(mp.floor(mpf(t) / lap))
     return laps, mpf(t) - laps * lap
 
 
 def sample(lam: str, v2: mpf, kappa: mpf, normal_force: mpf) -> Row:
-    """Give one row of ``samples``."""
+    """Return one row of ``samples``."""
     return {
         "lam": lam,
         "v2": text(v2),
@@ -68,7 +68,7 @@ def sample(lam: str, v2: mpf, kappa: mpf, normal_force: mpf) -> Row:
 
 
 def position(t: str, lam: mpf, v: mpf) -> Row:
-    """Give one row of ``positions``: the parameter and the signed ds/dt."""
+    """Return one row of ``positions``: the parameter and the signed ds/dt."""
     return {"t": t, "lam": text(lam), "v": text(v)}
 
 
@@ -78,7 +78,7 @@ OMEGA = mp.sqrt(G)
 
 
 def swing(amplitude: mpf, t: mpf) -> tuple[mpf, mpf]:
-    """Angle from the vertical and its rate, after release from rest at ``amplitude``."""
+    """Return the angle from the vertical and its rate, after release from rest at ``amplitude``."""
     k, m = mp.sin(amplitude / 2), mp.sin(amplitude / 2) ** 2
     sn, cn, dn = (mp.ellipfun(name, OMEGA * t, m=m) for name in ("sn", "cn", "dn"))
     half = mp.asin(k * cn / dn)
@@ -86,19 +86,19 @@ def swing(amplitude: mpf, t: mpf) -> tuple[mpf, mpf]:
 
 
 def complete(gap: mpf) -> mpf:
-    """Complete elliptic integral of the first kind for k = sqrt(1 - gap**2), by quadrature."""
+    """Return the complete elliptic integral of the first kind for k = sqrt(1 - gap**2), by quadrature."""
     return integral(lambda u: 1 / mp.sqrt(mp.sin(u) ** 2 + gap**2 * mp.cos(u) ** 2), graded(gap, mp.pi / 2))
 
 
 def swing_half_period(amplitude: mpf) -> mpf:
-    """Half period: ``2*sqrt(L/g)*K(sin(A/2))``."""
+    """Return the half period, ``2*sqrt(L/g)*K(sin(A/2))``."""
     m = mp.sin(amplitude / 2) ** 2
     closed = 2 * mp.ellipk(m) / OMEGA
     return must_agree(closed, 2 / OMEGA * complete(mp.cos(amplitude / 2)))
 
 
 def pendulum_samples(lams: list[str], lowest: mpf, v0: mpf, angle0: mpf, read: Row) -> list[Row]:
-    """Speed and contact force of a unit mass; ``lowest`` is the parameter of the bottom."""
+    """Return speed and contact force of a unit mass; ``lowest`` is the parameter of the bottom."""
     rows = []
     for lam in lams:
         angle = read[lam] - lowest
@@ -108,7 +108,7 @@ def pendulum_samples(lams: list[str], lowest: mpf, v0: mpf, angle0: mpf, read: R
 
 
 def pendulum_from_rest(slug: str, track: str, lam0: str, amplitude: mpf, times: list[str]) -> Row:
-    """Release a pendulum from rest, seen from the vertical or from the horizontal."""
+    """Release a pendulum from rest, with its angle from the vertical or from the horizontal."""
     lowest = mpf(0) if track == "circle" else -mp.pi / 2
     tau = swing_half_period(amplitude)
     positions = []
@@ -155,7 +155,7 @@ def pendulum_from_bottom(slug: str, v0: str, speed: mpf, times: list[str]) -> Ro
             sn, cn, dn = (mp.ellipfun(name, u, m=1 / m) for name in ("sn", "cn", "dn"))
             half = mp.asin(sn / k)
             angle, rate = 2 * half, 2 * OMEGA / k * cn * dn / mp.cos(half)
-        # The energy is a second way to the speed.
+        # The energy gives the speed in a second way.
         must_agree(rate**2, speed**2 - 4 * G * mp.sin(angle / 2) ** 2)
         positions.append(position(t, angle, rate))
     expected: Row = {"kind": "asymptotic", "turning_points": []}
@@ -180,13 +180,13 @@ def pendulum_from_bottom(slug: str, v0: str, speed: mpf, times: list[str]) -> Ro
     }
 
 
-# --- graphs: one smooth integral after the turning points' roots are divided out ------------------
+# --- graphs: one smooth integral after the roots at turning points are divided out ------------------
 
 
 def graph_samples(
     at: dict[str, mpf], height: Callable[[mpf], mpf], energy: mpf, slopes: Callable[[mpf], Any]
 ) -> list[Row]:
-    """Speed, curvature and contact force of a unit mass on ``z = height(x)``."""
+    """Return speed, curvature and contact force of a unit mass on ``z = height(x)``."""
     rows = []
     for lam, x in at.items():
         first, second = slopes(x)
@@ -197,12 +197,12 @@ def graph_samples(
 
 
 def invert(time: Callable[[mpf], mpf], target: mpf, low: mpf, high: mpf) -> mpf:
-    """Find the angle at which a growing ``time`` meets ``target``."""
+    """Find the angle at which a growing ``time`` reaches ``target``."""
     return mp.findroot(lambda u: time(u) - target, (low, high), solver="anderson", tol=mpf(10) ** -130)
 
 
 def quartic_small(amplitude: mpf, lam0: str) -> Row:
-    """Small swings in z = x**4: with x = A*sin(u) the time integrand is smooth."""
+    """Return small swings in z = x**4, for which the time integrand is smooth with x = A*sin(u)."""
 
     def rate(u: mpf) -> mpf:
         x = amplitude * mp.sin(u)
@@ -224,7 +224,7 @@ def quartic_small(amplitude: mpf, lam0: str) -> Row:
 
 
 def double_well_slopes(x: mpf) -> tuple[mpf, mpf]:
-    """First and second derivative of x**4 - x**2."""
+    """Return the first and the second derivative of x**4 - x**2."""
     return 4 * x**3 - 2 * x, 12 * x**2 - 2
 
 
@@ -312,7 +312,7 @@ def double_well_across(slug: str, v0: str, speed: mpf, times: list[str]) -> Row:
 
 
 def double_well_separatrix(times: list[str]) -> Row:
-    """Release at x = 1, exactly as high as the barrier: x = 1/cosh(w) reaches 0 at infinity."""
+    """Release at x = 1, exactly as high as the barrier; x = 1/cosh(w) reaches 0 after infinite time."""
 
     def rate(w: mpf) -> mpf:
         slope = double_well_slopes(1 / mp.cosh(w))[0]
@@ -343,7 +343,7 @@ def double_well_separatrix(times: list[str]) -> Row:
 
 
 def parabola(slug: str, x0: str, amplitude: mpf, times: list[str]) -> Row:
-    """Release in z = 7/10*x**2: half period 2*E(-4*a**2*X**2)/sqrt(2*g*a)."""
+    """Release in z = 7/10*x**2, with the half period 2*E(-4*a**2*X**2)/sqrt(2*g*a)."""
     a = mpf(7) / 10
     m, rate = -4 * a**2 * amplitude**2, mp.sqrt(2 * G * a)
     tau = must_agree(
@@ -376,7 +376,7 @@ def parabola(slug: str, x0: str, amplitude: mpf, times: list[str]) -> Row:
 
 
 def tautochrone(slug: str, lam0: str, start: mpf, times: list[str]) -> Row:
-    """Release in the inverted cycloid of radius 1/2: cos(lam/2) is a cosine of time."""
+    """Release in the inverted cycloid of radius 1/2, where cos(lam/2) is a cosine of time."""
     radius = mpf(1) / 2
     omega = mp.sqrt(G / (4 * radius))
     reach = mp.cos(start / 2)
@@ -407,7 +407,7 @@ def tautochrone(slug: str, lam0: str, start: mpf, times: list[str]) -> Row:
 
 
 def cubic(times: list[str]) -> Row:
-    """Launch up z = x**3 from x = -1 at 6.2088: one turning point, then off to minus infinity."""
+    """Launch up z = x**3 from x = -1 at 6.2088; the body turns once, and then moves to minus infinity."""
     speed = mpf(62088) / 10000
     top = mp.cbrt(speed**2 / (2 * G) - 1)
 
@@ -448,7 +448,7 @@ def cubic(times: list[str]) -> Row:
 
 
 def direct_time(x: mpf) -> mpf:
-    """Time from -1 to x on the cubic, without any substitution (x is far from the turn)."""
+    """Return the time from -1 to x on the cubic, without any substitution (x is far from the turn)."""
     speed = mpf(62088) / 10000
     return mp.quad(
         lambda u: mp.sqrt((1 + 9 * u**4) / (speed**2 - 2 * G * (u**3 + 1))),
@@ -457,7 +457,7 @@ def direct_time(x: mpf) -> mpf:
 
 
 def at_rest(slug: str, track: str, lam0: str, lam: mpf, parameters: dict[str, str]) -> Row:
-    """Leave the body at an equilibrium: it stays."""
+    """Put a body at an equilibrium, where it stays."""
     return {
         "slug": slug,
         "track": track,
@@ -473,7 +473,7 @@ def at_rest(slug: str, track: str, lam0: str, lam: mpf, parameters: dict[str, st
 
 
 def cases() -> list[Row]:
-    """Every case of the file, in its order."""
+    """Return every case of the file, in its order."""
     tiny, milli, micro = mpf(10) ** -6, mpf(10) ** -3, mpf(10) ** -6
     # The float nearest to pi/2 lies this far below the hilltop (an exact binary number).
     float_top = mp.pi / 2 - mpf(3.141592653589793 / 2)

@@ -1,9 +1,9 @@
-"""Make ``degenerate.json``: motions at the edges of what doubles can tell, with truths to 40 digits.
+"""Make ``degenerate.json``, which has motions that are hard for doubles, with true values to 40 digits.
 
 Run as ``python tests/data/make_degenerate.py`` (a minute). Pendulums, cycloids and Kepler's ellipse have closed forms
-in mpmath's elliptic functions; of the others the zeros of V**2 are divided out by hand, so that one smooth integral
-without any difference is left, taken over panels graded towards its peak. 80 digits throughout, from exact inputs.
-Nothing here imports ``gqm_sym``.
+in mpmath's elliptic functions; in the other cases the zeros of V**2 are divided out by hand, which leaves one smooth
+integral without any difference, taken over panels graded towards its peak. All is computed with 80 digits from exact
+inputs. Nothing here imports ``gqm_sym``.
 """
 
 import json
@@ -16,23 +16,23 @@ from pathlib import Path
 from make_closed_forms import G, Row, graded, integral, must_agree, text
 from mpmath import mp, mpf
 
-# Where on an orbit it is looked at, in half periods (or laps) from launch: early and late, and where it may be fast.
+# Orbits are sampled at these times, in half periods (or laps) from launch: early, late, and at fast places.
 SHARES = (
     *("0.0003", "0.07", "0.31", "0.499", "0.50002", "0.52", "0.96", "0.99999", "1.00001", "1.43", "1.9"),
     *("7.77", "123.456", "1000.50003", "12345.67", "1000000.00001", "9876543.21", "1234567890.123"),
 )
-TIME_DIGITS = 12  # of a time of the table; it is exactly what it says
+TIME_DIGITS = 12  # the relative precision of a time of the table; the text means exactly what it says
 
 Function = Callable[[mpf], mpf]
 
 
 def times(tau: mpf, shares: Sequence[str] = SHARES) -> list[str]:
-    """Times as text, at shares of the half period."""
+    """Return times as text, at shares of the half period."""
     return [mp.nstr(mpf(share) * tau, TIME_DIGITS, min_fixed=-30, max_fixed=30) for share in shares]
 
 
 def row(slug: str, track: str, hard: str, parameters: dict[str, str], launch: Row, expected: Row) -> Row:
-    """Give one case."""
+    """Return one case."""
     return {
         "slug": slug,
         "track": track,
@@ -44,7 +44,7 @@ def row(slug: str, track: str, hard: str, parameters: dict[str, str], launch: Ro
 
 
 def position(t: str, lam: mpf, v: mpf) -> Row:
-    """Give one row of ``positions``: the parameter and the signed ds/dt."""
+    """Return one row of ``positions``: the parameter and the signed ds/dt."""
     return {"t": t, "lam": text(lam), "v": text(v)}
 
 
@@ -56,17 +56,17 @@ class Clock:
     knots: list[mpf]
 
     def marks(self) -> list[mpf]:
-        """Time at every knot."""
+        """Return the time at every knot."""
         parts = (integral(self.rate, [a, b]) for a, b in zip(self.knots, self.knots[1:], strict=False))
         return list(accumulate(parts, initial=mpf(0)))
 
     def at(self, u: mpf, marks: list[mpf]) -> mpf:
-        """Time at u."""
+        """Return the time at u."""
         k = min(max(bisect_right(self.knots, u) - 1, 0), len(self.knots) - 2)
         return marks[k] + mp.quad(self.rate, [self.knots[k], u])
 
     def when(self, t: mpf, marks: list[mpf]) -> mpf:
-        """The u at a time, by Newton's method inside the panel."""
+        """Return u at a time, by Newton's method inside the panel."""
         k = min(max(bisect_right(marks, t) - 1, 0), len(marks) - 2)
         low, high = self.knots[k], self.knots[k + 1]
         u, spent = low, marks[k]
@@ -83,7 +83,7 @@ class Clock:
 
 
 def both_sides(width: mpf, end: mpf) -> list[mpf]:
-    """Ends of panels from -end to end for a peak at 0."""
+    """Return ends of panels from -end to end for a peak at 0."""
     right = graded(width, end)
     return [*(-u for u in reversed(right[1:])), *right]
 
@@ -101,7 +101,7 @@ def swing(
     start: mpf,
     heading: int = 1,
 ) -> Row:
-    """A libration: u runs from one turning point to the other and back, from ``start`` at launch."""
+    """Return a libration, in which u runs from one turning point to the other and back, from ``start`` at launch."""
     marks = clock.marks()
     tau = marks[-1]
     begun = tau if start == clock.knots[-1] else clock.at(start, marks)
@@ -128,7 +128,7 @@ def swing(
 
 
 def pendulum(hard: str, track: str, lam0: str, amplitude: mpf, length: str = "1", g: str = "9.81") -> Row:
-    """Release a pendulum, its angle counted from the vertical ("circle") or from the horizontal ("pendulum")."""
+    """Release a pendulum, with its angle from the vertical ("circle") or from the horizontal ("pendulum")."""
     lowest = mpf(0) if track == "circle" else -mp.pi / 2
     omega = mp.sqrt(mpf(g) / mpf(length))
     k, m = mp.sin(amplitude / 2), mp.sin(amplitude / 2) ** 2
@@ -160,7 +160,7 @@ def thrown_pendulum(slug: str, hard: str, v0: str, speed: mpf) -> Row:
     omega, m = mp.sqrt(G), 4 * G / speed**2
     launch = {"lam0": "0", "v0": v0}
     positions = []
-    if m > 1:  # it comes back
+    if m > 1:  # the body comes back
         tau = 2 * mp.ellipk(1 / m) / omega
         for t in times(tau):
             rest = mpf(t) - 2 * tau * mp.floor(mpf(t) / (2 * tau))
@@ -185,12 +185,12 @@ def thrown_pendulum(slug: str, hard: str, v0: str, speed: mpf) -> Row:
 
 
 def steepness(p: mpf, q: mpf) -> Function:
-    """ds/dx on the double well."""
+    """Return ds/dx on the double well."""
     return lambda x: mp.sqrt(1 + (4 * p * x**3 - 2 * q * x) ** 2)
 
 
 def in_one_well(slug: str, hard: str, p: str, q: str, launch: Row, a2: mpf, start: mpf) -> Row:
-    """Swing in the right-hand well: x**2 = a**2*cos(u)**2 + b**2*sin(u)**2; ``start`` is sin(u)**2 at launch."""
+    """Swing in the right-hand well, x**2 = a**2*cos(u)**2 + b**2*sin(u)**2; ``start`` is sin(u)**2 at launch."""
     cp, cq = mpf(p), mpf(q)
     b2, root, ds = cq / cp - a2, mp.sqrt(2 * G * cp), steepness(cp, cq)
 
@@ -214,7 +214,7 @@ def in_one_well(slug: str, hard: str, p: str, q: str, launch: Row, a2: mpf, star
 
 
 def over_both_wells(slug: str, hard: str, p: str, q: str, launch: Row, b2: mpf, start: mpf) -> Row:
-    """Swing across the barrier: x = b*sin(u)."""
+    """Swing across the barrier, with x = b*sin(u)."""
     cp, cq = mpf(p), mpf(q)
     c2, root, ds = b2 - cq / cp, mp.sqrt(2 * G * cp), steepness(cp, cq)
     b = mp.sqrt(b2)
@@ -240,7 +240,7 @@ def over_both_wells(slug: str, hard: str, p: str, q: str, launch: Row, b2: mpf, 
 
 
 def bottom(slug: str, hard: str, track: str, parameters: dict[str, str], c: mpf, n: int, lam0: str) -> Row:
-    """Release on z = c*x**n, n even: x = A*sin(u)."""
+    """Release on z = c*x**n, n even, with x = A*sin(u)."""
     amplitude = mpf(lam0)
 
     def left(s: mpf) -> mpf:  # (1 - s**n)/(1 - s**2)
@@ -273,7 +273,7 @@ def bottom(slug: str, hard: str, track: str, parameters: dict[str, str], c: mpf,
 
 
 def cycloid(slug: str, hard: str, radius: str, lam0: str, start: mpf, shares: Sequence[str]) -> Row:
-    """Release on the inverted cycloid: cos(lam/2) is a cosine of time."""
+    """Release on the inverted cycloid, where cos(lam/2) is a cosine of time."""
     r = mpf(radius)
     omega, reach = mp.sqrt(G / (4 * r)), mp.cos(start / 2)
     tau = mp.pi / omega
@@ -291,7 +291,7 @@ def cycloid(slug: str, hard: str, radius: str, lam0: str, start: mpf, shares: Se
 
 
 def kepler(slug: str, hard: str, eccentricity: str, lam0: str, start: mpf) -> Row:
-    """Round its own ellipse of major semi-axis 1 about an attraction of strength 1: Kepler's equation."""
+    """Move along its own ellipse of semi-major axis 1 about an attraction of strength 1, by Kepler's equation."""
     e = mpf(eccentricity)
 
     def speed(lam: mpf) -> mpf:
@@ -337,7 +337,7 @@ def passage(
     start: mpf,
     heading: int,
 ) -> Row:
-    """Once through: u from ``start`` grows with time (heading 1), or falls to 0, the turn, first."""
+    """Pass once: u grows with time from ``start`` (heading 1), or first falls to 0, the turn."""
     marks = clock.marks()
     begun = clock.at(start, marks)
     last = marks[-1] + (-begun if heading > 0 else begun)
@@ -352,7 +352,7 @@ def passage(
 
 
 def off_a_hilltop(slug: str, hard: str, lam0: str, offset: mpf) -> Row:
-    """Release on z = -(x - 1)**2 beside its top: x - 1 = offset*cosh(u)."""
+    """Release on z = -(x - 1)**2 beside its top, with x - 1 = offset*cosh(u)."""
     end = mp.acosh(3 / abs(offset))
     root = mp.sqrt(2 * G)
     return passage(
@@ -371,7 +371,9 @@ def off_a_hilltop(slug: str, hard: str, lam0: str, offset: mpf) -> Row:
 
 
 def past_a_hilltop(slug: str, hard: str, lam0: str, offset: mpf, v0: str, least: mpf) -> Row:
-    """Run over z = -(x - 1)**2 to the right, V**2 = ``least`` on top: x - 1 = c*sinh(u), ``offset`` at launch."""
+    """Run over z = -(x - 1)**2 to the right, with V**2 = ``least`` on top and x - 1 = c*sinh(u), ``offset`` at
+    launch.
+    """
     c = mp.sqrt(least / (2 * G))
     root = mp.sqrt(2 * G)
     start = mp.asinh(offset / c)
@@ -393,7 +395,7 @@ def past_a_hilltop(slug: str, hard: str, lam0: str, offset: mpf, v0: str, least:
 
 
 def back_over_a_barrier(slug: str, hard: str, v0: str, energy: mpf) -> Row:
-    """Launch up z = x**3 - 3*x from x = 1: turns beyond 2, comes back and clears the barrier at -1."""
+    """Launch up z = x**3 - 3*x from x = 1; the body turns beyond 2, comes back and passes the barrier at -1."""
     # With b the turn, V**2 = 2*g*(b - x)*((x + b/2)**2 + h**2), and x = b - u**2.
     b = 2 * mp.cosh(mp.acosh(energy / 2) / 3)
     h2 = 3 * (b**2 - 4) / 4
@@ -424,7 +426,7 @@ def back_over_a_barrier(slug: str, hard: str, v0: str, energy: mpf) -> Row:
 
 
 def pendulums() -> list[Row]:
-    """Amplitudes from 5e-11 to pi - 1e-12, from the vertical and from the horizontal; sizes and gravities."""
+    """Return pendulums of amplitudes from 5e-11 to pi - 1e-12, from both axes, of various sizes and gravities."""
     rows = []
     for share in ("5e-11", "1e-8", "1e-5", "1e-2", "1"):
         hard = f"amplitude {share}"
@@ -442,7 +444,7 @@ def pendulums() -> list[Row]:
 
 
 def wells() -> list[Row]:
-    """Barriers missed or cleared by little, shallow wells, turning points that nearly meet."""
+    """Return motions that barely miss or pass a barrier, shallow wells, and turning points that nearly coincide."""
     rel = mpf(10) ** -14
     root = mp.sqrt(mpf(1) / 2)
     tiny = mpf(5) * mpf(10) ** -11
@@ -480,7 +482,7 @@ def wells() -> list[Row]:
 
 
 def bottoms() -> list[Row]:
-    """Flat ones and steep ones."""
+    """Return flat bottoms and steep ones."""
     return [
         bottom("quartic_1e_8", "flat, tiny", "quartic", {}, mpf(1), 4, "1e-8"),
         bottom("quartic_1e_3", "flat", "quartic", {}, mpf(1), 4, "1e-3"),
@@ -493,7 +495,7 @@ def bottoms() -> list[Row]:
 
 
 def others() -> list[Row]:
-    """Cycloids, Kepler's ellipse, and motions that do not repeat."""
+    """Return cycloids, Kepler's ellipse, and motions that do not repeat."""
     return [
         cycloid("cycloid_late", "1e12 periods", "0.5", "1", mpf(1), (*SHARES, "1234567890123.4", "2000000000000.7")),
         cycloid("cycloid_small", "scaled by 1e-6", "5e-7", "0.3", mpf("0.3"), SHARES),

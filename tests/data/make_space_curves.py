@@ -1,9 +1,9 @@
-"""Make ``space_curves.json``: motions on twelve space curves, with truths to 40 digits.
+"""Make ``space_curves.json``, which has motions on twelve space curves, with true values to 40 digits.
 
 Run as ``python tests/data/make_space_curves.py`` (a minute). Times are integrals of ds/dlam over V, by the midpoint
-rule in an angle in which the integrand is smooth and repeats, and by Gauss-Legendre quadrature beside it; the contact
-force is m*(acceleration) less the applied force, by coordinates. 120 digits throughout, from exact inputs. Nothing here
-imports ``gqm_sym``.
+rule in an angle in which the integrand is smooth and periodic, and by Gauss-Legendre quadrature as a check; the contact
+force is m*(acceleration) less the applied force, by coordinates. All is computed with 120 digits from exact inputs.
+Nothing here imports ``gqm_sym``.
 """
 
 import json
@@ -18,7 +18,8 @@ mp.dps = 120
 G, DIGITS = sp.Rational(981, 100), 40
 Row = dict[str, Any]
 
-# Name; x, y, z; potential per unit mass; launch place and speed. The two of LAPS are passed all round, in laps of 2*pi.
+# A row has the name; x, y, z; the potential per unit mass; the place and speed of launch. The two of LAPS are closed,
+# with laps of 2*pi.
 CURVES: tuple[tuple[str, tuple[str, str, str], str, tuple[str, str]], ...] = (
     ("viviani", ("1 + cos(u)", "sin(u)", "2*sin(u/2)"), "g*z", ("3/10", "0")),
     ("trefoil", ("(2 + 3*cos(3*u)/4)*cos(2*u)", "(2 + 3*cos(3*u)/4)*sin(2*u)", "3*sin(3*u)/4"), "g*z", ("1/5", "1/2")),
@@ -37,12 +38,12 @@ LAPS = ("torus_knot", "saddle_lap")
 
 
 def text(value: mpf) -> str:
-    """Forty digits."""
+    """Return a number with forty digits."""
     return str(mp.nstr(value, DIGITS, min_fixed=-5, max_fixed=8))
 
 
 def midpoints(function: Callable[[mpf], mpf], width: mpf) -> mpf:
-    """The mean of a periodic function times ``width``, by ever more midpoints."""
+    """Return the mean of a periodic function times ``width``, by midpoint rules with more and more nodes."""
     n, before = 64, mpf(0)
     while True:
         found = width * mp.fsum(function(width * (2 * k + 1) / (2 * n)) for k in range(n)) / n
@@ -52,12 +53,14 @@ def midpoints(function: Callable[[mpf], mpf], width: mpf) -> mpf:
 
 
 def panels(function: Callable[[mpf], mpf], width: mpf) -> mpf:
-    """The same integral over panels."""
+    """Return the same integral by panels."""
     return mp.quad(function, mp.linspace(0, width, 65), method="gauss-legendre")
 
 
 def first_zero(function: Callable[[mpf], mpf], start: mpf, direction: int) -> mpf:
-    """The first zero of a function that is positive next to a start; the start itself where it is negative there."""
+    """Return the first zero of a function that is positive next to a start, or the start itself if it is negative
+    there.
+    """
     step = mpf(direction) / 100
     if function(start + step / 10**6) < 0:
         return start
@@ -67,7 +70,7 @@ def first_zero(function: Callable[[mpf], mpf], start: mpf, direction: int) -> mp
 
 
 def row(name: str, curve: tuple[str, str, str], potential: str, launch: tuple[str, str]) -> Row:
-    """Give one case."""
+    """Return one case."""
     u, x, y, z = sp.symbols("u x y z", real=True)
     names = {"u": u, "x": x, "y": y, "z": z, "g": G}
     place = [sp.sympify(form, names) for form in curve]

@@ -1,4 +1,4 @@
-"""Closed curves: their periods found, and those that are none refused."""
+"""The periods of closed curves are found, and periods that are wrong are refused."""
 
 import math
 from fractions import Fraction
@@ -16,7 +16,7 @@ from gqm_sym.specfile import read_spec
 
 
 def drawn(x, z, **options):
-    """A parametric curve."""
+    """Return a parametric curve."""
     return gqm.Curve.parametric(x=x, z=z, parameter="u", **options)
 
 
@@ -53,21 +53,21 @@ OPEN = {
 
 @pytest.mark.parametrize("name", FOUND)
 def test_the_least_period_is_found(name):
-    """After which every coordinate is what it was, and not sooner."""
+    """The period found is the smallest after which every coordinate is the same."""
     curve, period = FOUND[name]
     assert sp.simplify(curve.period - sp.sympify(period, {"w": sp.Symbol("w", real=True)})) == 0
 
 
 @pytest.mark.parametrize("name", OPEN)
 def test_what_does_not_close_for_certain_stays_open(name):
-    """A curve that may have a pole, or be complex somewhere, stays open too."""
+    """A curve stays open if it does not certainly close, also if it may have a pole or be complex somewhere."""
     assert OPEN[name].period is None
 
 
 @settings(deadline=None, max_examples=40)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 6, max_denominator=6), min_size=1, max_size=3), polar=st.booleans())
 def test_random_waves_close_after_their_least_common_period(rates, polar):
-    """Against the least common multiple of the periods, which for a sum of lone waves is the least."""
+    """The period is the least common multiple of the periods, which for a sum of single waves is the smallest."""
     waves = " + ".join(f"{k + 2}*cos({rate}*u)" for k, rate in enumerate(rates))
     rates = [*rates, Fraction(1)]
     curve = gqm.Curve.polar(f"20 + {waves}", parameter="u") if polar else drawn(waves, "sin(u)")
@@ -94,12 +94,14 @@ def test_a_period_that_is_none_is_refused(declare, message):
 
 @pytest.mark.parametrize("period", ["2*pi", "4*pi", "6*pi"])
 def test_a_period_is_one_however_often_it_goes_round(period):
-    """A period may be declared that counts two rounds as one."""
+    """A declared period may count two rounds as one."""
     assert drawn("cos(u)", "sin(u)", period=period).period == sp.sympify(period)
 
 
 def test_what_run_time_values_decide_is_not_refused():
-    """A wheel of radius r inside one of radius R closes after one turn for whole R/r only."""
+    """A period that depends on run-time values is accepted: a wheel of radius r inside one of radius R closes after one
+    turn for whole R/r only.
+    """
     wheel = {"x": "(R - r)*cos(u) + r*cos((R - r)*u/r)", "z": "(R - r)*sin(u) - r*sin((R - r)*u/r)"}
     curve = drawn(**wheel, period="2*pi")
     gqm.derive(curve, gqm.Gravity())
@@ -108,8 +110,8 @@ def test_what_run_time_values_decide_is_not_refused():
         gqm.derive(curve, gqm.Gravity(), parameters={"R": 5, "r": 2})
 
 
-def test_a_file_is_told_too(tmp_path):
-    """The message for a file gives line and column."""
+def test_a_message_about_a_file_has_its_place(tmp_path):
+    """The message for a mistake in a file gives line and column."""
     path = tmp_path / "ring.yaml"
     path.write_text(
         "name: ring\ncurve: {parametric: {x: cos(u), z: sin(u), parameter: u, period: 3}}\nkernel: {gravity: {}}\n"
@@ -119,7 +121,7 @@ def test_a_file_is_told_too(tmp_path):
 
 
 def test_rounds_of_a_ring_are_a_circulation(tmp_path):
-    """Its loop time is that of the ring which is told its period; it was a transit for ever."""
+    """The loop time is that of a ring with a declared period (the motion was a transit)."""
     silent, told = (
         gqm.build(gqm.derive(drawn("2*sin(u)", "-2*cos(u)", **given), gqm.Gravity()), name=f"ring_{n}", folder=tmp_path)
         for n, given in enumerate(({}, {"period": "2*pi"}))
@@ -133,7 +135,9 @@ def test_rounds_of_a_ring_are_a_circulation(tmp_path):
 @settings(deadline=None, max_examples=25)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 5, max_denominator=6), min_size=2, max_size=3))
 def test_random_waves_are_derived_as_they_are(rates):
-    """Their line element against mpmath: the common measure of 1, 3 and 7/6 is 1/6, and was taken for 1."""
+    """The line element of random waves agrees with mpmath (the common measure of 1, 3 and 7/6 is 1/6, and was taken for
+    1).
+    """
     curve = drawn(" + ".join(f"cos({rate}*u)/{k + 1}" for k, rate in enumerate(rates)), "3*sin(u)")
     ds = sp.lambdify(curve.parameter, gqm.derive(curve, gqm.Gravity()).ds, "mpmath")
     x, z = (sp.lambdify(curve.parameter, form, "mpmath") for form in (curve.x, curve.z))

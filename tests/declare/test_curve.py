@@ -1,4 +1,4 @@
-"""Curves: what is read, what is kept, and what is refused."""
+"""Curves read, keep and refuse what they should."""
 
 import pytest
 import sympy as sp
@@ -28,7 +28,7 @@ def test_polar_keeps_its_radius():
 
 
 def test_expressions_of_sympy_are_taken_like_text():
-    """Complex symbols of the user's own become the real ones."""
+    """Complex symbols of the user's become real ones."""
     t, radius = sp.symbols("t R")
     assert Curve.parametric(x=radius * sp.cos(t), z=radius * sp.sin(t), parameter="t") == (
         Curve.parametric(x="R*cos(t)", z="R*sin(t)", parameter="t")
@@ -36,14 +36,14 @@ def test_expressions_of_sympy_are_taken_like_text():
 
 
 def test_parameters_keep_the_order_of_their_declaration():
-    """The mapping's order first, then what it leaves out by appearance."""
+    """The order of the mapping comes first, and then the other parameters in order of appearance."""
     curve = Curve.graph("a*x**2 + b*x + c", parameters={"c": 1, "a": "1/3"})
     assert curve.defaults == (("c", 1), ("a", "1/3"), ("b", None))
     assert curve.parameters == ("c", "a", "b")
 
 
 def test_domain_and_period_may_contain_parameters():
-    """Ends are expressions in run-time parameters; either may be open."""
+    """Ends of a domain are expressions in run-time parameters, and either end may be open."""
     curve = Curve.parametric(x="L*cos(u)", z="L*sin(u)", parameter="u", period="2*pi", domain=(None, "w"))
     assert curve.domain == (None, sp.Symbol("w", real=True))
     assert curve.period == 2 * sp.pi
@@ -51,12 +51,12 @@ def test_domain_and_period_may_contain_parameters():
 
 
 def test_gravity_in_a_curve_has_its_usual_default():
-    """Everywhere m and g mean mass and gravity."""
+    """In every curve m and g mean mass and gravity."""
     assert Curve.graph("x**2/g").defaults == (("g", "9.81"),)
 
 
 def test_lam_is_a_name_for_a_curves_parameter_only():
-    """Emitted functions call their argument lam, which is the curve's parameter."""
+    """Only a curve's parameter may be called lam, because emitted functions call their argument so."""
     assert Curve.graph("lam**2", parameter="lam").parameter.name == "lam"
     with pytest.raises(InputError, match="lam"):
         Curve.graph("lam*x**2", parameter="x")
@@ -118,14 +118,14 @@ def test_a_family_takes_names_and_values():
 
 
 def test_the_circle_is_measured_from_the_downward_vertical():
-    """Table 3, row 2."""
+    """The circle is that of Table 3, row 2, with its angle from the downward vertical."""
     curve = families.circle()
     assert (curve.x, curve.z) == (L * sp.sin(theta), -L * sp.cos(theta))
     assert curve.period == 2 * sp.pi
 
 
 def test_the_inverted_cycloid_hangs():
-    """inverted=True turns the printed arch over: the tautochrone."""
+    """inverted=True turns the printed arch upside down, which gives the tautochrone."""
     arch, hanging = families.cycloid(), families.cycloid(inverted=True)
     assert arch.z == R * (1 - sp.cos(theta))
     assert hanging.z == -arch.z
@@ -134,7 +134,7 @@ def test_the_inverted_cycloid_hangs():
 
 
 def test_cartesian_graph_is_graph():
-    """The paper's name for it."""
+    """``cartesian_graph`` is the paper's name for ``graph``."""
     assert families.cartesian_graph("a*x**4") == Curve.graph("a*x**4")
 
 
@@ -147,13 +147,13 @@ def test_cartesian_graph_is_graph():
     ],
 )
 def test_a_wrong_family_call_is_refused(declare, word):
-    """Unknown arguments and names that mean two things."""
+    """Unknown arguments and names with two meanings are refused."""
     with pytest.raises(DeclarationError, match=word):
         declare()
 
 
 def test_an_unknown_family_is_no_attribute():
-    """The message lists those there are."""
+    """The message for an unknown family lists the families."""
     with pytest.raises(AttributeError, match="cycloid"):
         families.spirograph  # noqa: B018
 

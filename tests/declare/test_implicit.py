@@ -1,4 +1,4 @@
-"""Implicit curves through the whole chain: the corpus, the paper's family, singular points, bad input, YAML."""
+"""Implicit curves work in all stages: the corpus, the paper's family, singular points, bad input and YAML."""
 
 import json
 from collections.abc import Callable
@@ -19,12 +19,13 @@ from gqm_sym.cli.gen import main
 from gqm_sym.declare.implicit import X, Z
 from gqm_sym.errors import DeclarationError, GQMError, LaunchError
 
-# Of the scale of each (MATHS, section 7): turning points and times; what pass1 fills; a position, however late.
+# The tolerances relative to the scale of each (MATHS, section 7): turning points and times; what pass1 fills; a
+# position, however late.
 TURNING = 1e-15
 TIME = 1e-14
 SAMPLE = 1e-13
 POSITION = 8e-15
-# Of a period, in its last place; and how many times what is needed error_bound may say.
+# The tolerance of a period in its last places, and the largest ratio of error_bound to what is necessary.
 PERIOD_ULPS = 0.5
 USEFUL = 100
 
@@ -33,30 +34,30 @@ Expected = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FamousMotion:
-    """A motion of the corpus on an implicit curve, its numbers text."""
+    """A motion of the corpus on an implicit curve, with its numbers as text."""
 
     entry: Expected
     count: int
 
     @property
     def slug(self) -> str:
-        """Its curve's name as an identifier."""
+        """Return the curve's name as an identifier."""
         return "implicit_" + "".join(c if c.isalnum() else "_" for c in self.entry["name"].lower())
 
     @property
     def motion(self) -> Expected:
-        """Launch and what it comes to."""
+        """Return the launch and the expected results."""
         return (self.entry, *self.entry.get("also", ()))[self.count]
 
     @property
     def start(self) -> Expected:
-        """Arguments of ``module.solve`` besides the place."""
+        """Return arguments of ``module.solve`` besides the place."""
         launch = {key: self.motion["launch"][key] for key in ("v0", "direction")}
         return launch | {key: self.entry[key] for key in ("m", "g")}
 
     @property
     def along(self) -> float:
-        """The scale of places on it."""
+        """Return the scale of places on the curve."""
         expect = self.motion["expect"]
         if expect["kind"] == "circulation":
             return float(self.entry["period"])
@@ -64,14 +65,14 @@ class FamousMotion:
         return max(abs(low), abs(high), high - low)
 
     def derive(self) -> gqm.Model:
-        """Declare the curve as the corpus gives it; a closed one without its domain."""
+        """Declare the curve as the corpus gives it, but a closed one without its domain."""
         entry = self.entry
         ends = {} if entry["period"] else {"domain": entry["domain"]}
         curve = gqm.Curve.implicit(entry["F"], start=entry["start"], tangent=entry["tangent"], **ends)
         return gqm.derive(curve, gqm.Gravity(), parameters=entry["params"])
 
     def yaml(self) -> str:
-        """Spell it as a curve file, launched by its point."""
+        """Write the curve as a curve file, with a launch by its point."""
         entry, launch = self.entry, self.motion["launch"]
         lines = [f"name: {self.slug}", "curve:", "  implicit:", f"    F: {entry['F']}"]
         lines += [f"    start: [{', '.join(entry['start'])}]", f"    tangent: {entry['tangent']}"]
@@ -100,7 +101,7 @@ BOTH_LAUNCHES = pytest.mark.parametrize("by", ["lam0", "point"])
 
 @pytest.fixture(scope="module")
 def famous_module(generated_folder: Path) -> ModuleOf:
-    """Give the generated module of a famous curve."""
+    """Return the generated module of a famous curve."""
     built: dict[str, ModuleType] = {}
 
     def module(famous: FamousMotion) -> ModuleType:
@@ -112,7 +113,7 @@ def famous_module(generated_folder: Path) -> ModuleOf:
 
 
 def test_all_implicit_curves_are_here() -> None:
-    """Six curves, eight motions."""
+    """The corpus has six implicit curves and eight motions on them."""
     assert len({famous.slug for famous in MOTIONS}) == 6
     assert len(MOTIONS) == 8
 
@@ -120,7 +121,7 @@ def test_all_implicit_curves_are_here() -> None:
 @EVERY_MOTION
 @BOTH_LAUNCHES
 def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
-    """Kind, turning points, half period or loop time, and positions, launched either way."""
+    """Kind, turning points, half period or loop time, and positions are right in both launch directions."""
     expect, launch = famous.motion["expect"], famous.motion["launch"]
     motion = famous_module(famous).solve(**{by: launch[by]}, **famous.start)
     assert motion.kind == expect["kind"]
@@ -148,7 +149,9 @@ def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
 
 @EVERY_MOTION
 def test_the_error_bound(famous: FamousMotion, famous_module: ModuleOf) -> None:
-    """It holds at every time, early and late, and says at most a hundred times what is lost. Worst measured: 79."""
+    """The bound holds at every time, early and late, and is at most a hundred times the error. The worst ratio measured
+    is 79.
+    """
     motion = famous_module(famous).solve(lam0=0, **famous.start)
     rows = [(row["t"], row["lam"]) for row in famous.motion["expect"]["positions"]]
     for t, place in rows:
@@ -158,7 +161,7 @@ def test_the_error_bound(famous: FamousMotion, famous_module: ModuleOf) -> None:
 
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
-    """x, z, ds, kappa, V**2 and N at the sampled places, of the largest among the samples."""
+    """x, z, ds, kappa, V**2 and N are right at the sampled places, relative to the largest among the samples."""
     samples = famous.motion["expect"]["samples"]
     field = famous_module(famous).pass1([row["lam"] for row in samples], lam0=0, **famous.start)
     for name in field._fields:
@@ -171,7 +174,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
 def test_a_curve_file_gives_the_same_module(
     famous: FamousMotion, famous_module: ModuleOf, generated_folder: Path, tmp_path: Path
 ) -> None:
-    """Byte by byte, whether declared in Python or in YAML."""
+    """The module is the same byte by byte, whether declared in Python or in YAML."""
     famous_module(famous)
     path = tmp_path / "curve.yaml"
     path.write_text(famous.yaml(), encoding="utf-8")
@@ -181,7 +184,7 @@ def test_a_curve_file_gives_the_same_module(
 
 
 def test_the_command_solves_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The file alone: the half period is in the table that is printed."""
+    """The command solves the file, and prints the right half period in its table."""
     famous = MOTIONS[-1]
     path = tmp_path / "curve.yaml"
     path.write_text(famous.yaml(), encoding="utf-8")
@@ -193,7 +196,7 @@ def test_the_command_solves_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_derivatives_and_orientation() -> None:
-    """Gradient, Hessian, tangent and curvature are those of F, with the sign of the tangent that was asked for."""
+    """Gradient, Hessian, tangent and curvature are those of F, with the requested sign of the tangent."""
     F = sp.sympify("sin(x*z) + x**3*z**2 - exp(z)", locals={"x": X, "z": Z})
     at = {X: 0.7, Z: -0.4}
     for tangent in (1, -1):
@@ -216,13 +219,13 @@ FAMILY_ULPS = 8
 
 @pytest.fixture(scope="module")
 def superellipse(generated_folder: Path) -> ModuleType:
-    """The paper's family, as x**4 + z**4 = 1."""
+    """Return a curve of the paper's family, x**4 + z**4 = 1."""
     curve = gqm.families.implicit("x**4 + z**4 - 1", start=("17**(-1/4)", "-2*17**(-1/4)"))
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_superellipse", folder=generated_folder)
 
 
 def test_family(superellipse: ModuleType) -> None:
-    """The reference case of the paper's Table 3."""
+    """The reference case of the paper's Table 3 is right."""
     cases = json.loads((DATA / "paper_cases.json").read_text(encoding="utf-8"))
     (case,) = (case for case in cases["cases"] if case["id"] == "table3_8_implicit")
     motion = superellipse.solve(lam0=0, v0="1.5")
@@ -249,7 +252,7 @@ def test_family(superellipse: ModuleType) -> None:
 
 
 def test_run_time_parameters(generated_folder: Path) -> None:
-    """Start, domain and F may hold them; each set of values has its own chart."""
+    """Start, domain and F may contain run-time parameters, and each set of values has its own chart."""
     curve = gqm.Curve.implicit(
         "x**2 + z**2 - R**2", start=(0, "-R"), domain=(None, "h*R"), parameters={"R": 2, "h": 1}, tangent=1
     )
@@ -266,7 +269,7 @@ def test_run_time_parameters(generated_folder: Path) -> None:
 
 
 def test_motion_ends_at_a_singular_point(generated_folder: Path) -> None:
-    """Fast enough, a body on the strophoid's loop comes to its node."""
+    """A body on the strophoid's loop that is fast enough reaches its node, where its motion ends."""
     curve = gqm.Curve.implicit(
         "x**2*(a - z) - z**2*(a + z)", start=("-3*sqrt(3)/10", "-9/10"), tangent=-1, parameters={"a": "9/5"}
     )
@@ -281,7 +284,9 @@ def test_motion_ends_at_a_singular_point(generated_folder: Path) -> None:
 
 
 def test_start_off_the_curve(generated_folder: Path) -> None:
-    """A start point whose coordinates are rounded is moved onto the curve; another is refused when it is known."""
+    """A start point with rounded coordinates is moved onto the curve; another point is refused when its values are
+    known.
+    """
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=("u", "w"))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_ring", folder=generated_folder)
     near = module.solve(lam0=0, u=0.6000001, w=-0.8)
@@ -295,12 +300,12 @@ def test_start_off_the_curve(generated_folder: Path) -> None:
 
 
 def test_launch_point_on_a_curve_without_end(generated_folder: Path) -> None:
-    """However far the curve is followed, a point near it is one that is near for its place."""
+    """However far the curve is followed, a point counts as near it if it is near relative to its place."""
     curve = gqm.Curve.implicit("z - x**2", start=(0, 0), tangent=-1)
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_parabola", folder=generated_folder)
     half = module.solve(point=("1/2", "1/4")).half_period
     with mp.workdps(30):
-        # 2E(m)/sqrt(2ga) with m = -4 a**2 X**2.
+        # The half period is 2E(m)/sqrt(2ga) with m = -4 a**2 X**2.
         assert ulps(half, 2 * mp.ellipe(-1) / mp.sqrt(2 * mpf("9.81"))) <= FAMILY_ULPS
     assert module.solve(point=(0, 0)).kind == "rest"
     with pytest.raises(LaunchError, match=r"point: \(5\.0, 0\.0\) is 4\.06 off the curve; the nearest .* \(1\."):
@@ -329,14 +334,14 @@ def test_launch_point_on_a_curve_without_end(generated_folder: Path) -> None:
     ids=lambda value: "" if isinstance(value, str) else "-".join(f"{k}={v}" for k, v in value.items()),
 )
 def test_bad_declaration(given: dict[str, Any], message: str) -> None:
-    """Refused, with what would be right."""
+    """A bad declaration is refused, and the message says what would be right."""
     arguments: dict[str, Any] = {"F": "x**2 + z**2 - 1", "start": (1, 0), **given}
     with pytest.raises(GQMError, match=message):
         gqm.Curve.implicit(arguments.pop("F"), **arguments)
 
 
 def test_constant_in_disguise() -> None:
-    """F that changes with neither coordinate has no curve."""
+    """If F changes with neither coordinate, there is no curve."""
     with pytest.raises(DeclarationError, match="changes neither with x nor with z"):
         gqm.derive(gqm.Curve.implicit("sin(x)**2 + cos(x)**2 - 1", start=(1, 0)), gqm.Gravity())
 
@@ -363,7 +368,7 @@ parameters: {R: 1}
     ],
 )
 def test_bad_file(text: str, message: str, tmp_path: Path) -> None:
-    """Mistakes in a curve file, with their places."""
+    """Mistakes in a curve file are reported with their places."""
     path = tmp_path / "a.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(GQMError) as caught:
@@ -373,7 +378,7 @@ def test_bad_file(text: str, message: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("force", [gqm.Gravity(), gqm.Gravity() + gqm.QuadraticDrag(b="c")], ids=["free", "drag"])
 def test_contact_force_that_touches_zero(force: gqm.Kernel, tmp_path: Path) -> None:
-    """At the flat sides of x**4 + z**4 = 1 both parts of N vanish: it touches zero there, and changes no sign."""
+    """At the flat sides of x**4 + z**4 = 1 both parts of N vanish, so that N touches zero without changing its sign."""
     curve = gqm.Curve.implicit("x**4 + z**4 - 1", start=(0, -1))
     module = gqm.build(gqm.derive(curve, force), name="sides", folder=tmp_path)
     losing = {"c": 0.1} if "c" in module.PARAMETERS else {}

@@ -57,7 +57,7 @@ def test_a_curve_says_what_it_is(name):
 
 @pytest.mark.parametrize("name", FORCES)
 def test_a_force_says_what_it_is(name):
-    """One line a term."""
+    """A force describes itself with one line for each term."""
     text = str(FORCES[name])
     assert len(text.splitlines()) == len(FORCES[name].terms) + 2
     for words in TOLD[name]:
@@ -80,7 +80,7 @@ def test_a_model_says_what_it_is(curve, force):
 
 @pytest.mark.parametrize("make", [copy.copy, copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
 def test_everything_declared_can_be_copied(make):
-    """And is the same afterwards."""
+    """Everything that is declared can be copied, and the copy is the same."""
     for thing in (*CURVES.values(), *FORCES.values()):
         assert make(thing) == thing
     for curve, force in (("family", "law"), ("implicit", "gravity"), ("rail", "losses"), ("polar", "frame")):
@@ -90,7 +90,7 @@ def test_everything_declared_can_be_copied(make):
 
 
 def test_a_model_arrives_in_another_process(tmp_path):
-    """And gives the same module there, unknown functions and charts included."""
+    """A model can be sent to another process and gives the same module there, unknown functions and charts included."""
     models = [
         gqm.derive(CURVES[curve], FORCES[force])
         for curve, force in (("family", "law"), ("rail", "losses"), ("implicit", "gravity"))
@@ -109,7 +109,7 @@ def test_a_model_arrives_in_another_process(tmp_path):
 
 
 def units(formulas) -> dict[str, str]:
-    """Units of everything that formulas tell."""
+    """Return the units of everything that formulas determine."""
     return {name: unit_of(found) for name, found in found_dimensions(formulas, COMMON).items()}
 
 
@@ -133,13 +133,13 @@ def test_a_graph_tells_the_units_of_its_parameters(text, told):
 
 @pytest.mark.parametrize("text", ["h*(x**4 - 2*x**2)", "h*(x**2 - 1)**2", "a*b*x", "x**3", "h*x**n", "cos(x)"])
 def test_a_number_may_hide_a_unit(text):
-    """h*(x**4 - 2*x**2) is in metres for whoever takes x by the metre: then nothing is said of h."""
+    """h*(x**4 - 2*x**2) is in metres only if x counts metres, so that the unit of h is not determined."""
     names = {"h", "a", "b"} & set(gqm.Curve.graph(text).parameters)
     assert not names & units(curve_formulas(gqm.Curve.graph(text))).keys()
 
 
 def test_formulas_that_contradict_each_other_tell_nothing():
-    """The same length as a slope and as a height."""
+    """If formulas use the same parameter as a slope and as a height, its unit is not determined."""
     assert "a" not in units(curve_formulas(gqm.Curve.graph("a*x + a*x**2")))
 
 
@@ -155,12 +155,12 @@ def test_formulas_that_contradict_each_other_tell_nothing():
     ],
 )
 def test_a_force_tells_the_units_of_its_parameters(kernel, told):
-    """Energies and accelerations have theirs."""
+    """Energies and accelerations determine the units of a force's parameters."""
     assert told.items() <= units(kernel_formulas(kernel)).items()
 
 
 def test_a_printed_model_is_no_promise_of_formulas():
-    """A formula that is too long is shortened with an ellipsis, and complete in closed_forms()."""
+    """A printed model shortens formulas that are too long with an ellipsis; they are complete in closed_forms()."""
     model = gqm.derive(gqm.Curve.graph("x**3"), GRAVITY + gqm.CoulombFriction())
     assert "..." in str(model)
     assert "..." not in str(dict(model.closed_forms())["W = V**2"])

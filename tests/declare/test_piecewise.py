@@ -1,4 +1,4 @@
-"""Declarations of rails in Python and in YAML, and refusals of impossible ones, which name the piece."""
+"""Rails are declared in Python and in YAML, and impossible ones are refused with the name of the piece."""
 
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ from gqm_sym.errors import DeclarationError, ParameterError, SolutionError
 
 
 def test_joints_must_match(tmp_path: Path) -> None:
-    """Place and tangent within 1e-9; the message names the joint and by how much it misses."""
+    """At joints, place and tangent must agree within 1e-9; the message names the joint and the difference."""
     curve = gqm.Curve.graph("(x - 1)*(x - 1 + tilt) + gap", domain=(1, 2))
     module = built(tmp_path, "joint", [gqm.line(length=1), curve])
     assert chart_of(module, gap=1e-10, tilt=1e-10).high > 2.0
@@ -69,7 +69,7 @@ def test_joints_must_match(tmp_path: Path) -> None:
 def test_numbers_that_cannot_be(
     pieces: list[Any], given: dict[str, float], error: type[Exception], message: str, tmp_path: Path
 ) -> None:
-    """Lengths, angles and domains that depend on parameters are checked when those are known."""
+    """Lengths, angles and domains that depend on parameters are checked when their values are known."""
     module = built(tmp_path, "wrong", pieces)
     with pytest.raises(error, match=message):
         module.solve(lam0=0, v0=1, **given)
@@ -150,14 +150,16 @@ WRITTEN = """
 
 
 def spec(folder: Path, pieces: str, *, parameters: bool = True) -> gqm.Curve:
-    """The curve of a YAML file."""
+    """Return the curve of a YAML file."""
     text = YAML.format(pieces=pieces.strip("\n"))
     (folder / "rail.yaml").write_text(text if parameters else text.rpartition("parameters")[0])
     return gqm.read_spec(folder / "rail.yaml").curve
 
 
 def test_rails_in_yaml(tmp_path: Path) -> None:
-    """A list of pieces, or a mapping with start, heading and closed; families and graphs are pieces too."""
+    """A rail in YAML is a list of pieces, or a mapping with start, heading and closed; families and graphs are pieces
+    too.
+    """
     assert spec(tmp_path, WRITTEN).definition == gqm.Curve.piecewise(LOOP).definition
     head = "    start: [0, 1]\n    heading: -pi/6\n    closed: true\n    pieces:"
     long = spec(tmp_path, head + WRITTEN)
@@ -189,6 +191,6 @@ def test_rails_in_yaml(tmp_path: Path) -> None:
     ],
 )
 def test_mistakes_in_yaml(tmp_path: Path, pieces: str, message: str) -> None:
-    """Each at its place."""
+    """Each mistake in YAML is reported at its place."""
     with pytest.raises(gqm.GQMError, match=message):
         spec(tmp_path, pieces, parameters=False)

@@ -1,4 +1,6 @@
-"""Corners, jumps of curvature and powers without a side: refused with their place, or right where they are let pass."""
+"""Corners, jumps of curvature and powers without a side are refused with their place, or are right if they are
+accepted.
+"""
 
 import math
 
@@ -41,7 +43,7 @@ def test_what_is_not_smooth_is_refused(text, what):
 
 @pytest.mark.parametrize("text", [*SMOOTH, *CUSPS])
 def test_what_is_smooth_or_a_cusp_passes(text):
-    """Bars alone are no corner, and a motion that comes to a cusp ends there, as ever."""
+    """Absolute values alone are no corner, and a motion that reaches a cusp ends there, as before."""
     derived(text)
 
 
@@ -49,8 +51,8 @@ def test_what_is_smooth_or_a_cusp_passes(text):
     ("text", "degrees"),
     [("abs(x)", 90.0), ("3*abs(x)/4", 2 * math.degrees(math.atan(0.75))), ("x + abs(x)", math.degrees(math.atan(2)))],
 )
-def test_the_corner_is_told_by_its_angle(text, degrees):
-    """Between the limits of the tangent."""
+def test_a_corner_is_described_by_its_angle(text, degrees):
+    """The message gives the angle between the limits of the tangent."""
     with pytest.raises(DeclarationError, match=f"turns by {degrees:.3g} degrees at x = 0,"):
         derived(text)
 
@@ -58,7 +60,7 @@ def test_the_corner_is_told_by_its_angle(text, degrees):
 @pytest.mark.parametrize("text", ["abs(x)", "(x**2)**(2/3)", "x**2 + x*abs(x)/2"])
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_domain_may_end_there(text, side, tmp_path):
-    """One side has no corner: the fall to it takes as long as quadrature says, and ends at the end of the domain."""
+    """A domain may end at a corner: the fall to it takes the time of the quadrature, and ends with the domain."""
     domain = (0, None) if side > 0 else (None, 0)
     name = f"side_{abs(hash((text, side)))}"
     motion = gqm.build(derived(text, domain), name=name, folder=tmp_path).solve(f"{side}/2")
@@ -69,7 +71,7 @@ def test_the_domain_may_end_there(text, side, tmp_path):
     }[text]
     with mp.workdps(30):
         drop = lambda x: 2 * mpf("9.81") * (height(mpf(1) / 2) - height(x))  # noqa: E731
-        # x = (1 - u**2)/2 takes the root out of V**2 at the launch.
+        # With x = (1 - u**2)/2 the integrand has no root of V**2 at the launch.
         rate = lambda u: u * mp.sqrt((1 + mp.diff(height, (1 - u * u) / 2) ** 2) / drop((1 - u * u) / 2))  # noqa: E731
         time = quad(rate, [mpf("1e-12"), mpf("0.5"), 1 - mpf("1e-12")])
     (end,) = motion.events
@@ -78,7 +80,7 @@ def test_the_domain_may_end_there(text, side, tmp_path):
     assert end.t == pytest.approx(float(time), rel=1e-9)
 
 
-def test_a_file_is_told_the_place_too(tmp_path):
+def test_a_file_has_the_place_in_its_message(tmp_path):
     """In a file a corner is reported as one of its mistakes."""
     path = tmp_path / "vee.yaml"
     path.write_text("name: vee\ncurve: {graph: {z: abs(x)}}\nkernel: {gravity: {}}\n")
@@ -91,13 +93,13 @@ def test_a_file_is_told_the_place_too(tmp_path):
 
 @pytest.mark.parametrize("text", ["x**n", "(1 + x)**n", "sin(x)**(2*n)", "x**(n/2) + x", "exp((x - 3)**n)"])
 def test_a_power_that_needs_a_side_is_refused(text):
-    """It is real for negative x for some n only: the motion stopped where it need not."""
+    """A power that is real for negative x only for some n is refused (the motion stopped where it need not)."""
     with pytest.raises(DeclarationError, match="real for some values of n only; write the exponent as a number"):
         derived(text)
 
 
 def test_so_is_one_in_a_potential():
-    """A power in a potential is refused by its values along the curve."""
+    """A power in a potential is refused if its values along the curve are not real."""
     with pytest.raises(DeclarationError, match=r"potential: .*write the exponent as a number"):
         gqm.derive(gqm.families.circle(), gqm.Potential("z**n"))
     gqm.derive(gqm.families.circle(), gqm.Potential("(x**2 + z**2)**(n/2)"))
@@ -114,13 +116,13 @@ def test_so_is_one_in_a_potential():
     ],
 )
 def test_a_power_with_a_side_passes(text, domain):
-    """Its base is positive inside the domain, wherever that is."""
+    """A power is accepted if its base is positive inside the domain."""
     derived(text, domain)
 
 
 @pytest.mark.parametrize("n", [2, 3, "5/2"])
 def test_a_power_with_a_side_is_right(n, tmp_path):
-    """The fall from 1/2 to the end of the domain, against quadrature."""
+    """The time of a fall from 1/2 to the end of the domain agrees with quadrature."""
     module = gqm.build(derived("x**n", (0, None)), name="power_side", folder=tmp_path)
     (end,) = module.solve("1/2", n=n).events
     with mp.workdps(30):

@@ -1,4 +1,4 @@
-"""Refusals by derivation and emission, and checks that they leave to run time."""
+"""Derivation and emission refuse some input, and leave other checks to run time."""
 
 import importlib
 import os
@@ -23,26 +23,28 @@ t, a = (sp.Symbol(name, real=True) for name in "ta")
 
 
 def test_a_domain_that_is_known_at_run_time() -> None:
-    """Where the curve is real cannot be tried before its ends are known; the launch is checked instead."""
+    """If the ends of the domain are known at run time only, the launch is checked then, instead of the curve before."""
     model = gqm.derive(gqm.Curve.graph("sqrt(q - x)", domain=(None, "q")), gqm.Gravity())
     assert model.parameters == ("q", "g", "m")
 
 
 @pytest.mark.parametrize("z", ["exp(exp(exp(90*x)))", "sin(exp(exp(90*x)))", "asin(sin(10**200*x))", "abs(x)**900"])
 def test_whether_it_is_real_is_soon_known(z: str) -> None:
-    """At the places tried these are towers, or sines that take hundreds of digits; somewhere they are numbers."""
+    """A place is found quickly where the curve is real, though at others its values are towers, or sines of hundreds of
+    digits.
+    """
     with confined(10.0):
         assert gqm.derive(gqm.Curve.graph(z), gqm.Gravity()).z == gqm.Curve.graph(z).z
 
 
 def test_the_mass_is_no_curve_s_parameter() -> None:
-    """It means the same everywhere, whatever the forces are."""
+    """The mass cannot be a curve's parameter, because it means the same everywhere."""
     with pytest.raises(DeclarationError, match="'m' means mass everywhere; give the curve's parameter another name"):
         gqm.derive(gqm.Curve.graph("m**2", parameter="m"), gqm.Gravity())
 
 
 def test_gravity_may_be_in_the_curve_too() -> None:
-    """It is one parameter then: the height of a curve that is declared by it."""
+    """If the height of a curve contains g, this is the same parameter as gravity."""
     model = gqm.derive(gqm.Curve.graph("x**2/g"), gqm.Gravity())
     assert model.parameters == ("g", "m")
     assert sp.simplify(model.effective_potential_slope - 2 * sp.Symbol("x", real=True)) == 0
@@ -53,7 +55,7 @@ def test_gravity_may_be_in_the_curve_too() -> None:
     [("cosh(u) - 2*u", "sinh(u)"), ("sinh(u) - 2*u", "cosh(u) + u"), ("cosh(u)**2 - u", "cosh(u) - 2*sinh(u)")],
 )
 def test_an_angle_without_a_frame_that_turns(x: str, z: str) -> None:
-    """Hyperbolic functions turn nothing: the angle is that of the derivatives, up to half turns."""
+    """Hyperbolic functions rotate nothing, so that the angle is that of the derivatives, up to half turns."""
     model = gqm.derive(gqm.Curve.parametric(x=x, z=z, parameter="u"), gqm.Gravity())
     u = model.parameter
     for place in (-2, sp.Rational(-1, 3), sp.Rational(1, 7), 3):
@@ -69,7 +71,7 @@ def test_an_angle_without_a_frame_that_turns(x: str, z: str) -> None:
 
 @pytest.fixture(scope="module")
 def drag() -> gqm.Model:
-    """A pendulum with quadratic drag: V² is a closed form."""
+    """Return a pendulum with quadratic drag, for which V² has a closed form."""
     return gqm.derive(gqm.families.circle(L=2), gqm.Gravity() + gqm.QuadraticDrag(b="0.1"))
 
 
@@ -78,7 +80,7 @@ def drag() -> gqm.Model:
     [(0, True), (t, False), (sp.Float(1e-9) * sp.sin(t), False), (sp.sqrt(-1 - t**2), False)],
 )
 def test_a_closed_form_is_tried_before_it_is_kept(drag: gqm.Model, added: sp.Expr, agrees: bool) -> None:
-    """Its derivative must be the law's; what is no real number anywhere is not kept."""
+    """A closed form is kept only if its derivative is that of the law and it is real somewhere."""
     loss = drag.dissipation
     assert loss is not None
     lam, tried = drag.parameter, drag.speed_squared + sp.sympify(added).subs(t, drag.parameter)
@@ -86,7 +88,7 @@ def test_a_closed_form_is_tried_before_it_is_kept(drag: gqm.Model, added: sp.Exp
 
 
 def test_any_constant_of_integration_agrees(drag: gqm.Model) -> None:
-    """Another launch speed is another solution of the same law."""
+    """Any constant of integration agrees, because another launch speed is another solution of the same law."""
     loss = drag.dissipation
     assert loss is not None
     faster = drag.speed_squared.subs(V0, V0 + 1)
@@ -94,7 +96,7 @@ def test_any_constant_of_integration_agrees(drag: gqm.Model) -> None:
 
 
 def test_a_form_that_does_not_agree_becomes_a_quadrature(drag: gqm.Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same numbers, by an integral."""
+    """A closed form that does not agree is replaced by an integral with the right values."""
     monkeypatch.setattr(speed, "_agrees", lambda *_: False)
     again = gqm.derive(drag.curve, drag.force)
     assert (drag.speed_squared_form, again.speed_squared_form) == ("closed", "quadrature")
@@ -115,7 +117,7 @@ def test_a_form_that_does_not_agree_becomes_a_quadrature(drag: gqm.Model, monkey
 
 
 def test_a_speed_that_only_falls() -> None:
-    """Drag alone, along x**4: V falls by exp(-b/m times the length), which no elementary function gives."""
+    """With drag alone along x**4, V falls by exp(-b/m times the length), which no elementary function gives."""
     model = gqm.derive(gqm.Curve.graph("x**4"), gqm.QuadraticDrag())
     assert model.speed_squared_form == "quadrature"
     found = _number(model.speed_squared, {"lam0": 0, "v0": 3, "direction": 1, "b": 0.5, "m": 2, "x": 1})
@@ -125,7 +127,7 @@ def test_a_speed_that_only_falls() -> None:
 
 
 def _number(form: sp.Expr, at: dict[str, float]) -> mpf:
-    """A form at values of its symbols, its integrals by quadrature."""
+    """Return a form at values of its symbols, with its integrals by quadrature."""
     values = {symbol: sp.Rational(str(at[symbol.name])) for symbol in form.free_symbols}
     number = form.xreplace(values).replace(
         lambda part: isinstance(part, sp.Integral), lambda part: sp.Float(part.evalf(30), 30)
@@ -138,7 +140,7 @@ def _number(form: sp.Expr, at: dict[str, float]) -> mpf:
 
 
 def test_a_function_without_a_rule_is_named() -> None:
-    """Divided differences are known of the grammar's functions only."""
+    """A function without a rule is named, because divided differences are known of the grammar's functions only."""
     with pytest.raises(EmissionError, match="gamma: no rule for its divided difference"):
         Differences(t, (a, t), {}).first(sp.gamma(t), 0, 1)
 
@@ -153,14 +155,14 @@ def test_a_formula_that_is_too_large_is_counted_and_not_walked() -> None:
 
 
 def test_templates_that_are_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A broken installation is named, with what to do."""
+    """If templates are missing, the error names them and says what to do."""
     monkeypatch.setattr(render, "__file__", str(tmp_path / "gqm_sym" / "emission" / "render.py"))
     with pytest.raises(EmissionError, match="its templates are missing; install gqm_sym again"):
         render._environment()
 
 
 def test_templates_of_another_version(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A template is given what it wants, no less and no more."""
+    """A template gets exactly the variables that it uses."""
     (tmp_path / "templates").mkdir()
     (tmp_path / "templates" / "old").write_text("{{ name }} {{ gone }}", encoding="utf-8")
     monkeypatch.setattr(render, "__file__", str(tmp_path / "gqm_sym" / "emission" / "render.py"))
@@ -171,7 +173,9 @@ def test_templates_of_another_version(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 
 def test_what_sympy_takes_as_a_double_is_refused() -> None:
-    """With gmpy2's integers SymPy looks for the root of a number by its logarithm as a double."""
+    """Numbers that SymPy would take as doubles are refused: with gmpy2's integers it finds roots by a logarithm in
+    doubles.
+    """
     pytest.importorskip("gmpy2")
     code = "import gqm_sym as gqm; gqm.derive(gqm.Curve.graph('1e400*u', parameter='u'), gqm.Gravity())"
     environment = {**os.environ, "SYMPY_GROUND_TYPES": "gmpy"}

@@ -1,4 +1,4 @@
-"""Closed forms: against textbooks, against the corpus, and against numerical differentiation."""
+"""Closed forms agree with textbooks, with the corpus, and with numerical differentiation."""
 
 import json
 import os
@@ -31,7 +31,7 @@ def read(text: str) -> sp.Expr:
 
 
 def real(name: str) -> sp.Symbol:
-    """Make the symbol of a parameter."""
+    """Return the symbol of a parameter."""
     return sp.Symbol(name, real=True)
 
 
@@ -56,7 +56,7 @@ def value(form: sp.Expr, place: dict[sp.Symbol, sp.Expr]) -> mpf:
 
 
 def defaults(model: Model) -> dict[sp.Symbol, sp.Expr]:
-    """Give the exact values of the parameters that have one."""
+    """Return the exact values of the parameters that have one."""
     return {real(name): read(str(given)) for name, given in model.defaults if given is not None}
 
 
@@ -112,7 +112,7 @@ OTHERS = {
 
 
 def differences(function, at: mpf) -> tuple[mpf, mpf]:
-    """Give first and second derivative by differences of the eighth order."""
+    """Return the first and the second derivative by differences of the eighth order."""
     step = mpf(10) ** -12
     first = [mpf(4) / 5, mpf(-1) / 5, mpf(4) / 105, mpf(-1) / 280]
     second = [mpf(8) / 5, mpf(-1) / 5, mpf(8) / 315, mpf(-1) / 560]
@@ -242,24 +242,24 @@ def test_textbook_forms(name):
     ],
 )
 def test_turning_angles(curve, angle):
-    """The angle turned from the launch on, in closed form."""
+    """The angle turned since the launch has a closed form."""
     lam0 = sp.Symbol("lam0", real=True)
-    # lam0 is reserved for users, so it stands in for itself here under another name.
+    # lam0 is reserved for users, so it has another name here.
     expected = read(angle.replace("lam0", "start")).xreplace({real("start"): lam0})
     assert derive(curve, Gravity()).turning_angle == expected
 
 
 def test_the_ellipses_turning_angle_never_jumps():
-    """Once round the tangent has turned by 2π, through no cut of atan2."""
+    """After one round the tangent has turned by 2π, without a jump at a cut of atan2."""
     model = derive(families.ellipse(a=3, b=1), Gravity())
     assert not model.turning_angle.has(sp.atan2)
-    assert model.parameter in model.turning_angle.args  # seen from a frame that turns once with it, and not twice
+    assert model.parameter in model.turning_angle.args  # in a frame that rotates once with it, and not twice
     around = model.turning_angle.subs({**defaults(model), model.lam0: 0})
     assert around.subs(model.parameter, 2 * sp.pi).evalf(30) == pytest.approx(2 * sp.pi.evalf(30))
 
 
 def test_the_pendulum_in_full():
-    """Every form of the paper's first example, as the model hands it on."""
+    """The model has every form of the paper's first example."""
     model = derive(families.circle(), Gravity())
     theta, lam0, v0, length, g, m = (
         model.parameter,
@@ -288,7 +288,7 @@ def test_the_pendulum_in_full():
 
 
 def test_cusps_are_zeros_of_one_factor():
-    """It is smooth and changes sign, so that a run time can find them."""
+    """The factor that vanishes at cusps is smooth and changes its sign, so that the runtime can find its zeros."""
     theta = real("theta")
     assert derive(families.cycloid(), Gravity()).cusp == sp.sin(theta / 2)
     assert derive(OTHERS["cusp"], Gravity()).cusp == real("t")
@@ -315,7 +315,7 @@ def test_defaults_can_be_replaced():
     [({"q": 1}, "'q'"), ({"L": -1}, "positive"), ({"m": 0}, "positive")],
 )
 def test_wrong_defaults_are_refused(parameters, word):
-    """Unknown names, and what a family promises to be positive."""
+    """Unknown names are refused, and so are negative values for what a family requires to be positive."""
     with pytest.raises(DeclarationError, match=word):
         derive(families.circle(), Gravity(), parameters=parameters)
 
@@ -327,7 +327,7 @@ def test_a_curve_that_is_nowhere_real_is_refused():
 
 
 def test_latex_is_one_aligned_block():
-    """A notebook shows every form, the launch as θ₀ and V₀."""
+    """A notebook shows every form in one block, with the launch as θ₀ and V₀."""
     text = derive(families.circle(), Gravity())._repr_latex_()
     assert text.startswith("$\\displaystyle \\begin{aligned}")
     assert r"\theta_{0}" in text
@@ -336,7 +336,7 @@ def test_latex_is_one_aligned_block():
 
 
 def test_the_forms_are_the_same_under_every_hash_seed():
-    """No order comes from a set."""
+    """No order depends on a set."""
     script = (
         "from gqm_sym.declare import Curve, families\n"
         "from gqm_sym.derivation import derive\n"
@@ -369,11 +369,11 @@ def test_a_height_that_is_nowhere_real_is_refused(z: str) -> None:
 
 
 def test_a_height_that_is_real_somewhere_is_kept() -> None:
-    """A curve that is real on part of the line is one: the motion ends where it is not."""
+    """A curve that is real on part of the line is accepted, and the motion ends where it is no longer real."""
     assert derive(Curve.graph("sqrt(x)", parameter="x"), Gravity()).z == sp.sqrt(sp.Symbol("x", real=True))
 
 
 def test_a_parameter_without_a_default_is_not_guessed() -> None:
-    """sqrt(1 - ecc**2) is real for the eccentricities it is meant for: nothing is refused before they are given."""
+    """Nothing is refused before the parameters are given; sqrt(1 - ecc**2) is real for proper eccentricities."""
     model = derive(Curve.parametric(x="a*cos(u)", z="a*sqrt(1 - ecc**2)*sin(u)", parameter="u"), Gravity())
     assert model.parameters == ("a", "ecc", "g", "m")

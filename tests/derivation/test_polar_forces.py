@@ -1,4 +1,4 @@
-"""Forces about a pole and turning along closed curves: forms in which sines and cosines have gone into each other."""
+"""Forces about a pole, and turning along closed curves, have forms in which sines and cosines have combined."""
 
 from pathlib import Path
 
@@ -20,20 +20,20 @@ MIRROR = gqm.Potential("mu_B*sqrt(1 + 3*z**2/(x**2 + z**2))/(x**2 + z**2)**(3/2)
 
 @pytest.fixture(scope="module")
 def field_line(tmp_path_factory):
-    """A charge that gyrates about a field line of a magnetic dipole: its mirror force is that of a potential."""
+    """Return the field line of a magnetic dipole about which a charge gyrates; its mirror force has a potential."""
     folder = Path(tmp_path_factory.mktemp("dipole"))
     return gqm.build(gqm.derive(DIPOLE, MIRROR), name="field_line", folder=folder)
 
 
 def bounce(degrees: int) -> mpf:
-    """A quarter of the bounce period at unit speed, by quadrature in 45 digits."""
+    """Return a quarter of the bounce period at unit speed, by quadrature in 45 digits."""
     with mp.workdps(45):
         a = mp.radians(degrees)
         field = lambda th: sqrt(1 + 3 * sin(th) ** 2) / cos(th) ** 6  # noqa: E731
         left = lambda th: 1 - sin(a) ** 2 * field(th)  # noqa: E731
         excess = lambda th: mp.log(sin(a) ** 2 * field(th))  # noqa: E731
         mirror = mp.findroot(excess, (mpf(0), mp.pi / 2 - mpf("1e-3")), solver="anderson", tol=mpf(10) ** -70)
-        # th = mirror*sin(w): the root of V**2 at the mirror point goes into the cosine.
+        # With th = mirror*sin(w) the root of V**2 at the mirror point cancels against the cosine.
         rate = lambda w: (  # noqa: E731
             cos(mirror * sin(w))
             * sqrt(1 + 3 * sin(mirror * sin(w)) ** 2)
@@ -45,14 +45,14 @@ def bounce(degrees: int) -> mpf:
 
 
 @pytest.mark.parametrize(("degrees", "known"), [(15, "1.14488841"), (10, "1.20288213"), (5, "1.27032319")])
-def test_the_truth_is_the_truth(degrees, known):
-    """Against figures found elsewhere."""
+def test_the_quadrature_agrees_with_published_values(degrees, known):
+    """The quadrature agrees with values found elsewhere."""
     assert abs(bounce(degrees) - mpf(known)) < 1e-8
 
 
 @pytest.mark.parametrize("degrees", [80, 60, 45, 30, 20, 16, 15, 10, 5, 3, 2, 1])
 def test_a_field_line_has_mirror_points(degrees, field_line):
-    """However far out the mirror points lie, where the potential grows without bounds."""
+    """A field line has mirror points however far out they lie, where the potential grows without bounds."""
     a = np.radians(degrees)
     motion = field_line.solve(0, float(np.cos(a)), 1, mu_B=float(np.sin(a) ** 2 / 2), R=1)
     assert motion.kind == "libration"
@@ -60,7 +60,7 @@ def test_a_field_line_has_mirror_points(degrees, field_line):
 
 
 def test_no_form_keeps_what_adds_up_to_one():
-    """x**2 + z**2 is r**2 in the potential, in its slope and in both forces."""
+    """x**2 + z**2 becomes r**2 in the potential, in its slope and in both forces."""
     model = gqm.derive(DIPOLE, MIRROR)
     for form in (
         model.potential,
@@ -109,7 +109,7 @@ CLOSED = {
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("form", ["resistance", "printed"])
 def test_a_droplet_runs_along_a_closed_curve(name, form, tmp_path):
-    """Its V**2 against DOP853 of dW/dlam over the first stretch, through all its changes of curvature."""
+    """V**2 of a droplet agrees with DOP853 of dW/dlam on the first leg, through all changes of curvature."""
     curve = CLOSED[name]
     kernel = gqm.Gravity() + gqm.SurfaceTension(gamma="1/2", ell_c="1/5", form=form)
     model = gqm.derive(curve, kernel)

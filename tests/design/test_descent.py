@@ -1,4 +1,4 @@
-"""The brachistochrone with and without friction: times, the cycloid, and that other curves are slower."""
+"""Brachistochrones with and without friction have the right times, are cycloids, and are faster than other curves."""
 
 from math import cos, pi, sin, sqrt
 from pathlib import Path
@@ -10,13 +10,13 @@ from scipy.optimize import brentq
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 
-# Upper bounds of the least times with mu = 0.3, found by optimisation over splines.
+# These are upper bounds of the least times with mu = 0.3, found by optimisation over splines.
 TIMES = {("1", "-1"): 0.6757788612, ("1", "-0.6"): 0.7222327080, ("1", "-0.45"): 0.804359295}
 
 
 @pytest.mark.parametrize("to", TIMES)
 def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
-    """The body gets there in that time, pressed on the track all along."""
+    """The body arrives at that time, and presses on the track all along."""
     track = gqm.design.brachistochrone(to, mu="0.3")
     force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
     motion = gqm.build(gqm.derive(track, force), name="quickest", folder=tmp_path).solve(0, 0)
@@ -28,19 +28,21 @@ def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
     assert (motion.state(np.linspace(0.01, end.t, 100)).normal_force > 0.0).all()
 
 
-# When a body with mu = 0.3 gets on the textbook's curve to the same places.
+# These are the times at which a body with mu = 0.3 reaches the same places on the textbook's curve.
 TEXTBOOK = {("1", "-1"): 0.6805584516, ("1", "-0.6"): 0.7434743316}
 
 
 def test_the_curve_of_textbooks(tmp_path: Path) -> None:
-    """It leaves the contact force of the curve itself out: the body is slow, and does not even get to (1, -0.45)."""
+    """The textbooks' curve neglects the contact force due to curvature: the body is slow, and does not even reach (1,
+    -0.45).
+    """
     x, z = "R*(q - sin(q) + 3/10*(1 - cos(q)))", "-R*(1 - cos(q) + 3/10*(q + sin(q)))"
     curve = gqm.Curve.parametric(x=x, z=z, parameter="q", domain=(0, "9/2"), parameters={"R": 1})
     model = gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction(mu="3/10"))
     track = gqm.build(model, name="textbook", folder=tmp_path)
 
     def ends(to: tuple[str, str]) -> tuple[float, float]:
-        """The parameter at a place, and the size of the curve."""
+        """Return the parameter at a place, and the size of the curve."""
         across, down = lambda q: q - sin(q) + 0.3 * (1 - cos(q)), lambda q: 1 - cos(q) + 0.3 * (q + sin(q))
         end = brentq(lambda q: float(to[1]) * across(q) + down(q), 1, 4.5)
         return end, 1.0 / across(end)
@@ -54,7 +56,9 @@ def test_the_curve_of_textbooks(tmp_path: Path) -> None:
 
 
 def test_without_friction(tmp_path: Path) -> None:
-    """A cycloid, to the left too: in sqrt(R/g) times the wheel's angle, and pressed with twice the static load."""
+    """Without friction the curve is a cycloid, also to the left; its time is sqrt(R/g) times the wheel's angle, and the
+    load is twice the static one.
+    """
     track = gqm.design.brachistochrone((-3, -1))
     motion = gqm.build(gqm.derive(track, gqm.Gravity()), name="cycloid_down", folder=tmp_path).solve(0, 0)
     angle = 2 * float(track.domain[1])
@@ -81,7 +85,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_places_that_cannot_be_reached(case: str) -> None:
-    """Each is one clear error."""
+    """Each place that cannot be reached gives one clear error."""
     (to, *mu), said = BAD[case]
     with pytest.raises(GQMError, match=said):
         gqm.design.brachistochrone(to, mu=mu[0] if mu else 0)

@@ -1,4 +1,4 @@
-"""The least launch speed with which contact holds everywhere."""
+"""The least launch speed is that with which contact holds everywhere."""
 
 from math import cosh, sqrt
 
@@ -14,17 +14,19 @@ import generated.rolling_circle
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError, LaunchError, ParameterError, SolutionError
 
-# Roundings of the square that the speed is the root of.
+# The tolerance is in roundings of the square of the speed.
 SHARE = 4e-16
 
 
 def near(actual: float, expected: float) -> bool:
-    """Whether a speed is the expected one to rounding."""
+    """Return whether a speed is the expected one to rounding."""
     return abs(actual - expected) <= SHARE * expected
 
 
 def test_loop_the_loop() -> None:
-    """From the lowest point v0² = 5 g L; for a bead on a ring 4 g L; for a rolling body (1 + 4/(1 + β)) g L."""
+    """From the lowest point v0² is 5 g L; it is 4 g L for a bead on a ring, and (1 + 4/(1 + β)) g L for a rolling
+    body.
+    """
     circle = generated.circle
     assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81), sqrt(5 * 9.81 * 1.5))
     assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81, contact="bilateral"), sqrt(4 * 9.81 * 1.5))
@@ -34,19 +36,19 @@ def test_loop_the_loop() -> None:
 
 
 def test_from_any_place_of_the_loop() -> None:
-    """Energy is conserved: v0² = g L (3 + 2 cos θ0)."""
+    """By conservation of energy v0² is g L (3 + 2 cos θ0)."""
     expected = sqrt(9.81 * 0.9 * (3 + 2 * 0.5403023058681398))
     assert near(gqm.least_speed(generated.circle, 1, between=(-4, 4)), expected)
 
 
 def test_loop_the_ellipse() -> None:
-    """At the top κ = b/a², so that v0² = g a²/b + 4 g b from the lowest point."""
+    """At the top κ is b/a², so that v0² is g a²/b + 4 g b from the lowest point."""
     a, b, g = 1.0, 2.0, 9.81
     assert near(gqm.least_speed(generated.ellipse, "-pi/2", a=a, b=b, g=g), sqrt(g * a**2 / b + 4 * g * b))
 
 
 def test_in_a_valley_the_ends_decide() -> None:
-    """Contact from above is no trouble there: V² must last to the higher end."""
+    """In a valley contact from above always holds, so that V² must only suffice to reach the higher end."""
     c, g = 0.8, 9.81
     speed = gqm.least_speed(generated.catenary, 0, between=(-1, 0.5), c=c, g=g)
     assert near(speed, sqrt(2 * g * c * (cosh(1 / c) - 1)))
@@ -54,14 +56,14 @@ def test_in_a_valley_the_ends_decide() -> None:
 
 
 def test_the_motion_agrees() -> None:
-    """A little faster it goes round; a little slower it lifts off."""
+    """A slightly faster body goes round, and a slightly slower one lifts off."""
     speed = gqm.least_speed(generated.circle, 0)
     assert generated.circle.solve(0, speed * (1 + 1e-9), contact="above").kind == "circulation"
     assert generated.circle.solve(0, speed * (1 - 1e-9), contact="above").events[-1].kind == "liftoff"
 
 
 def test_a_hump_asks_for_less_and_not_for_more() -> None:
-    """On top of an arch of a cycloid no speed keeps a body on all of it, and any small speed does so near its top."""
+    """On an arch of a cycloid no speed keeps a body on all of it, and any small speed does so near its top."""
     with pytest.raises(SolutionError, match=r"no speed.*at most|no speed.*low enough"):
         gqm.least_speed(generated.cycloid, 3, between=(1, 5))
     assert gqm.least_speed(generated.cycloid, "pi", between=(3, "2*pi - 3")) == 0.0
@@ -80,6 +82,6 @@ def test_a_hump_asks_for_less_and_not_for_more() -> None:
     ],
 )
 def test_questions_without_an_answer(module: object, arguments: dict, kind: type[GQMError], message: str) -> None:
-    """Each is refused with what would be right."""
+    """Each question without an answer is refused, and the message says what would be right."""
     with pytest.raises(kind, match=message):
         gqm.least_speed(module, 0, **arguments)

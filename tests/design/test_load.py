@@ -1,4 +1,4 @@
-"""Tracks from their contact force: the loads that motions along them feel, and closed forms."""
+"""Tracks made from a contact force have it in their motions, and agree with closed forms."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ G = 9.81
 
 
 def test_constant_load(tmp_path: Path) -> None:
-    """3 g from 12 m/s: the loads to 1e-14, top, shift and times as Kepler's equation has them."""
+    """For 3 g from 12 m/s the loads are right to 1e-14, and top, shift and times are those of Kepler's equation."""
     track = gqm.design.constant_load(3, 12)
     module = gqm.build(gqm.derive(track, gqm.Gravity()), name="steady_loop", folder=tmp_path)
     motion = module.solve(0, 12)
@@ -27,7 +27,7 @@ def test_constant_load(tmp_path: Path) -> None:
 
 
 def test_constant_load_with_parameters(tmp_path: Path) -> None:
-    """Load, speed and gravity as run-time parameters."""
+    """Load, speed and gravity may be run-time parameters."""
     track = gqm.design.constant_load("n", "V", g="g", parameters={"n": 3, "V": 12})
     module = gqm.build(gqm.derive(track, gqm.Gravity()), name="steady_loops", folder=tmp_path)
     psi = np.linspace(-3.0, 7.0, 200)
@@ -51,7 +51,7 @@ def test_prescribed_load(law: str, tmp_path: Path) -> None:
 
 
 def test_without_load_the_body_flies(tmp_path: Path) -> None:
-    """A parabola, as far as it is asked for."""
+    """Without load the track is a parabola, as long as requested."""
     track = gqm.design.from_load(0, 10, until=6, heading="pi/4")
     chart_of = gqm.build(gqm.derive(track, gqm.Gravity()), name="thrown", folder=tmp_path).pass1(
         np.linspace(0.0, 6.0, 50), 0, 10.0
@@ -72,7 +72,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_loads_that_no_track_has(case: str) -> None:
-    """Each is one clear error."""
+    """Each load that no track has gives one clear error."""
     call, said = BAD[case]
     with pytest.raises(GQMError, match=said):
         call()

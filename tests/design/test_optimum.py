@@ -1,4 +1,6 @@
-"""Optimal tracks against closed forms: the quickest plane with and without friction, under limits, and a spline."""
+"""Optimal tracks agree with closed forms: the quickest plane with and without friction and under limits, and a
+spline.
+"""
 
 from math import atan, pi, sqrt, tan
 from pathlib import Path
@@ -22,7 +24,9 @@ def steepness(force: Any, free: Any = None, **options: Any) -> float:
 
 
 def test_the_quickest_plane() -> None:
-    """45 degrees; under limits as steep as they allow: the contact force is m g cos(alpha)."""
+    """The quickest plane has 45 degrees, under limits it is as steep as they allow, and the contact force is m g
+    cos(alpha).
+    """
     assert steepness(gqm.Gravity()) == pytest.approx(1.0, rel=1e-6)
     assert steepness(gqm.Gravity(), limits={"slope": (-0.8, None)}) == pytest.approx(0.8, rel=1e-9)
     assert steepness(gqm.Gravity(), limits={"height": ("-3/4", 0)}) == pytest.approx(0.75, rel=1e-9)
@@ -31,13 +35,13 @@ def test_the_quickest_plane() -> None:
 
 
 def test_with_friction() -> None:
-    """Steeper by half of the angle of friction."""
+    """With friction the quickest plane is steeper by half of the angle of friction."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
     assert steepness(force, {"k": (0.5, 0.9, 4)}) == pytest.approx(tan(pi / 4 + atan(0.3) / 2), rel=1e-6)
 
 
 def test_exact_gradients() -> None:
-    """The quickest pendulum within limits is the shortest; periods have exact derivatives."""
+    """The quickest pendulum within limits is the shortest one; periods have exact derivatives."""
     circle = gqm.families.circle()
     best = gqm.design.minimise("period", circle, gqm.Gravity(), free={"L": (0.5, 1, 2)}, lam0=1)
     assert dict(best.defaults)["L"] == 0.5
@@ -45,7 +49,7 @@ def test_exact_gradients() -> None:
 
 
 def test_points_that_move(tmp_path: Path) -> None:
-    """The spline through seven points that is quickest is slower than the brachistochrone by a thousandth at most."""
+    """The quickest spline through seven points is slower than the brachistochrone by a thousandth at most."""
     x = np.linspace(0.0, 1.0, 7)
     points = np.column_stack([x, -x])
     best = gqm.design.minimise("time_at", points, gqm.Gravity(), free=range(1, 6))

@@ -1,4 +1,4 @@
-"""Tracks from their period against Abel's integral in 30 digits, and against the cycloid."""
+"""Tracks made from a period agree with Abel's integral in 30 digits, and with the cycloid."""
 
 from pathlib import Path
 from types import ModuleType
@@ -21,24 +21,24 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def built(folder: Path, name: str, *law: Any, **options: Any) -> ModuleType:
-    """The module of a track from its period."""
+    """Return the module of a track made from its period."""
     return gqm.build(gqm.derive(gqm.design.from_period(*law, **options), gqm.Gravity()), name=name, folder=folder)
 
 
 def lengths(period: Any, height: Any) -> Any:
-    """The arc length between both places of a height, by Abel's integral with s = z sin(phi)**2."""
+    """Return the arc length between both places of a height, by Abel's integral with s = z sin(phi)**2."""
     share = mp.quad(lambda phi: period(height * mp.sin(phi) ** 2) * mp.sin(phi), [0, mp.pi / 2])
     return mp.sqrt(2 * mpf(981) / 100 * height) / mp.pi * share
 
 
 @pytest.fixture(scope="module")
 def growing(folder: Path) -> ModuleType:
-    """The symmetric track whose period is 2 s at the bottom, and grows by a quarter a metre."""
+    """Return the symmetric track whose period is 2 s at the bottom and grows by a quarter for each metre."""
     return built(folder, "growing", "2*(1 + h/4)")
 
 
 def heights_of(places: np.ndarray, share: Any, period: Any) -> list[Any]:
-    """The heights of places, given by the arc length from the bottom."""
+    """Return the heights of places given by the arc length from the bottom."""
     found = []
     for place in map(abs, map(mpf, places.tolist())):
         found.append(mp.findroot(lambda w, s=place: share * lengths(period, w * w) - s, place, tol=1e-55) ** 2)
@@ -58,7 +58,9 @@ def test_a_period_that_grows(growing: ModuleType) -> None:
 
 
 def test_an_uneven_share(folder: Path) -> None:
-    """A period that is no polynomial, with a third of the length on the right: both sides ask for the same time."""
+    """A period that is no polynomial is met with a third of the length on the right; the time on both sides is the
+    same.
+    """
     track = gqm.design.from_period("T0*sqrt(1 + h)", "1/3", up_to="0.15", parameters={"T0": "3/2"})
     module = gqm.build(gqm.derive(track, gqm.Gravity()), name="uneven", folder=folder)
     with mp.workdps(30):
@@ -75,7 +77,7 @@ def test_an_uneven_share(folder: Path) -> None:
 
 
 def test_a_constant_period_is_that_of_a_cycloid(folder: Path) -> None:
-    """Every place and the greatest height are the cycloid's, to rounding."""
+    """Every place and the greatest height are those of the cycloid, to rounding."""
     radius = 9.81 / (4.0 * np.pi**2) * 2.0**2 / 4.0
     assert gqm.design.height_limit(2) == pytest.approx(2 * radius, rel=4 * ULP)
     assert gqm.design.height_limit(2, "1/3") == pytest.approx(2 * radius * 4 / 9, rel=4 * ULP)
@@ -115,7 +117,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_periods_that_no_track_has(case: str) -> None:
-    """Each is one clear error."""
+    """Each period that no track has gives one clear error."""
     law, options, said = BAD[case]
     with pytest.raises(GQMError) as raised:
         gqm.design.from_period(*law, **options)

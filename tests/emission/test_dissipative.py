@@ -1,4 +1,6 @@
-"""Friction, drag and resistance in emitted modules: P, Q and the holding force, against the textbook equation."""
+"""P, Q and the holding force in emitted modules agree with the textbook equation under friction, drag and
+resistance.
+"""
 
 from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t, c_void_p
@@ -14,7 +16,7 @@ from textbook import DIGITS, Textbook
 import gqm_sym as gqm
 from gqm_sym.errors import ParameterError
 
-# Roundings (2**-53) of the size of the parts that a value is the sum of: worst measured 10.
+# The tolerance in roundings (2**-53) of the size of the terms that a value is the sum of. Worst measured: 10.
 ROUNDINGS = 16
 SIGNS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
 LINE = POINTER(c_double)
@@ -22,7 +24,7 @@ LINE = POINTER(c_double)
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A model, values of its parameters, and the same in definitions."""
+    """A model, with values of its parameters as numbers and as definitions."""
 
     curve: Callable[[], gqm.Curve]
     force: Callable[[], gqm.Kernel]
@@ -33,12 +35,12 @@ class Case:
 
 
 def gravity() -> gqm.Kernel:
-    """The one of all cases."""
+    """Return the gravity of all cases."""
     return gqm.Gravity()
 
 
 def cycloid_truth() -> Textbook:
-    """Everything but drag on an arch upside down, whose cusps are ends."""
+    """Return all numbers but drag on an arch that is upside down, whose cusps are its ends."""
     r, k = mpf("0.5"), mpf("1.25")
 
     def push(x: mpf, z: mpf) -> tuple[mpf, mpf]:
@@ -56,7 +58,7 @@ def cycloid_truth() -> Textbook:
 
 
 def turning_truth() -> Textbook:
-    """A rough hoop that turns."""
+    """Return the numbers of a rough hoop that rotates."""
     omega = mpf("2.5")
     return Textbook(
         x=lambda t: mp.mpf("1.2") * mp.sin(t),
@@ -161,18 +163,18 @@ class Loss:
         return out
 
     def drive(self, lam: float, w: float, v: int, nu: int) -> np.ndarray:
-        """ds, P, Q, n0 and kappa, at the second of two places."""
+        """Return ds, P, Q, n0 and kappa at the second of two places."""
         lines = [np.array([0.5, lam]), np.array([1.0, w])]
         return self._fill(self.dissipation.speed_equation, 5, lines, [float(v), float(nu)])[:, 1]
 
     def hold(self, lam: float) -> np.ndarray:
-        """A forwards and backwards from rest."""
+        """Return A forwards and backwards from rest."""
         return self._fill(self.dissipation.static_balance, 2, [np.array([0.5, lam])], [])[:, 1]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=[name.replace(" ", "-") for name in CASES])
 def case(request: pytest.FixtureRequest, generated_folder: Path) -> tuple[Case, Loss, Textbook]:
-    """A row of the table, its module built."""
+    """Return a row of the table, with its module built."""
     row = CASES[request.param]
     name = request.param.replace(" ", "_").replace(",", "")
     module = gqm.build(gqm.derive(row.curve(), row.force()), name=name, folder=generated_folder)
@@ -181,13 +183,13 @@ def case(request: pytest.FixtureRequest, generated_folder: Path) -> tuple[Case, 
 
 
 def near(actual: float, truth: mpf, size: mpf) -> None:
-    """Hold a number to the truth, in roundings of the size of its parts."""
+    """Check a number against the true one, in roundings of the size of its parts."""
     allowed = ROUNDINGS * mpf(2) ** -53 * (size + abs(truth))
     assert abs(mpf(float(actual)) - truth) <= allowed, (actual, mp.nstr(truth, 20))
 
 
 def test_drive(case: tuple[Case, Loss, Textbook]) -> None:
-    """Rows σ, n₀, κ are the curve's, and P - Q W is dW/dλ on a leg of either direction and either sign of N."""
+    """Rows σ, n₀, κ are the curve's, and P - Q W is dW/dλ on a leg of either direction and with either sign of N."""
     row, loss, truth = case
     linear = row.flags[2]
     with mp.workdps(DIGITS):
@@ -204,7 +206,7 @@ def test_drive(case: tuple[Case, Loss, Textbook]) -> None:
                     near(rows[4], kappa, abs(kappa))
                     actual = mpf(rows[1]) - mpf(rows[2]) * mpf(w)
                     near(actual, truth.rate(lam, mpf(w), v, sign), 2 * ds * (abs(push) + 20 + abs(kappa) * w))
-                    # Q is minus its slope in W, P the rest.
+                    # Q is minus the slope in W, and P is the remainder.
                     h = mpf(10) ** -12
                     if w:
                         slope = (truth.rate(lam, w + h, v, sign) - truth.rate(lam, w - h, v, sign)) / (2 * h)
@@ -214,7 +216,7 @@ def test_drive(case: tuple[Case, Loss, Textbook]) -> None:
 
 
 def test_hold(case: tuple[Case, Loss, Textbook]) -> None:
-    """A body at rest feels static friction, whichever way it is about to go."""
+    """Static friction acts on a body at rest in both directions in which it may begin to move."""
     row, loss, truth = case
     with mp.workdps(DIGITS):
         for text in row.places:
@@ -231,7 +233,7 @@ def test_flags(case: tuple[Case, Loss, Textbook]) -> None:
 
 @pytest.fixture(scope="module")
 def rough(generated_folder: Path) -> ModuleType:
-    """A line with both kinds of friction, whose coefficients have no defaults."""
+    """Return a line with both kinds of friction, whose coefficients have no defaults."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu_static="mu_s") + gqm.QuadraticDrag()
     return gqm.build(gqm.derive(gqm.Curve.graph("x/2"), force), name="rough_line", folder=generated_folder)
 
@@ -246,7 +248,7 @@ def rough(generated_folder: Path) -> ModuleType:
     ],
 )
 def test_a_coefficient_out_of_its_range_is_refused(rough: ModuleType, wrong: dict[str, str], message: str) -> None:
-    """When the module runs, with the bound."""
+    """A coefficient out of its range is refused when the module runs, and the message gives the bound."""
     given = {"mu": "0.2", "mu_s": "0.3", "b": "0.1", "g": "9.81", "m": "1"}
     assert rough.MODEL.numbers(tuple(given.values()))
     with pytest.raises(ParameterError, match=message):
@@ -259,7 +261,7 @@ def test_static_friction_may_equal_sliding_friction(rough: ModuleType) -> None:
 
 
 def test_the_law_can_be_read_in_the_module() -> None:
-    """The paper's second example, as a person would write it; nothing that it does not need."""
+    """The module contains the paper's second example as a person would write it, and no unnecessary function."""
     text = gqm.emit(gqm.derive(gqm.Curve.graph("x**3"), gqm.Gravity() + gqm.CoulombFriction()), name="example")
     for line in (
         "out[1, i] = 2*ds*(-mu*n0*nu*v + push)",
@@ -277,7 +279,7 @@ def test_the_law_can_be_read_in_the_module() -> None:
 
 
 def test_names_of_the_law_may_be_the_user_s() -> None:
-    """A track with parameters called as emitted code calls its own things."""
+    """A track may have parameters with the names that emitted code uses."""
     curve = gqm.Curve.graph("nu*u**2 + ds*u + push", parameter="u")
     force = gqm.Gravity() + gqm.CoulombFriction(mu="kappa") + gqm.QuadraticDrag(b="v") + gqm.SurfaceTension(gamma="n0")
     text = gqm.emit(gqm.derive(curve, force), name="names")

@@ -1,4 +1,4 @@
-"""Emitted text: what it may hold, what it must refuse, and its numbers against those of the declaration."""
+"""Emitted text holds what it may and refuses the rest, and its numbers are those of the declaration."""
 
 import ast
 import dataclasses
@@ -19,10 +19,10 @@ from gqm_sym.emission.render import INTERFACE
 from gqm_sym.errors import EmissionError, ExpressionError, GQMError, InputError
 from gqm_sym.runtime import interface
 
-# Formulas of 60 digits, with some for rounding.
+# Formulas are evaluated to 60 digits, with some more for rounding.
 EXACT = mpf("1e-56")
 
-# An inner function that bends, in (0.1, 0.7) on the places below.
+# This inner function is curved, and has values in (0.1, 0.7) at the places below.
 W = "(u/2 + u**2/9)"
 HEADS = {
     **{name: f"{name}{W}" for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")},
@@ -43,10 +43,10 @@ HEADS = {
     "large": "1e30*u**2 + 12345678901234567890123*u",
     "small": "1e-30*u**2",
 }
-# Compiling a module takes some seconds, so the others are run by Python: it is the printed text that is tested.
+# Compiling a module takes some seconds, so the others are run by Python; the test is of the printed text.
 COMPILED = ("sin", "acosh", "power -7/5", "kink", "parameter as exponent", "both", "nested", "product")
 
-# Every name that emitted functions have for something of their own.
+# These are all names that emitted functions use for something of their own.
 TAKEN = (
     "a",
     "b",
@@ -86,7 +86,7 @@ TITLES = (
 
 
 def refuses(name: str) -> Model:
-    """Derive a motion with a run-time parameter of that name, whose functions need helpers."""
+    """Derive a motion with a run-time parameter of that name whose functions need helpers."""
     return declared(f"cos(u) + {name}*u", **{name: "1"})
 
 
@@ -97,7 +97,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_interface_is_the_runtimes() -> None:
-    """The emitter does not import the runtime, but writes for the version that there is."""
+    """The emitter does not import the runtime, but writes for its present version."""
     assert INTERFACE == interface.INTERFACE
 
 
@@ -136,7 +136,7 @@ def test_numbers_of_every_head(head: str, folder: Path, monkeypatch: pytest.Monk
 
 
 def test_exact_domain(folder: Path) -> None:
-    """Ends and period are evaluated in any arithmetic, with no rational number rounded."""
+    """Ends and period can be evaluated in any arithmetic, without rounding a rational number."""
     curve = gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", domain=("-k/3", "e"), period="2*pi")
     module = gqm.build(gqm.derive(curve, gqm.Gravity(), parameters={"k": 1}), name="domain", folder=folder)
     with mp.workdps(60):
@@ -145,7 +145,7 @@ def test_exact_domain(folder: Path) -> None:
 
 
 def test_taken_names_as_parameters(folder: Path) -> None:
-    """Run-time parameters may have all the names of ours at once, and keep their meaning."""
+    """Run-time parameters may have all names of emitted code at once, and keep their meaning."""
     terms = (f"{name}*{f}" for name, f in zip(TAKEN, ("sin(u)", "exp(u)", "u**3", "cosh(u/2)") * 5, strict=False))
     values = {name: 0.5 + k / 8 for k, name in enumerate(TAKEN)}
     text = " + ".join(terms)
@@ -156,7 +156,7 @@ def test_taken_names_as_parameters(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
 def test_taken_names_as_the_curves_parameter(name: str) -> None:
-    """The curve's parameter may have any of them too."""
+    """The curve's parameter may have any of these names too."""
     text, values = f"k*cos({name}) + {name}**2/3", {"k": 1.5}
     check_numbers(interpreted(declared(text, parameter=name, k="1.5"), f"along_{name}"), text, values, name)
 
@@ -211,7 +211,7 @@ def test_the_same_model_gives_the_same_text() -> None:
 
 
 def test_the_body_digest() -> None:
-    """The header states the digest of what follows it; a changed character is seen."""
+    """The header states the digest of the text after it, which detects a changed character."""
     text = gqm.emit(declared("u**2"), name="digest")
     stated, actual = body_digests(text)
     assert stated == actual
@@ -254,8 +254,8 @@ def test_the_input_digest() -> None:
     ids=lambda value: value if isinstance(value, str) else "",
 )
 @pytest.mark.parametrize("where", ["x", "effective_potential_slope", "kappa"])
-def test_what_has_no_text_is_refused_by_name(form: sp.Expr, name: str, where: str) -> None:
-    """A model made by hand gets no further than one that was derived."""
+def test_a_model_without_text_is_refused_by_name(form: sp.Expr, name: str, where: str) -> None:
+    """A model made by hand is refused by name where a derived one would have been."""
     with pytest.raises(EmissionError, match=rf"^{where}: {re.escape(name)}"):
         gqm.emit(dataclasses.replace(declared("u**2"), **{where: 2 + form}), name="refused")
 
@@ -269,14 +269,14 @@ def test_sympy_expressions_are_refused_where_they_are_declared(form: Callable[[s
 
 @pytest.mark.parametrize("text", ["1e400*u", "1e-400*u"])
 def test_numbers_beyond_doubles_are_refused(text: str) -> None:
-    """Compiled code could hold no such number; the message says how large it is."""
+    """Compiled code cannot hold numbers beyond doubles; the message says how large such a number is."""
     with pytest.raises(EmissionError, match=r"10\*\*\d+ is beyond the range of doubles"):
         gqm.emit(declared(text), name="beyond")
 
 
 @pytest.mark.parametrize("name", ["kepler", "pendulum"])
 def test_each_loop_can_be_vectorised(name: str) -> None:
-    """LLVM checks 128 pairs of rows at most whether they overlap."""
+    """Loops are so short that LLVM, which compares at most 128 pairs of rows for overlap, can vectorise them."""
     text = (ROOT / "generated" / f"{name}.py").read_text(encoding="utf-8")
     for loop in re.findall(r"for i in range\(n\):\n((?: {8}.*\n)+)", text):
         writes = len(re.findall(r"^ +out\[", loop, re.MULTILINE))

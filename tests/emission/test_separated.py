@@ -1,4 +1,4 @@
-"""Potentials as sums of products: what is put together is the potential, and no part has a parameter of its own."""
+"""Potentials as sums of products add up to the potential, and no part has a parameter of its own."""
 
 import pytest
 import sympy as sp
@@ -25,9 +25,9 @@ A, B, G, K = sp.symbols("a b g k", real=True)
     ],
 )
 def test_parts_times_factors_are_the_form(form: sp.Expr, held: set[sp.Symbol], count: int) -> None:
-    """Factors do not depend on the place, nor parts on a parameter that is not held."""
+    """Factors do not depend on the place, and parts depend only on parameters that are held fixed."""
     found: set[sp.Symbol] = set()
-    for _ in range(2):  # what the end of a form holds back, its beginning may have
+    for _ in range(2):  # the beginning of a form may have what its end lacks
         parts = separate(form, S, found)
     assert found == held
     assert len(parts) <= count

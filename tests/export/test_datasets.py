@@ -1,4 +1,4 @@
-"""Motions as tables and as datasets: the numbers of the motion, named, with units and with what they came from."""
+"""Tables and datasets of motions have the numbers of the motion, with names, units and their origin."""
 
 import sys
 from types import ModuleType
@@ -14,13 +14,13 @@ from gqm_sym.export.datasets import VARIABLES
 
 @pytest.fixture(scope="module")
 def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum."""
+    """Return a pendulum."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity(), parameters={"L": 1})
     return gqm.build(model, name="swing", folder=tmp_path_factory.mktemp("display"))
 
 
 def cells(html: str) -> list[list[str]]:
-    """Rows of all tables of a well-formed text."""
+    """Return the rows of all tables of a well-formed text."""
     return [[cell.text or "" for cell in row] for row in ElementTree.fromstring(f"<div>{html}</div>").iter("tr")]
 
 
@@ -37,13 +37,13 @@ def test_a_motion_as_html(circle: ModuleType) -> None:
 
 @pytest.mark.parametrize("launch", [{"lam0": 0}, {"lam0": 0, "v0": 20}, {"lam0": 1, "v0": 1, "t_max": 2}])
 def test_every_kind_has_its_html(circle: ModuleType, launch: dict[str, object]) -> None:
-    """Rest, circulation, and a motion that is followed for a while."""
+    """Rest, circulation, and a motion that is followed for some time have pages."""
     motion = circle.solve(**launch)
     assert ["kind", motion.kind] in cells(motion._repr_html_())
 
 
 def test_events_are_a_tuple_and_a_table(circle: ModuleType) -> None:
-    """They compare as the tuple they are; notebooks show their fields."""
+    """Events compare as the tuple that they are, and notebooks show their fields."""
     motion = circle.solve("5/2")
     for records in (motion.events, motion.legs, motion.events_between(0, 10), circle.solve(0).events):
         assert isinstance(records, tuple)
@@ -69,7 +69,7 @@ def test_dataset(circle: ModuleType) -> None:
 
 
 def test_dataset_without_times(circle: ModuleType) -> None:
-    """Evenly over one period."""
+    """Without times, a dataset has equal steps over one period."""
     motion = circle.solve(1)
     t = motion.to_xarray().t.values
     assert (t[0], t[-1]) == (0.0, motion.period)

@@ -1,4 +1,4 @@
-"""Figures: what they show is what the motion says; files are written in the format asked for."""
+"""Figures show what the motion says, and files are written in the requested format."""
 
 from pathlib import Path
 from types import ModuleType
@@ -10,13 +10,13 @@ import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.figures import animations
 
-# Lengths of lines of 800 pieces, and of the way towards an equilibrium that is reached in no time.
+# The tolerances for lengths of lines of 800 pieces, and for the distance to an equilibrium that is approached.
 SHOWN = 1e-3
 
 
 @pytest.fixture(scope="module")
 def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum that swings so high that its rod pushes and pulls."""
+    """Return a pendulum that swings so high that its rod pushes and pulls."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity(), parameters={"L": 1})
     return gqm.build(model, name="swing", folder=tmp_path_factory.mktemp("figures"))
 
@@ -46,7 +46,7 @@ def test_track(circle: ModuleType) -> None:
 
 
 def test_speed_and_force(circle: ModuleType) -> None:
-    """Speed above, force below, over the arc from turn to turn."""
+    """Speed is above and force below, over the arc from turn to turn."""
     motion = circle.solve(2.5)
     above, below = motion.plot("speed_and_force").axes
     s, speed = above.lines[0].get_data()
@@ -56,7 +56,7 @@ def test_speed_and_force(circle: ModuleType) -> None:
 
 
 def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
-    """The marker stands where contact is lost."""
+    """The marker stands at the place where contact is lost."""
     motion = circle.solve(0.3, 5, contact="above")
     axes = motion.plot().axes[0]
     (mark,) = [line for line in axes.lines if line.get_label() == "liftoff"]
@@ -73,7 +73,7 @@ def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
     ],
 )
 def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str, object], arc: float) -> None:
-    """Rest, circulation, and a motion that takes for ever: each figure shows the arc that is run through."""
+    """Rest, circulation, and a motion without end: each figure shows the arc that is passed."""
     motion = circle.solve(**launch)
     assert motion.kind == kind
     track, speeds, portrait = (motion.plot(what) for what in ("track", "speed_and_force", "portrait"))
@@ -87,7 +87,7 @@ def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str
 
 
 def test_notebooks_show_figures(circle: ModuleType) -> None:
-    """Each is a picture to IPython, without pyplot."""
+    """IPython shows each figure as a picture, without pyplot."""
     for what in ("track", "speed_and_force", "portrait"):
         assert circle.solve(1.0).plot(what)._repr_png_().startswith(b"\x89PNG")
 
@@ -104,13 +104,13 @@ def test_axes_of_the_caller(circle: ModuleType) -> None:
 
 
 def test_an_unknown_figure(circle: ModuleType) -> None:
-    """The message lists what there is."""
+    """The message lists the figures that there are."""
     with pytest.raises(InputError, match="plot: what: must be one of track, speed_and_force, portrait, got 'map'"):
         circle.solve(1.0).plot("map")
 
 
 def test_animation(circle: ModuleType, tmp_path: Path) -> None:
-    """A GIF of as many frames as asked for."""
+    """A GIF has as many frames as requested."""
     animations.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
     assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF89a")
     with pytest.raises(InputError, match="duration: must be positive"):

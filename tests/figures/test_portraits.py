@@ -1,4 +1,4 @@
-"""Figures of models: their curves are the energies' own, and the separatrices pass through the equilibria."""
+"""The curves in figures of models have their energies, and separatrices pass through the equilibria."""
 
 from pathlib import Path
 from types import ModuleType
@@ -14,27 +14,27 @@ G = 9.81
 
 @pytest.fixture(scope="module")
 def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The pendulum, 0 at the bottom."""
+    """Return the pendulum, with 0 at the bottom."""
     model = gqm.derive(gqm.families.circle(), gqm.Gravity(), parameters={"L": 1})
     return gqm.build(model, name="swing", folder=tmp_path_factory.mktemp("portraits"))
 
 
 @pytest.fixture(scope="module")
 def wells(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """Two wells of unequal depth, and no ends."""
+    """Return two wells of unequal depth on an endless curve."""
     model = gqm.derive(gqm.Curve.graph("x**4 - 2*x**2 + x/4"), gqm.Gravity())
     return gqm.build(model, name="wells", folder=tmp_path_factory.mktemp("portraits"))
 
 
 def curves(figure: object, label: str) -> list[np.ndarray]:
-    """Points of the lines of a label, both branches."""
+    """Return points of the lines of a label, on both branches."""
     (axes,) = figure.axes  # type: ignore[attr-defined]
     named = [k for k, line in enumerate(axes.lines) if line.get_label() == label]
     return [axes.lines[i].get_xydata() for k in named for i in (k, k + 1)]
 
 
 def test_separatrix_of_the_pendulum(circle: ModuleType) -> None:
-    """The separatrix is V = 2*sqrt(g)*|cos(theta/2)|, through the tops, where the body could rest."""
+    """The separatrix is V = 2*sqrt(g)*|cos(theta/2)|, through the tops, at which the body could rest."""
     figure = gqm.figures.phase_portrait(circle)
     branches = curves(figure, "separatrix")
     assert len(branches) == 4
@@ -48,7 +48,7 @@ def test_separatrix_of_the_pendulum(circle: ModuleType) -> None:
 
 
 def test_level_stretches_have_no_equilibria(tmp_path: Path) -> None:
-    """On a rail with a loop the top is one; on the straight pieces a body may rest anywhere, and no place is marked."""
+    """The top of a loop is marked; on straight level pieces a body may rest anywhere, and no place is marked."""
     rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="2*pi"), gqm.line(length=2)])
     module = gqm.build(gqm.derive(rail, gqm.Gravity()), name="loop", folder=tmp_path)
     (axes,) = gqm.figures.phase_portrait(module).axes
@@ -65,7 +65,7 @@ def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:
     def height(x: np.ndarray) -> np.ndarray:
         return x**4 - 2 * x**2 + x / 4
 
-    # Between places of the grid turning points lie on chords: off by at most h''*step**2/8, times 2g.
+    # Between places of the grid turning points lie on chords, with an error of at most h''*step**2/8, times 2g.
     chord = G * 44 * (4 / 1600) ** 2 / 4
     for x, v in map(np.transpose, curves(figure, "separatrix")):
         inside = np.isfinite(v)
@@ -103,7 +103,7 @@ def test_what_cannot_be_drawn(options: dict, error: type[Exception], said: str, 
 
 
 def test_period_against_amplitude(circle: ModuleType) -> None:
-    """Amplitudes are in rising order along the arc, with the periods of the motions themselves; L scales them."""
+    """Amplitudes along the arc are in ascending order, with the periods of the motions themselves; L scales them."""
     figure = gqm.figures.period_against_amplitude(circle, [2, 1, "pi", "-1/2"], L=4)
     (line,) = figure.axes[0].lines
     amplitude, period = line.get_data()
@@ -114,7 +114,7 @@ def test_period_against_amplitude(circle: ModuleType) -> None:
 
 
 def test_equal_periods_look_equal(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """On the tautochrone the axis does not blow rounding up to the size of the figure."""
+    """On the tautochrone the axis does not magnify rounding to the size of the figure."""
     model = gqm.derive(gqm.families.cycloid(inverted=True), gqm.Gravity(), parameters={"R": 1})
     cycloid = gqm.build(model, name="tautochrone", folder=tmp_path_factory.mktemp("portraits"))
     (axes,) = gqm.figures.period_against_amplitude(cycloid, [0.5, 1, 2, 3]).axes
@@ -123,7 +123,7 @@ def test_equal_periods_look_equal(tmp_path_factory: pytest.TempPathFactory) -> N
 
 
 def test_portrait_of_a_motion(wells: ModuleType) -> None:
-    """It reaches somewhat beyond the orbit, which it shows."""
+    """The portrait of a motion shows its orbit, and somewhat more."""
     motion = wells.solve(-1.2, 1, -1)
     (axes,) = motion.plot("portrait").axes
     low, high = axes.get_xlim()
@@ -134,7 +134,7 @@ def test_portrait_of_a_motion(wells: ModuleType) -> None:
 
 
 def test_a_launch_in_another_round_is_drawn_in_this_one(circle: ModuleType) -> None:
-    """Three rounds on is the same place."""
+    """A launch three rounds away is drawn at the same place."""
     drawn = []
     for place in (0.5, 0.5 + 6.0 * np.pi, 0.5 - 4.0 * np.pi):
         (axes,) = gqm.figures.phase_portrait(circle, levels=1, through=[(place, 2)]).axes
@@ -145,7 +145,7 @@ def test_a_launch_in_another_round_is_drawn_in_this_one(circle: ModuleType) -> N
 
 
 def test_a_range_without_a_curve(tmp_path: Path) -> None:
-    """Where the curve is not real there is nothing to draw."""
+    """A range in which the curve is not real cannot be drawn."""
     module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
     with pytest.raises(SolutionError, match="the energy is finite nowhere in the range; give another lam"):
         gqm.figures.phase_portrait(module, (-3, -1))

@@ -15,7 +15,7 @@ from gqm_sym.errors import InputError
 
 @pytest.fixture(scope="module")
 def hills(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A closed track with three hills, banked for 14 m/s."""
+    """Return a closed track with three hills, banked for 14 m/s."""
     track = gqm.Curve.space(
         x="40*cos(u)", y="60*sin(u)", z="6*cos(3*u)", parameter="u", roll=("coordinated", 14), heartline="1.1"
     )
@@ -23,7 +23,7 @@ def hills(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 
 def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
-    """Track and loads are those of states, the colours are the vertical load, limits stand where they were given."""
+    """Track and loads are those of states, the colours are the vertical load, and limits are drawn at their values."""
     motion = hills.solve(0, 10)
     figure = gqm.figures.ride(motion, limits={"vertical": (-1, 5), "lateral": 1.5})
     view, plan, elevation, felt = (axes for axes in figure.axes if axes.get_ylabel() != "vertical load (9.80665 m/s²)")
@@ -44,7 +44,7 @@ def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
 
 
 def test_seats_and_their_animation(tmp_path: Path) -> None:
-    """Loads of three cars stand against the places of these; the frames of an animation show all cars in space."""
+    """Loads of three cars are drawn against their places; the frames of an animation show all cars in space."""
     track = gqm.Curve.space(
         x="40*cos(u)", y="60*sin(u)", z="6*cos(3*u)", parameter="u", roll=("coordinated", 14), heartline="1.1"
     )
@@ -78,7 +78,7 @@ def test_seats_and_their_animation(tmp_path: Path) -> None:
     ],
 )
 def test_bad_limits(hills: ModuleType, limits: Any, message: str) -> None:
-    """One error says what is wrong."""
+    """Each bad limit is refused with a reason."""
     with pytest.raises(InputError, match=message):
         gqm.figures.ride(hills.solve(0, 10), limits=limits)
 

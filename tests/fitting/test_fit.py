@@ -1,4 +1,6 @@
-"""Fits against the parameters that made the measurements, closed forms, and what data cannot tell."""
+"""Fits agree with the parameters that made the measurements and with closed forms, and say what data do not
+determine.
+"""
 
 from pathlib import Path
 from types import ModuleType
@@ -27,13 +29,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pendulum(folder: Path) -> ModuleType:
-    """A pendulum, of one metre unless said otherwise; its angle is counted from below."""
+    """Return a pendulum, of one metre unless given otherwise; its angle is measured from the bottom."""
     return gqm.build(gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="fitted_pendulum", folder=folder)
 
 
 @pytest.fixture(scope="module")
 def spring(folder: Path) -> ModuleType:
-    """A body on a level line with a spring and dry friction."""
+    """Return a body on a level line with a spring and dry friction."""
     force = gqm.Gravity() + gqm.Potential("k*x**2/2", parameters={"k": 40}) + gqm.CoulombFriction(mu="1/10")
     return gqm.build(gqm.derive(gqm.Curve.graph("0*x"), force), name="fitted_spring", folder=folder)
 
@@ -68,18 +70,18 @@ def test_data_without_noise_are_met(pendulum: ModuleType) -> None:
 
 
 def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) -> None:
-    """Periods at many amplitudes tell the length if g is known; a DataFrame, and quantities, are taken."""
+    """Periods at many amplitudes determine the length if g is known; a DataFrame and quantities are accepted."""
     lam0 = np.linspace(0.1, 2.8, 12)
     period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
     found = gqm.fit(pendulum, pd.DataFrame({"lam0": lam0, "period": period, "sigma": 1e-3}), {"L": None})
     assert found.estimates["L"] == pytest.approx(1.3, rel=1e-14)
-    # T ~ sqrt(L), so dT/dL = T/(2 L).
+    # T is in proportion to sqrt(L), so dT/dL = T/(2 L).
     assert found.std["L"] == pytest.approx(1e-3 * 2.6 / np.linalg.norm(period), rel=1e-9)
     degrees = {"lam0": np.rad2deg(lam0) * u.deg, "period": period * 1e3 * u.ms}
     assert gqm.fit(pendulum, degrees, {"L": 1.2}).estimates["L"] == pytest.approx(1.3, rel=1e-13)
 
 
-def test_what_periods_cannot_tell(pendulum: ModuleType) -> None:
+def test_what_periods_cannot_determine(pendulum: ModuleType) -> None:
     """Periods determine only g/L: the result says so, and neither number has a finite standard deviation."""
     lam0 = np.linspace(0.1, 2.8, 12)
     period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
@@ -92,7 +94,7 @@ def test_what_periods_cannot_tell(pendulum: ModuleType) -> None:
 
 @pytest.mark.parametrize("launch", [{"lam0": 0.8, "v0": 0.3}, {"lam0": -3.0, "v0": 9.0}])
 def test_passages(pendulum: ModuleType, launch: dict[str, float]) -> None:
-    """Through the lowest point, of swings and of rounds; and through two places in turn."""
+    """Passages through the lowest point, of swings and of rounds, and through two places in turn are fitted."""
     true = pendulum.solve(**launch, L=1.3)
     period = true.period if true.kind == "libration" else 2.0 * true.period
     first = true.time_at(0)
@@ -106,7 +108,9 @@ def test_passages(pendulum: ModuleType, launch: dict[str, float]) -> None:
 
 
 def test_friction(spring: ModuleType) -> None:
-    """Amplitudes of a spring with dry friction fall by 2 mu g/k a half swing; after ten seconds the body rests."""
+    """Amplitudes of a spring with dry friction decrease by 2 mu g/k in a half swing; after ten seconds the body
+    rests.
+    """
     mu, k, start = 0.1, 40.0, 1.0
     rate, offset = np.sqrt(k), mu * 9.81 / k
     t = np.linspace(0.0, 8.0, 200)
@@ -119,7 +123,8 @@ def test_friction(spring: ModuleType) -> None:
     found = gqm.fit(spring, {"t": t, "x": x}, {"mu": (0, 0.09, 1), "k": (30, 39.9, 50)}, lam0=start)
     assert found.estimates == pytest.approx({"mu": mu, "k": k}, rel=1e-12)
     assert _until_rest(spring.solve(1), np.array([5.0, 12.0])) == pytest.approx([5.0, last * np.pi / rate], rel=1e-14)
-    # Through the place of equilibrium of swings to the left: in the middle of these, and later on the swings back.
+    # These are passages through the equilibrium place of swings to the left, which lies in their middle and later on
+    # the swings back.
     n = np.arange(5)
     half = np.where(n % 2, np.arccos(-2.0 * offset / (start - (2.0 * n + 1.0) * offset)), 0.5 * np.pi)
     data = {"passages": (n * np.pi + half) / rate, "place": offset}
@@ -201,7 +206,7 @@ def test_what_cannot_be_fitted_is_refused(case: str, pendulum: ModuleType) -> No
 
 
 def test_what_is_shown(pendulum: ModuleType) -> None:
-    """Text, a table for a notebook and a figure."""
+    """A result shows itself as text, as a table for a notebook and as a figure."""
     data = {"lam0": [0.5, 1.0], "period": [2.3, 2.4], "sigma": 0.02}
     found = gqm.fit(pendulum, data, {"L": 1.2})
     assert "L  1." in str(found)

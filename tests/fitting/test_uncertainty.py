@@ -1,4 +1,4 @@
-"""Uncertain answers against closed forms, and what is refused."""
+"""Uncertain answers agree with closed forms, and impossible questions are refused."""
 
 from types import ModuleType
 
@@ -14,7 +14,7 @@ from gqm_sym.fitting.result import Fit
 
 
 def test_of_a_length() -> None:
-    """T = sqrt(L)*f(amplitude): the linear deviation, and mean and deviation of what was drawn."""
+    """For T = sqrt(L)*f(amplitude) the linear deviation is right, and so are mean and deviation of the sample."""
     found = gqm.uncertainty(pendulum, "period", {"L": (1.0, 0.02)}, lam0=1.2, samples=20_000)
     period = 4.0 * np.sqrt(1 / 9.81) * ellipk(np.sin(0.6) ** 2)
     assert found.linear == pytest.approx((period, 0.5 * period * 0.02), rel=1e-14)
@@ -29,7 +29,7 @@ def test_of_a_length() -> None:
 
 
 def test_of_several_numbers() -> None:
-    """Independent numbers add their squares; quantities with units are converted; text and repr show both."""
+    """Independent numbers add their squares; quantities with units are converted; text and repr show both results."""
     angle = 1.2
     m = np.sin(0.5 * angle) ** 2
     period = 4.0 * np.sqrt(1 / 9.81) * ellipk(m)
@@ -45,7 +45,7 @@ def test_of_several_numbers() -> None:
 
 
 def test_where_there_is_no_gradient() -> None:
-    """Without a gradient difference quotients are used: v_max of a motion with friction is the launch speed."""
+    """Without a gradient difference quotients are used; v_max of a motion with friction is the launch speed."""
     found = gqm.uncertainty(rough, "v_max", {"v0": (2.0, 0.1)}, lam0=0.0, mu=0.2, L=1, samples=500)
     assert found.linear == pytest.approx((2.0, 0.1), rel=1e-9)
     assert found.sampled.std == pytest.approx(0.1, rel=0.15)
@@ -54,7 +54,7 @@ def test_where_there_is_no_gradient() -> None:
 
 
 def test_draws_without_an_answer() -> None:
-    """Some launches near the top go round, and have no half period."""
+    """Some launches near the top are circulations, which have no half period."""
     found = gqm.uncertainty(pendulum, "half_period", {"v0": (6.2, 0.05)}, lam0=0.0, L=1, samples=2000)
     assert found.missing > 100
     assert f"{found.missing} more draws have no half_period" in str(found)

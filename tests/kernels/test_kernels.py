@@ -1,4 +1,4 @@
-"""Force laws: slots that add, names that must not clash."""
+"""The slots of force laws add up, and their names must not clash."""
 
 import pytest
 import sympy as sp
@@ -25,7 +25,7 @@ mu, b, gamma, ell_c = (sp.Symbol(name, real=True) for name in ("mu", "b", "gamma
 
 
 def test_gravity_has_the_exact_default():
-    """It is 9.81, exactly: text, not its nearest double."""
+    """The default is exactly 9.81, not the nearest double."""
     assert Gravity().potential == g * z
     assert Gravity().defaults == (("g", "9.81"),)
 
@@ -49,7 +49,7 @@ def test_slots_add():
 
 
 def test_adding_is_associative():
-    """Whichever sum is formed first."""
+    """The sum is the same whichever part of it is formed first."""
     terms = Gravity(), Rolling(), CentralForce()
     assert (terms[0] + terms[1]) + terms[2] == terms[0] + (terms[1] + terms[2])
 
@@ -75,7 +75,7 @@ def test_a_name_that_means_two_things_is_refused(add):
 
 
 def test_curve_and_kernel_must_not_share_a_name():
-    """The ellipse's b and another b."""
+    """A curve and a kernel must not use one name for two things, as the ellipse's b and another b."""
     with pytest.raises(DeclarationError, match=r"'b'.*another name"):
         derive(families.ellipse(), Potential("b*z"))
     with pytest.raises(DeclarationError, match="theta"):
@@ -90,14 +90,14 @@ def test_a_centre_is_two_numbers(centre):
 
 
 def test_a_centre_may_have_units():
-    """Its coordinates are lengths (the unit was refused)."""
+    """The coordinates of a centre are lengths and may have units (the unit was refused)."""
     assert CentralForce(centre=("50 cm", "1 m")) == CentralForce(centre=("1/2", 1))
     with pytest.raises(InputError, match="must be in m"):
         CentralForce(centre=("2 s", 0))
 
 
 def test_only_kernels_add():
-    """Anything else is a TypeError, as Python's own."""
+    """Adding anything else raises a TypeError, like Python's own."""
     with pytest.raises(TypeError):
         Gravity() + 1
 
@@ -112,7 +112,7 @@ def test_only_kernels_add():
     ],
 )
 def test_the_force_along_a_curve_is_minus_the_gradient(kernel: Kernel, potential):
-    """A = F·t and n₀ = -F·n with F = -∇U, on z = sinh(x), by SymPy's own derivatives."""
+    """On z = sinh(x), A is F·t and n₀ is -F·n with F = -∇U, by SymPy's own derivatives."""
     model = derive(Curve.graph("sinh(x)"), kernel)
     place = {x: sp.Rational(7, 10), Omega: 2, k: 3, g: sp.Rational(981, 100)}
     push = [-sp.diff(potential, along).subs(z, sp.sinh(x)).subs(place).evalf(40) for along in (x, z)]
@@ -141,11 +141,11 @@ def test_the_table_of_kernels_makes_each_of_them():
         assert row.summary
 
 
-# What is lost on the way --------------------------------------------------------------------------
+# Forces with losses --------------------------------------------------------------------------
 
 
 def test_lossy_slots_add() -> None:
-    """Each force fills its own."""
+    """Each force fills its own slot."""
     law = Gravity() + CoulombFriction(mu_static="mu_s") + QuadraticDrag() + SurfaceTension() + Kernel.law("k*W")
     assert (law.friction, law.static_friction) == (mu, sp.Symbol("mu_s", real=True))
     assert (law.drag, law.resistance) == (b / MASS, gamma * ell_c**2 * sp.Abs(KAPPA) / MASS)
@@ -156,7 +156,7 @@ def test_lossy_slots_add() -> None:
 
 
 def test_static_friction_is_that_of_sliding_if_nothing_is_said() -> None:
-    """One parameter, not two."""
+    """If static friction is not given, both coefficients are one parameter."""
     law = CoulombFriction(mu="mu_rail")
     assert law.parameters == ("mu_rail",)
     assert law.friction == law.static_friction == sp.Symbol("mu_rail", real=True)
@@ -206,7 +206,9 @@ def test_defaults_out_of_their_range_are_refused(parameters, message) -> None:
 
 
 def test_a_law_knows_the_curve_s_parameter_and_coordinates() -> None:
-    """The curve's own parameter comes first; x and z are the place; the rest are run-time parameters."""
+    """In a law, the curve's own parameter comes first, x and z are the place, and other names are run-time
+    parameters.
+    """
     law = Gravity() + Kernel.law("q*theta + k*z*W - direction*x")
     assert law.parameters == ("g", "q", "theta", "k")
     model = derive(families.circle(), law)
@@ -241,8 +243,8 @@ def test_a_law_that_is_infinite_at_rest_is_refused() -> None:
         derive(families.circle(), Gravity() + Kernel.law("-k*direction/sqrt(W)"))
 
 
-def test_a_turning_track_is_loaded_sideways() -> None:
-    """On a turning track the Coriolis force acts sideways: N_b = 2 m Ω V dx/ds."""
+def test_the_load_across_a_rotating_track() -> None:
+    """On a rotating track the Coriolis force acts sideways: N_b = 2 m Ω V dx/ds."""
     model = derive(families.circle(), Gravity() + RotatingFrame())
     v = model.side_force / (2 * MASS * Omega * model.dxds)
     assert sp.simplify(v**2 - sp.Symbol("direction", real=True) ** 2 * model.speed_squared) == 0
@@ -261,7 +263,7 @@ def test_a_turning_track_is_loaded_sideways() -> None:
     ],
 )
 def test_an_old_name_says_the_new_one(owner, old, new):
-    """A name of before raises an AttributeError with the new name, and any other an ordinary one."""
+    """An earlier name raises an AttributeError with the new name, and any other an ordinary one."""
     with pytest.raises(AttributeError, match=rf"{old!r}; it is called '(2\*)?{new}' now$"):
         getattr(owner, old)
     with pytest.raises(AttributeError, match=r"has no attribute 'other'$"):

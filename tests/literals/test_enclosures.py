@@ -1,4 +1,4 @@
-"""Values of trees without names: exact, or enclosed as narrowly as asked, or refused."""
+"""Values of trees without names are exact, or enclosed as narrowly as requested, or refused."""
 
 from fractions import Fraction
 
@@ -15,7 +15,7 @@ CHUNK, MOST = 390, 900
 
 
 def value(text: str) -> Fraction | tuple[Fraction, Fraction]:
-    """The value of a text: exact, or both ends of what encloses it."""
+    """Return the value of a text: exact, or both ends of its enclosure."""
     found = enclose(parse(text, where="w"), BITS, where="w")
     if isinstance(found, Fraction):
         return found
@@ -24,7 +24,7 @@ def value(text: str) -> Fraction | tuple[Fraction, Fraction]:
 
 
 def less_its_digits(count: int) -> str:
-    """Pi less its first digits, so many behind the point: from 10**-count on."""
+    """Return the text of pi less its first ``count`` decimals, of which a number below 10**-count remains."""
     with mp.workdps(count + 20):
         digits = str(int(mp.pi * mp.mpf(10) ** count))
     terms = ["pi"]
@@ -46,7 +46,7 @@ def test_rational_numbers_are_exact(text: str, exact: Fraction) -> None:
 
 @pytest.mark.parametrize("count", [230, 1200])
 def test_what_is_left_of_pi(count: int) -> None:
-    """Its digits from some place on, enclosed to as many bits as any other number."""
+    """The digits of pi from some place on are enclosed to as many bits as any other number."""
     low, high = value(less_its_digits(count))
     with mp.workdps(count + 400):
         left = mp.pi - mp.floor(mp.pi * mp.mpf(10) ** count) / mp.mpf(10) ** count
@@ -55,7 +55,7 @@ def test_what_is_left_of_pi(count: int) -> None:
 
 
 def test_cube_roots() -> None:
-    """The real one, of negative numbers too; its cube encloses the number."""
+    """A cube root is the real one, of negative numbers too; the cube of its enclosure contains the number."""
     low, high = value("cbrt(2)")
     assert low**3 < 2 < high**3
     assert value("cbrt(-2)") == (-high, -low)
@@ -66,33 +66,35 @@ def test_cube_roots() -> None:
     [
         ("0**(-sqrt(2))", "column 2: division by zero"),
         ("q + pi", "'q' is not a number"),
-        # Too near zero to tell its digits, and yet not equal to it; beyond 4096 bits it is.
+        # This is too near to zero to tell its digits at first; beyond 4096 bits it counts as zero.
         (less_its_digits(1240), "its digits cancel; write it in another form"),
-        # Of an argument of 1100 digits few are left behind the point.
+        # Of an argument of 1100 digits few are left after the point.
         (" - ".join(["sin(10**900*10**200*sqrt(2))"] * 2), "its digits cancel"),
     ],
     ids=["pole", "name", "pi", "sine"],
 )
 def test_what_has_no_value(text: str, message: str) -> None:
-    """It is said where, and why."""
+    """If a text has no value, the error says where, and why."""
     with pytest.raises(ExpressionError, match=f"^w: .*{message}|^w: {message}"):
         value(text)
 
 
 def test_equal_to_all_digits_that_are_tried() -> None:
-    """Beyond the last precision two numbers are the same."""
+    """Two numbers that agree to the last precision tried count as equal."""
     assert value(less_its_digits(1300)) == 0
 
 
 def test_nothing_is_taken_for_growing_unknown() -> None:
-    """A function that has no bounds yet is refused, not enclosed by its values at the ends."""
+    """A function without known bounds is refused; it is not enclosed by its values at the ends."""
     with pytest.raises(ValueError, match="unknown function 'gamma'"):
         _Enclosures(BITS, last=True).call("gamma", Fraction(1, 3))
 
 
 @pytest.mark.parametrize("number", [libmp.finf, libmp.fninf, libmp.fnan])
 def test_what_is_not_finite_is_beyond_all_sizes(number: tuple[int, int, int, int]) -> None:
-    """A library writes them with a mantissa of zero; they are no zeros."""
+    """Values that are not finite are larger than all sizes; a library writes them with a mantissa of zero, but they are
+    no zeros.
+    """
     assert _scale(number) > MAX_SCALE
     with pytest.raises(ValueError, match="far outside the range"):
         _Enclosures(BITS, last=False).checked((number, number))

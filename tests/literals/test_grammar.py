@@ -12,14 +12,14 @@ from gqm_sym.errors import ExpressionError, GQMError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, MAX_LENGTH, parse
 from gqm_sym.literals.trees import evaluate
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=10)
 
 VALUES = {"x": Fraction(3, 7), "L": Fraction(-5, 2), "a_1": Fraction(11)}
 
 
 class Rationals:
-    """A small algebra of its own: Fractions, with values for three names."""
+    """A small algebra of fractions, with values for three names."""
 
     def number(self, value):
         return value
@@ -248,7 +248,7 @@ def test_hostile_text_gives_a_tree_or_one_clear_error(text):
 
 
 def _spelled(children):
-    """Texts of sums, products and powers with every parenthesis written, and their meaning."""
+    """Yield texts of sums, products and powers with every parenthesis written, and their meaning."""
     pair = st.tuples(children, children)
     return st.one_of(
         pair.map(lambda p: (f"({p[0][0]} + {p[1][0]})", p[0][1] + p[1][1])),
@@ -283,7 +283,7 @@ def test_chains_agree_with_python(operators, data):
     """Without parentheses, precedence and association must be Python's."""
     numbers = data.draw(st.lists(st.integers(1, 9), min_size=len(operators) + 1, max_size=len(operators) + 1))
     text = str(numbers[0])
-    # Slow and obvious: products first, then sums, from the left.
+    # This is slow and simple: products first, then sums, from the left.
     terms = [Fraction(numbers[0])]
     for operator, number in zip(operators, numbers[1:], strict=True):
         text += f" {operator} {number}"
@@ -306,7 +306,7 @@ def test_limits_themselves_are_allowed():
 
 
 def test_columns_point_into_the_text():
-    """A node must remember where it stood, for those who report more about it later."""
+    """A node must remember its column, for later messages about it."""
     tree = parse("1 + sin(x)/0.5", where="t")
     found = {
         getattr(node, "id", getattr(node, "value", None)): node.col_offset
@@ -316,7 +316,7 @@ def test_columns_point_into_the_text():
     assert found == {Fraction(1): 0, "x": 8, Fraction(1, 2): 11}
 
 
-def test_trouble_in_an_algebra_is_told_with_its_column():
+def test_an_error_in_an_algebra_has_its_column():
     """A refusal by an algebra must be reported at the operand that caused it."""
     with pytest.raises(ExpressionError, match="t: column 10: "):
         evaluate(parse("1 + 2/(x - x)", where="t"), Rationals(), where="t")

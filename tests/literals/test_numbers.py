@@ -1,4 +1,4 @@
-"""Numbers mean exactly what is written, whatever they are written as."""
+"""Numbers mean exactly what is written, in whatever form."""
 
 import copy
 import math
@@ -21,21 +21,21 @@ from gqm_sym.errors import GQMError, NumberError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
 from gqm_sym.literals.numbers import Number, read_number, read_numbers
 
-# Against a reader that hangs, not against a busy machine.
+# This limit detects a reader that hangs; a busy machine does not reach it.
 NO_HANG = timedelta(seconds=20)
 
-# More digits than any case below cancels.
+# These are more digits than any case below cancels.
 TRUTH = mpmath.mp.clone()
 TRUTH.prec = 1500
 
 
 def name_of(given):
-    """Name of a case: its text, or its type for what cannot be printed."""
+    """Return the name of a case: its text, or its type if it cannot be printed."""
     return given[:40] if isinstance(given, str) else f"{type(given).__name__} {given!s:.30}"
 
 
 def halves(exact):
-    """Both halves of a double-double, from an mpf of many digits, by rounding twice."""
+    """Return both halves of a double-double, from an mpf of many digits, by rounding twice."""
     value = float(exact)
     return value, float(exact - value)
 
@@ -70,7 +70,7 @@ def halves(exact):
     ids=repr,
 )
 def test_rational_numbers_are_kept_exactly(given, fraction):
-    """The fraction is the number, the double its nearest, ``low`` the nearest of the rest."""
+    """The fraction is the number, the double is the nearest to it, and ``low`` is the nearest to the remainder."""
     number = read_number(given, where="lam0")
     assert number.fraction == fraction
     assert number.value == float(fraction)
@@ -115,7 +115,7 @@ def test_irrational_numbers_are_rounded_once(given, truth):
     assert number.fraction is None
     exact = truth(TRUTH)
     if isinstance(given, str) and given.startswith("pi - 3.14"):
-        # The truth was typed in, to 17 digits.
+        # The expected value was typed in, to 17 digits.
         assert number.value == float(exact)
         return
     assert (number.value, number.low) == halves(exact)
@@ -221,7 +221,7 @@ def test_a_tie_between_two_doubles_goes_to_the_even_one():
     ids=name_of,
 )
 def test_what_is_no_finite_real_number_is_refused(given, message):
-    """One clear line each, that names the place and never takes long."""
+    """Each such value is refused quickly with one clear line that names its place."""
     with pytest.raises(NumberError) as caught:
         read_number(given, where="lam0")
     assert str(caught.value).startswith("lam0: ")
@@ -269,17 +269,17 @@ def test_values_agree_with_mpmath(grown):
         truth = compute()
     except (ZeroDivisionError, ValueError, OverflowError):
         truth = None
-    # A cube root of a negative number is complex to mpmath; a zero may be true or all rounding.
+    # For mpmath a cube root of a negative number is complex, and a zero may be exact or pure rounding.
     assume(truth is not None and isinstance(truth, TRUTH.mpf) and TRUTH.isfinite(truth))
     assume(1e-100 < abs(truth) < 1e300)
     try:
         number = read_number(text, where="t")
     except NumberError:
-        # Refused for its size on the way, or an exact zero where mpmath has but a small number.
+        # The number is refused for the size of a part, or it is an exact zero where mpmath has a small number.
         assume(False)
     value, low = halves(truth)
     assert number.value == value
-    # tanh(314) equals 1 to 200 digits, so nothing beyond 1 is held; ``at`` still knows better.
+    # tanh(314) equals 1 to 200 digits, so nothing beyond 1 is stored; ``at`` still has the exact value.
     assert number.low == low or abs(number.low - low) < abs(value) * 2.0**-690
     if number.fraction is None:
         assert number.at(mpmath.mp) == mpmath.mpf(truth)
@@ -398,7 +398,7 @@ def test_in_interval_arithmetic_the_number_is_enclosed(text):
     ids=str,
 )
 def test_many_numbers_at_once_are_those_read_one_by_one(given):
-    """Ranges, lists and arrays: what doubles hold is read at once, with the same values, remainders and shape."""
+    """Ranges, lists and arrays of doubles are read at once, with the same values, remainders and shape."""
     high, low, shape = read_numbers(given, where="t")
     each = [read_number(v, where="t") for v in np.asarray(given, dtype=object).reshape(-1)]
     assert high.tolist() == [number.value for number in each]
@@ -417,13 +417,13 @@ def test_what_is_among_many_numbers_and_none_is_refused(given):
     "given", [range(10**6), [0.1] * 10**6, [7] * 10**6, np.arange(10**6)], ids=lambda g: str(type(g))
 )
 def test_many_doubles_are_not_read_one_by_one(given, monkeypatch):
-    """Ten million times from a range took 20 s."""
+    """Ten million times from a range are read quickly (it took 20 s)."""
     monkeypatch.setattr("gqm_sym.literals.numbers.read_number", None)
     assert read_numbers(given, where="t")[0].size == 10**6
 
 
 def test_numbers_are_values():
-    """Equal when they mean the same; hashed, copied, pickled; never changed; read as they are."""
+    """Numbers are equal if they mean the same; they can be hashed, copied and pickled, and never change."""
     half = read_number("1/2", where="t")
     assert half == read_number(0.5, where="t") == read_number(Fraction(1, 2), where="t")
     assert hash(half) == hash(read_number(0.5, where="t"))

@@ -1,4 +1,4 @@
-"""Quantities of pint, and texts with units, as numbers: converted exactly, or refused with the remedy."""
+"""Quantities of pint and texts with units are converted to numbers exactly, or refused with the remedy."""
 
 import pickle
 import subprocess
@@ -43,7 +43,7 @@ u = pint.UnitRegistry()
     ],
 )
 def test_conversions_are_exact(given: object, unit: str, exact: Fraction) -> None:
-    """A float means its binary value, and everything else what it says."""
+    """A float means its binary value, and any other input exactly what it says."""
     assert read_number(given, where="it", unit=unit).fraction == exact
 
 
@@ -51,7 +51,7 @@ def test_conversions_are_exact(given: object, unit: str, exact: Fraction) -> Non
     "given", [30 * u.deg, 30.0 * u.deg, "30 deg", "30 \u00b0", "30\u00b0", "30deg", 1800 * u.arcmin]
 )
 def test_degrees(given: object) -> None:
-    """They become numbers with pi in them, known to any number of digits."""
+    """Degrees become numbers with a factor pi, known to any number of digits."""
     number = read_number(given, where="it", unit="1")
     with mp.workdps(50):
         assert abs(number.at(mp) - mp.pi / 6) < mp.mpf(10) ** -48
@@ -103,7 +103,7 @@ def test_another_dimension_is_refused(given: object) -> None:
 
 
 def test_where_no_dimension_is_known() -> None:
-    """The remedy is a plain number."""
+    """If no dimension is known, the remedy is a plain number."""
     with pytest.raises(NumberError, match=r"k: a unit is not known for it, got meter; give a plain number"):
         read_number(3 * u.m, where="k")
     with pytest.raises(NumberError, match="not a finite number"):
@@ -114,13 +114,13 @@ def test_where_no_dimension_is_known() -> None:
 
 @pytest.fixture(scope="module")
 def pendulum() -> Model:
-    """A circle."""
+    """Return a circle."""
     return gqm.derive(gqm.families.circle(L=50 * u.cm), gqm.Gravity(g="981 cm/s**2"))
 
 
 @pytest.fixture(scope="module")
 def swing(pendulum: Model, tmp_path_factory: pytest.TempPathFactory) -> object:
-    """Its module."""
+    """Return the circle's module."""
     return gqm.build(pendulum, name="swing", folder=tmp_path_factory.mktemp("units"))
 
 
@@ -134,7 +134,7 @@ def test_defaults(pendulum: Model) -> None:
 
 
 def test_launch_and_motion(swing: object) -> None:
-    """`solve`, times, places and parameters; the answers are those of plain numbers."""
+    """`solve`, times, places and parameters accept units, and the answers are those of plain numbers."""
     measured = swing.solve(30 * u.deg, "36 km/h", t_max=1 * u.min, L=50 * u.cm, m="200 g")  # type: ignore[attr-defined]
     plain = swing.solve("pi/6", 10, t_max=60, L="1/2", m="1/5")  # type: ignore[attr-defined]
     assert measured.lam(500 * u.ms) == plain.lam("1/2")
@@ -146,7 +146,7 @@ def test_launch_and_motion(swing: object) -> None:
 
 
 def test_load_maps_and_sweeps(swing: object) -> None:
-    """Arrays of quantities, a list of texts, and places that are asked about."""
+    """Arrays of quantities, a list of texts and the places of an arrival are accepted."""
     given = swing.pass1([10, 20] * u.deg, 30 * u.deg)  # type: ignore[attr-defined]
     plain = swing.pass1(["pi/18", "pi/9"], "pi/6")  # type: ignore[attr-defined]
     assert all(np.array_equal(*both) for both in zip(given, plain, strict=True))
@@ -201,7 +201,7 @@ def test_declarations_are_checked() -> None:
 
 
 def test_points() -> None:
-    """Arrays of quantities, pairs of them, and two arrays."""
+    """Points may be arrays of quantities, pairs of them, or two arrays."""
     plain = gqm.Curve.sampled([(0, 1), (1, 0), (2, 1)], kind="linear")
     for given in (
         gqm.Curve.sampled(np.array([[0, 100], [100, 0], [200, 100]]) * u.cm, kind="linear"),
@@ -215,7 +215,7 @@ def test_points() -> None:
 
 
 def test_a_pint_that_is_not_needed_is_not_imported() -> None:
-    """Reading plain numbers and SI units costs no import."""
+    """Reading plain numbers and SI units does not import pint."""
     code = (
         "import sys; from gqm_sym.literals.numbers import read_number as r; r(1.5, where='a', unit='s'); "
         "r('3/4', where='a', unit='s'); r('3 m', where='a', unit='m'); assert 'pint' not in sys.modules"

@@ -11,7 +11,7 @@ from gqm_sym.runtime.compiled.stamps import FOLDER
 
 
 def test_every_entry_point_is_found() -> None:
-    """The files with an entry point or a function called by address, as Python's own parser sees them."""
+    """The files with an entry point or a function called by address are those that Python's own parser finds."""
 
     def has_entry(path: Path) -> bool:
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -29,11 +29,11 @@ def test_every_entry_point_is_found() -> None:
 
 
 def test_a_room_is_compiled() -> None:
-    """The entry points of a small file; a second time they come from the cache."""
+    """The entry points of a small file are compiled, and a second time they come from the cache."""
     assert warm.compile_room("arithmetic.doubledouble") == "arithmetic.doubledouble"
 
 
 def test_a_wrong_file_is_refused_at_once(tmp_path: Path) -> None:
-    """Before minutes are spent on the rest."""
+    """A wrong file is refused before minutes are spent on the others."""
     with pytest.raises(InputError, match="is not a generated module"):
         warm.warm((str(tmp_path / "none.py"),))

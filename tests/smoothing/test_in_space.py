@@ -1,4 +1,6 @@
-"""Surveyed points in space: smooth tracks against the curve that the points scatter about, and the stated errors."""
+"""Smooth tracks through surveyed points in space lie within the stated errors of the curve that the points scatter
+about.
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import gqm_sym as gqm
 from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.charts.sampled import Sampled
 
-# A closed track of some 150 m by its formulas, which tell tangent and curvature.
+# The track is closed, some 150 m long, and has formulas that give tangent and curvature.
 U = sp.Symbol("u", real=True)
 KNOT = ((20 + 5 * sp.cos(3 * U)) * sp.cos(U), (20 + 5 * sp.cos(3 * U)) * sp.sin(U), 5 * sp.sin(3 * U) + 10 * sp.sin(U))
 at, slope_at, bend_at = (
@@ -21,12 +23,12 @@ LENGTHS = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(PLACES, axis=0
 
 
 def roll(u: np.ndarray) -> np.ndarray:
-    """A roll angle that a lap increases by one turn."""
+    """Return a roll angle that grows by one turn in each lap."""
     return u + 0.5 * np.sin(u)
 
 
 def surveyed(scatter: float, seed: int, stop: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points at equal distances, each off by normal deviates in all coordinates, and the roll angles there."""
+    """Return points at equal distances, each off by normal deviates in all coordinates, and the roll angles there."""
     closed = bool(stop == FINE[-1])
     wanted = np.linspace(0.0, np.interp(stop, FINE, LENGTHS), COUNT + closed)[:COUNT]
     u = np.interp(wanted, LENGTHS, FINE)
@@ -35,7 +37,7 @@ def surveyed(scatter: float, seed: int, stop: float) -> tuple[np.ndarray, np.nda
 
 
 def rows_of(curve: gqm.Curve, s: np.ndarray) -> np.ndarray:
-    """x, y, z and roll at arc lengths with two derivatives, as (3, n, 4)."""
+    """Return x, y, z and roll at arc lengths with two derivatives, as (3, n, 4)."""
     track = curve.definition
     chart = Sampled(track.points, closed=track.closed, in_space=True, banked=True).chart(())
     assert isinstance(chart, SpaceChart)
@@ -43,7 +45,7 @@ def rows_of(curve: gqm.Curve, s: np.ndarray) -> np.ndarray:
 
 
 def parameter_near(places: np.ndarray) -> np.ndarray:
-    """The parameter of the place of the knot that is nearest to each of some places, by Newton's method."""
+    """Return the parameter of the place on the knot that is nearest to each of some places, by Newton's method."""
     u = FINE[np.argmin(((places[:, None] - PLACES[::500]) ** 2).sum(axis=2), axis=1) * 500]
     for _ in range(6):
         off, first, second = (np.stack(f(u), axis=1) for f in (at, slope_at, bend_at))
@@ -55,7 +57,9 @@ def parameter_near(places: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("scatter", [0.001, 0.01, 0.1])
 @pytest.mark.parametrize(("stop", "known"), [(FINE[-1], True), (4.5, False)], ids=["closed-known", "open-auto"])
 def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) -> None:
-    """A standard error holds at two places of three or more, two of them at 19 of 20, and they are no idle bounds."""
+    """One standard error holds at two of three places or more, and two at 19 of 20, and the errors are not too
+    large.
+    """
     ratios = []
     for seed in range(2):
         points, angles = surveyed(scatter, seed, stop)
@@ -75,7 +79,7 @@ def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) 
         for axis in (aside, np.cross(tangent[:, :3], aside)):
             ratios.append(((bend[:, :3] - true) * axis).sum(axis=1) / report.curvature_error)
         off = np.abs(np.remainder(place[:, 3] - roll(u) + np.pi, 2.0 * np.pi) - np.pi)
-        assert off.max() < 0.1 * scatter + 1e-4  # smoothed as much as the coordinates are, though without scatter
+        assert off.max() < 0.1 * scatter + 1e-4  # the roll is smoothed like the coordinates
     size = np.abs(np.concatenate(ratios))
     assert np.mean(size < 1.0) > 0.68
     assert np.mean(size < 2.0) > 0.95
@@ -83,7 +87,7 @@ def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) 
 
 
 def test_exact_points_stay() -> None:
-    """Points without scatter are on the smooth track, and the track is turned as they are."""
+    """Points without scatter are on the smooth track, and the track is rotated when they are."""
     points, _ = surveyed(0.0, 0, 4.5)
     track = gqm.Curve.sampled(points, smoothing="auto").smoothing
     assert track.largest_shift < 1e-5
@@ -96,7 +100,7 @@ def test_exact_points_stay() -> None:
 
 
 def test_the_figure() -> None:
-    """It shows the track from above, and how far points were shifted."""
+    """The figure shows the track from above, and how far points were shifted."""
     points, _ = surveyed(0.02, 1, FINE[-1])
     figure = gqm.figures.smoothing(gqm.Curve.sampled(points, smoothing="auto", closed=True))
     above, middle, below = figure.axes

@@ -1,4 +1,4 @@
-"""Surveyed points: smoothed tracks against the curves that the points scatter about, and the errors that are stated."""
+"""Smoothed tracks lie within the stated errors of the curves that the points scatter about."""
 
 import copy
 import math
@@ -23,7 +23,7 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.sampled import Sampled
 
 G = 9.81
-# Half a millimetre apart: what is nearest to a place is told to that.
+# Places are half a millimetre apart, which is how well the nearest one is known.
 FINE = 200_001
 
 
@@ -38,7 +38,7 @@ class Truth:
     closed: bool = False
 
     def surveyed(self, count: int, scatter: float, seed: int) -> np.ndarray:
-        """Points at equal distances, each off by normal deviates in x and in z."""
+        """Return points at equal distances, each off by normal deviates in x and in z."""
         steps = np.hypot(np.diff(self.x), np.diff(self.z))
         s = np.concatenate([[0.0], np.cumsum(steps)])
         wanted = np.linspace(0.0, s[-1], count + self.closed)[:count]
@@ -46,23 +46,23 @@ class Truth:
         return exact + scatter * np.random.default_rng(seed).standard_normal(exact.shape)
 
     def nearest(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Which of the places are nearest."""
+        """Return which of the places are nearest."""
         return self.tree.query(np.stack([x, z], axis=1))[1]
 
     @cached_property
     def tree(self) -> KDTree:
-        """The places, for a search."""
+        """Return the places as a tree, for a search."""
         return KDTree(np.stack([self.x, self.z], axis=1))
 
 
 def graph(low: float, high: float, z: Callable, slope: Callable, bend: Callable) -> Truth:
-    """The curve z = z(x), by its derivatives."""
+    """Return the curve z = z(x), by its derivatives."""
     x = np.linspace(low, high, FINE)
     return Truth(x, z(x), np.arctan(slope(x)), bend(x) / (1.0 + slope(x) ** 2) ** 1.5)
 
 
 def hills() -> Truth:
-    """Some 80 m of a coaster: hills 20 m long and 4 m high that sink slowly."""
+    """Return some 80 m of a coaster, with hills 20 m long and 4 m high that become slowly lower."""
     k = 2.0 * np.pi / 20.0
     return graph(
         0.0,
@@ -74,18 +74,20 @@ def hills() -> Truth:
 
 
 def parabola() -> Truth:
-    """A valley 10 m wide."""
+    """Return a valley 10 m wide."""
     return graph(-5.0, 5.0, lambda x: 0.1 * x * x, lambda x: 0.2 * x, lambda x: 0.2 + 0.0 * x)
 
 
 def circle() -> Truth:
-    """A ring of radius 8 m, from its lowest point."""
+    """Return a ring of radius 8 m, from its lowest point."""
     u = np.linspace(0.0, 2.0 * np.pi, FINE)
     return Truth(8.0 * np.sin(u), -8.0 * np.cos(u), u, np.full(FINE, 0.125), closed=True)
 
 
 def loop() -> Truth:
-    """A line, a clothoid up to the curvature of an arc of 6 m, the arc and the mirror image of the way in."""
+    """Return a line, a clothoid up to the curvature of an arc of 6 m, the arc, and the mirror image of the first
+    two.
+    """
     radius, ramp, line = 6.0, 9.0, 8.0
     a = math.sqrt(2.0 * radius * ramp / 2.0)  # angle = (s/a)**2 / 2 * 1, kappa = s/a**2
     s = np.linspace(0.0, line + ramp, FINE // 2)
@@ -109,13 +111,15 @@ TRACKS = {"hills": hills(), "parabola": parabola(), "circle": circle(), "loop": 
 
 
 def charted(curve: gqm.Curve) -> Chart:
-    """The chart of a sampled curve."""
+    """Return the chart of a sampled curve."""
     track = curve.definition
     return Sampled(track.points, track.kind, track.closed).chart(())
 
 
 def loads(truth: Truth, curve: gqm.Curve, s: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Loads in g of a ride from rest half a metre above the top, on a track and at the nearest true places; V**2/g."""
+    """Return loads in g of a ride from rest half a metre above the top, on a track and at the nearest true places;
+    V**2/g.
+    """
     chart = charted(curve)
     s = np.linspace(0.0, chart.edges[-1], 2001) if s is None else s
     x, z, alpha, kappa = chart.points(s)
@@ -129,7 +133,9 @@ def loads(truth: Truth, curve: gqm.Curve, s: np.ndarray | None = None) -> tuple[
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("known", [True, False], ids=["known", "auto"])
 def test_loads_are_within_their_error(name: str, scatter: float, known: bool) -> None:
-    """A standard error holds at two places of three or more, two of them at 19 of 20, and they are no idle bounds."""
+    """One standard error holds at two of three places or more, and two at 19 of 20, and the errors are not too
+    large.
+    """
     truth = TRACKS[name]
     ratios = []
     for seed in range(4):
@@ -148,11 +154,11 @@ def test_loads_are_within_their_error(name: str, scatter: float, known: bool) ->
 
 @pytest.mark.parametrize("name", TRACKS)
 def test_there_is_little_bias(name: str) -> None:
-    """The bias of the curvature is less than half of the error that is stated.
+    """The bias of the curvature is less than half of the stated error.
 
-    Where the mean squared error of a smoothing spline is least, its squared bias is at most a quarter of its variance
-    (with a penalty on derivative m, one part in 4 m: both are powers of the smoothing parameter). Noise that is left in
-    the mean over the surveys is subtracted by its variance.
+    Where the mean squared error of a smoothing spline is smallest, its squared bias is at most a quarter of its
+    variance (with a penalty on derivative m, one part in 4 m: both are powers of the smoothing parameter). Noise that
+    is left in the mean over the surveys is subtracted by its variance.
     """
     truth = TRACKS[name]
     offs, errors = [], []
@@ -168,7 +174,7 @@ def test_there_is_little_bias(name: str) -> None:
 
 @pytest.mark.parametrize(("count", "interpolated", "smoothed"), [(160, 0.8, 0.06), (400, 5.0, 0.05)])
 def test_the_coaster_of_the_issue(tmp_path: Path, count: int, interpolated: float, smoothed: float) -> None:
-    """With 1 cm of scatter, contact forces are off by many g without smoothing, and by hundredths of one with it."""
+    """With 1 cm of scatter, the error of contact forces is many g without smoothing, and hundredths of one with it."""
     truth = TRACKS["hills"]
     points = truth.surveyed(count, 0.01, 5)
     with pytest.warns(
@@ -194,7 +200,7 @@ def test_the_coaster_of_the_issue(tmp_path: Path, count: int, interpolated: floa
 
 
 def test_ends_do_not_swing() -> None:
-    """The curvature's error at the ends is a few times that inside, and is told."""
+    """The curvature's error at the ends is a few times that inside, and the stated error includes it."""
     truth = TRACKS["hills"]
     ends, inside, stated = [], [], []
     for seed in range(12):
@@ -210,7 +216,7 @@ def test_ends_do_not_swing() -> None:
 
 
 def test_a_straight_line_stays_straight() -> None:
-    """Without scatter to rounding, and with it within the error."""
+    """A straight line stays straight to rounding without scatter, and within the error with it."""
     line = np.stack([np.linspace(0.0, 40.0, 90), 7.0 - 0.75 * np.linspace(0.0, 40.0, 90)], axis=1)
     curve = gqm.Curve.sampled(line, smoothing="auto")
     assert np.abs(charted(curve).points(np.linspace(0.0, 50.0, 300))[3]).max() < 1e-12
@@ -224,7 +230,7 @@ def test_a_straight_line_stays_straight() -> None:
 
 @pytest.mark.parametrize("name", TRACKS)
 def test_exact_points_stay(name: str) -> None:
-    """With next to no scatter the track is the one through the points."""
+    """With very little scatter the track is the one through the points."""
     truth = TRACKS[name]
     points = truth.surveyed(120, 0.0, 0)
     plain = charted(gqm.Curve.sampled(points, closed=truth.closed))
@@ -240,7 +246,7 @@ def test_exact_points_stay(name: str) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_closed_track_closes(seed: int) -> None:
-    """Place, angle and curvature, and the curvature's slope and bend, are the same on both sides of the first point."""
+    """Place, angle, curvature and its first two derivatives are the same on both sides of the first point."""
     truth = TRACKS["circle"]
     chart = charted(gqm.Curve.sampled(truth.surveyed(200, 0.03, seed), smoothing="auto", closed=True))
     step = 0.02
@@ -265,7 +271,7 @@ def test_a_closed_track_closes(seed: int) -> None:
 def test_turned_moved_and_magnified(
     angle: float, scale: float, shift: tuple[float, float], name: str, known: bool
 ) -> None:
-    """Turning, moving or magnifying the points does the same to the track, and nothing else."""
+    """If the points are rotated, moved or magnified, so is the track, and nothing else changes."""
     truth = TRACKS[name]
     points = truth.surveyed(100, 0.02, 3)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -282,7 +288,7 @@ def test_turned_moved_and_magnified(
 
 
 def test_the_other_way_round() -> None:
-    """Points in reverse order give the same track, and curvature of the other sign."""
+    """Points in reverse order give the same track with curvature of the other sign."""
     points = TRACKS["hills"].surveyed(150, 0.02, 2)
     one, two = (gqm.Curve.sampled(rows, smoothing=0.02) for rows in (points, points[::-1]))
     forwards, backwards = (np.array(curve.definition.points.split(), dtype=np.float64) for curve in (one, two))
@@ -291,7 +297,7 @@ def test_the_other_way_round() -> None:
 
 
 def test_many_points() -> None:
-    """Tens of thousands closer together than they scatter: few points are left, and a tenth of the error."""
+    """Tens of thousands of points closer together than their scatter leave few points, and a tenth of the error."""
     truth = TRACKS["hills"]
     curve = gqm.Curve.sampled(truth.surveyed(40_000, 0.03, 0), smoothing="auto")
     assert curve.definition.points.count("\n") < 1000
@@ -314,7 +320,7 @@ def test_a_place_measured_twice_is_no_mistake() -> None:
 
 
 def test_what_is_reported() -> None:
-    """The shifts are the distances from points to places, and everything prints, copies and pickles."""
+    """The shifts are the distances from points to places, and the report prints, copies and pickles."""
     curve = gqm.Curve.sampled(TRACKS["hills"].surveyed(200, 0.01, 0), smoothing=0.01)
     report = curve.smoothing
     off = np.hypot(*(report.points - report.places).T)
@@ -336,7 +342,7 @@ def test_what_is_reported() -> None:
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("count", [40, 160, 400])
 def test_the_warning(name: str, count: int) -> None:
-    """It comes with scatter that is felt, and neither without, nor with scatter that is not, nor once smoothed."""
+    """There is a warning for noticeable scatter, and none without scatter, with less, or after smoothing."""
     truth = TRACKS[name]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -352,8 +358,8 @@ def test_the_warning(name: str, count: int) -> None:
             gqm.Curve.sampled(scattered, closed=truth.closed)
 
 
-def test_too_small_a_deviation_is_told() -> None:
-    """A hundredth of the scatter keeps it all."""
+def test_too_small_a_deviation_is_reported() -> None:
+    """With a stated deviation of a hundredth of the scatter, all scatter is kept."""
     with pytest.warns(NoisyPointsWarning, match=r"smoothing 0\.0001 is less than their scatter$"):
         gqm.Curve.sampled(TRACKS["hills"].surveyed(160, 0.01, 1), smoothing=0.0001)
 
@@ -381,7 +387,7 @@ POINTS = [(float(x), float(z)) for x, z in TRACKS["hills"].surveyed(100, 0.02, 0
     ],
 )
 def test_bad_input_is_refused(points: object, options: dict[str, object], message: str) -> None:
-    """With the row, or with what was given."""
+    """Bad input is refused with its row, or with what was given."""
     with pytest.raises(DeclarationError, match=f"^sampled: {message}"):
         gqm.Curve.sampled(points, **options)
 
@@ -390,7 +396,7 @@ YAML = "name: track\ntitle: Surveyed\ncurve: {{points: {{file: track.csv{}}}}}\n
 
 
 def written(folder: Path, smoothing: str) -> Path:
-    """A curve file with its points beside it."""
+    """Write a curve file with its points beside it."""
     rows = "\n".join(f"{x!r},{z!r}" for x, z in POINTS)
     (folder / "track.csv").write_text(f"x,z\n{rows}\n")
     (folder / "track.yaml").write_text(YAML.format(smoothing and f", smoothing: {smoothing}"))
@@ -402,7 +408,7 @@ def written(folder: Path, smoothing: str) -> Path:
     [("0.02", 0.02), ("auto", "auto"), ("1/50", 0.02), ("{value: 20, unit: mm}", 0.02), ("{value: auto}", "auto")],
 )
 def test_curve_files(tmp_path: Path, text: str, smoothing: float | str) -> None:
-    """A number in metres or with its unit, or auto."""
+    """In curve files the deviation is a number in metres, or with its unit, or "auto"."""
     curve = gqm.read_spec(written(tmp_path, text)).curve
     assert curve.definition == gqm.Curve.sampled(POINTS, smoothing=smoothing).definition
     assert curve.smoothing.given == (None if smoothing == "auto" else smoothing)
@@ -420,12 +426,12 @@ def test_curve_files(tmp_path: Path, text: str, smoothing: float | str) -> None:
     ],
 )
 def test_bad_curve_files(tmp_path: Path, text: str, message: str) -> None:
-    """One line each, with the place."""
+    """Bad curve files give one line each, with the place."""
     with pytest.raises(gqm.GQMError, match=message):
         gqm.read_spec(written(tmp_path, text))
 
 
-def test_the_command_line_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_prints_the_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The changes by smoothing are printed with the closed forms; a warning is one line that names the file."""
     assert main([str(written(tmp_path, "auto")), "-o", str(tmp_path)]) == 0
     out, err = capsys.readouterr()
@@ -440,7 +446,9 @@ def test_the_command_line_tells(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_the_figure() -> None:
-    """Three panels: the track, shifts in millimetres and curvature with its band; axes of one's own are taken."""
+    """The figure has three panels: the track, shifts in millimetres and curvature with its band; axes of the caller are
+    accepted.
+    """
     from matplotlib.figure import Figure
 
     curve = gqm.Curve.sampled(POINTS, smoothing="auto")

@@ -1,6 +1,6 @@
-"""Texts such as "50 cm" in each place of a curve file, and quantities in each argument of a curve.
+"""Texts such as "50 cm" are read in each place of a curve file, and quantities in each argument of a curve.
 
-They are converted where a dimension is known, and refused with what to write instead elsewhere.
+They are converted if a dimension is known, and otherwise refused with what to write instead.
 """
 
 import math
@@ -47,7 +47,7 @@ def read(folder: Path, **parts: str) -> Spec:
     ],
 )
 def test_parameters_and_launches(part: str, text: str, parameters: dict[str, str], tmp_path: Path) -> None:
-    """A bare text is the same as its value and unit apart."""
+    """A text such as "50 cm" means the same as its value and unit apart."""
     spec = read(tmp_path, **{part: text})
     assert dict(spec.launch if part == "LAUNCH" else spec.parameters) == parameters
 
@@ -67,14 +67,16 @@ def test_parameters_and_launches(part: str, text: str, parameters: dict[str, str
     ],
 )
 def test_domains_periods_and_families(curve: str, domain: Any, period: Any, tmp_path: Path) -> None:
-    """The ends of a parameter, by what the kind of curve measures it in."""
+    """The ends of a parameter are converted from the unit in which the kind of curve measures it."""
     found = read(tmp_path, CURVE="{" + curve + "}", PARAMETERS="{}", LAUNCH="{lam0: 0.25}").curve
     assert found.period == period
     assert found.domain == domain
 
 
 def test_rails_points_and_places(tmp_path: Path) -> None:
-    """Pieces with the place where they begin, the scatter of points, the start of a level curve and a launch point."""
+    """Units are read in pieces and where they begin, in the scatter of points, in the start of a level curve and in a
+    launch point.
+    """
     pieces = "line: {length: 50 cm}}, {arc: {radius: 200 cm, angle: 90 deg}}, "
     pieces += "{clothoid: {length: 1 m, kappa_start: 0.5 1/m, kappa_end: 0}"
     rail = "{pieces: {pieces: [{" + pieces + "}], start: [50 cm, 1], heading: -90 deg}}"
@@ -101,7 +103,7 @@ def test_rails_points_and_places(tmp_path: Path) -> None:
     ],
 )
 def test_kernels(kernel: str, parameters: dict[str, str], tmp_path: Path) -> None:
-    """The values of the forces' own parameters."""
+    """Units are read in the values of the forces' own parameters."""
     defaults = dict(read(tmp_path, KERNEL=kernel).kernel.defaults)
     assert {name: defaults[name] for name in parameters} == parameters
 
@@ -122,20 +124,20 @@ def test_kernels(kernel: str, parameters: dict[str, str], tmp_path: Path) -> Non
     ],
 )
 def test_what_is_refused(part: str, text: str, message: str, tmp_path: Path) -> None:
-    """Another dimension, and a unit where none is known, with the line and what is right."""
+    """Another dimension, and a unit where none is known, are refused with the line and with what is right."""
     with pytest.raises(SpecFileError) as caught:
         read(tmp_path, **{part: text})
     assert message in str(caught.value)
 
 
 def test_a_point_in_seconds_is_refused(tmp_path: Path) -> None:
-    """Coordinates of a launch are lengths."""
+    """The coordinates of a launch are lengths."""
     with pytest.raises(SpecFileError, match=r"launch.point.0: must be in m or a multiple of it, got s"):
         read(tmp_path, CURVE="{" + RING + "}", PARAMETERS="{}", LAUNCH="{point: [1 s, 0]}")
 
 
 def test_quantities_in_declarations() -> None:
-    """They mean what the same numbers in SI mean."""
+    """Quantities mean the same as their numbers in SI."""
     u = UnitRegistry()
     cm, deg = u.Quantity(50, "cm"), u.Quantity(90, "deg")
     assert gqm.line(length=cm) == gqm.line(length="50 cm") == gqm.line(length="1/2")
@@ -166,7 +168,7 @@ def test_quantities_in_declarations() -> None:
 
 @pytest.mark.parametrize("heading", ["pi", "180 deg", math.pi, "-3*pi"])
 def test_a_line_that_runs_back_is_level(heading: Any, tmp_path: Path) -> None:
-    """Its height does not change, so that no speed is lost (it rose by the rounding of sin(pi))."""
+    """The height of the line does not change, so that no speed is lost (it rose by the rounding of sin(pi))."""
     curve = gqm.Curve.piecewise([gqm.line(length=2)], heading=heading)
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="level", folder=tmp_path)
     motion = module.solve(1, 1, 1)

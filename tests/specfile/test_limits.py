@@ -1,4 +1,4 @@
-"""Curve files: mistakes inside pieces, launches and families, each at its place; and values in odd units."""
+"""Mistakes in curve files inside pieces, launches and families are reported at their places, and odd units are read."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ HEAD, FORCE = "name: a\n", "kernel: {gravity: {}}\n"
 
 
 def read(folder: Path, text: str) -> gqm.Model:
-    """The model of a file."""
+    """Return the model of a file."""
     (folder / "a.yaml").write_text(text, encoding="utf-8")
     return gqm.read_spec(folder / "a.yaml").derive()
 
@@ -53,7 +53,7 @@ def read(folder: Path, text: str) -> gqm.Model:
     ],
 )
 def test_mistakes_inside_a_curve(curve: str, message: str, tmp_path: Path) -> None:
-    """With the path to them, and what may stand there."""
+    """Each mistake is reported with the path to it, and with what may stand there."""
     with pytest.raises(SpecFileError) as caught:
         read(tmp_path, f"{HEAD}curve: {curve}\n{FORCE}")
     found = [mistake.removeprefix(f"{tmp_path / 'a.yaml'}:") for mistake in caught.value.mistakes]
@@ -61,13 +61,13 @@ def test_mistakes_inside_a_curve(curve: str, message: str, tmp_path: Path) -> No
 
 
 def test_mistakes_inside_a_launch(tmp_path: Path) -> None:
-    """Its numbers are mappings of a value and a unit."""
+    """The numbers of a launch are mappings of a value and a unit."""
     with pytest.raises(SpecFileError, match=r"4:27: launch\.lam0: unknown key 'units'; did you mean unit\?"):
         read(tmp_path, f"{HEAD}curve: {{graph: {{z: x**2}}}}\n{FORCE}launch: {{lam0: {{value: 1, units: m}}}}\n")
 
 
 @pytest.mark.parametrize(("unit", "exact"), [("pi", 3 * sp.pi), ("pi*rad", 3 * sp.pi), ("deg/pi", sp.Rational(1, 60))])
 def test_multiples_of_pi(unit: str, exact: sp.Expr, tmp_path: Path) -> None:
-    """A unit may hold pi; the value in SI is exact."""
+    """A unit may contain pi, and the value in SI is exact."""
     text = f"{HEAD}curve: {{graph: {{z: sin(a)*x}}}}\n{FORCE}parameters: {{a: {{value: 3, unit: {unit}}}}}\n"
     assert sp.simplify(sp.sympify(str(dict(read(tmp_path, text).defaults)["a"])) - exact) == 0

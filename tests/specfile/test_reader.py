@@ -1,4 +1,4 @@
-"""Curve files: what is read, what is refused, and in which words."""
+"""Curve files are read, or refused in clear words."""
 
 import contextlib
 import json
@@ -36,7 +36,7 @@ def read(folder: Path, text: str | bytes) -> Spec:
 
 
 def mistakes(folder: Path, text: str | bytes) -> list[str]:
-    """Read a wrong file; what is said of it, without the name of the folder."""
+    """Read a wrong file, and return the messages without the name of the folder."""
     with pytest.raises(SpecFileError) as caught:
         read(folder, text)
     assert str(caught.value) == "\n".join(caught.value.mistakes)
@@ -55,7 +55,7 @@ def edited(*changes: tuple[str, str]) -> str:
 GRAPH = "graph: {z: h*x**2, parameter: x, domain: [-2, 2]}"
 NAME_RULE = "a name is made of ASCII letters, digits and _, and begins with a letter"
 
-# What is wrong -> the file, and everything that must be said of it.
+# A row has the kind of mistake, the file, and everything that the message must contain.
 WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "unknown key": (
         edited(("launch:", "lunch:")),
@@ -421,7 +421,7 @@ launch: {v0: -1, direction: left}
 
 
 def test_many_mistakes_are_cut_off(tmp_path: Path) -> None:
-    """A file full of nonsense does not flood the terminal."""
+    """A file with very many mistakes does not flood the terminal."""
     text = "".join(f"k{n}: {n}\n" for n in range(200))
     found = mistakes(tmp_path, text)
     assert len(found) == 51
@@ -489,7 +489,7 @@ def test_curves(case: tuple[str, str, str], tmp_path: Path) -> None:
 
 
 def test_kernels_add(tmp_path: Path) -> None:
-    """The terms of the kernel add in the file's order, each argument a name, a value or nothing."""
+    """The terms of the kernel add in the file's order; each argument is a name, a value or nothing."""
     forces = "rolling: {beta: 2/5}\n  gravity: {g: g_moon}\n  potential: {U: k*x**2/2}"
     text = edited(("gravity: {}", forces), ("{h: 3}", "{h: 3, g_moon: 1.62, k: null}"))
     spec = read(tmp_path, text)
@@ -566,7 +566,7 @@ UNSOLVABLE = {
 
 @pytest.mark.parametrize("case", UNSOLVABLE.values(), ids=UNSOLVABLE.keys())
 def test_what_cannot_be_solved(case: tuple[str, list[str]], tmp_path: Path) -> None:
-    """A file can be right and yet not say enough to be solved; then every reason is given."""
+    """A file can be right and yet lack what is needed to solve it; then every reason is given."""
     text, expected = case
     spec = read(tmp_path, text)
     model = spec.derive()
@@ -605,7 +605,7 @@ CHARACTERS = "abhxz019.*/+-^()[]{}:,#&!|>'\"%@` \n\t\\~λ"
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 @given(data=st.data())
 def test_no_file_escapes(data: st.DataObject, tmp_path: Path) -> None:
-    """Whatever is done to a file, it is read, or refused with a place in it."""
+    """However a file is changed, it is read, or refused with a place in it."""
     text = PLAIN
     for _ in range(data.draw(st.integers(1, 4))):
         start = data.draw(st.integers(0, len(text)))

@@ -1,4 +1,4 @@
-"""The file to start from: it generates and solves as it is, and so do the lines in it that are comments."""
+"""The file to start from generates and solves as it is, and so do the lines in it that are comments."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ from gqm_sym.specfile import starter
 def test_it_generates_and_solves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """From no file to digits in two commands."""
+    """Two commands lead from no file to digits."""
     monkeypatch.chdir(tmp_path)
     assert gen.main(["--init", "first"]) == 0
     assert capsys.readouterr().out == "wrote first.yaml\n"
@@ -27,7 +27,7 @@ def test_it_generates_and_solves(
 def test_nothing_is_overwritten(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A file of that name stays as it is; a name that no module can have makes none."""
+    """A file of that name stays as it is, and a name that no module can have creates none."""
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text("mine")
     assert gen.main(["--init", "mine"]) == 2
@@ -44,7 +44,7 @@ COMMENTED = re.findall(rf"^ +# ((?:{'|'.join(KEYS)}): .*)$", starter("a"), re.MU
 
 @pytest.mark.parametrize("line", COMMENTED)
 def test_what_is_commented_out_is_right(line: str, tmp_path: Path) -> None:
-    """Each may take the place of the line it stands by, or be added to it."""
+    """Each commented line may replace the line beside it, or be added to it."""
     text = starter("a").replace(f"# {line}", line)
     if line.startswith(("parametric", "polar", "family")):
         text = "\n".join(row for row in text.split("\n") if not row.startswith("  graph:"))
@@ -55,14 +55,14 @@ def test_what_is_commented_out_is_right(line: str, tmp_path: Path) -> None:
 
 
 def test_all_of_them_are_found() -> None:
-    """The pattern above misses none."""
+    """The pattern above finds all commented lines."""
     assert len(COMMENTED) == len(KEYS)
 
 
 def test_the_path_of_a_first_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Own file, module, figure, report, sweep: each step of the documentation's first page, in its order."""
+    """Each step of the documentation's first page works in its order: file, module, figure, report, sweep."""
     page = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     for language, block in re.findall(r"^```(sh|yaml)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
@@ -79,7 +79,7 @@ def test_the_path_of_a_first_user(
 def test_the_commands_of_the_readme(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each runs, in its order, with the file that is shown above them."""
+    """Each command of the README runs in its order, with the file that is shown above them."""
     page = (ROOT / "README.md").read_text(encoding="utf-8")
     (shown,) = re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,6 @@
-"""Files of surveyed tracks: tables with named columns, and GPX in local metres, against the ellipsoid in 30 digits."""
+"""Files of surveyed tracks are read, as tables with named columns, and as GPX in local metres, which agree with the
+ellipsoid in 30 digits.
+"""
 
 from pathlib import Path
 
@@ -14,7 +16,7 @@ TABLE = "".join(f"{k / 4}, {3 - k / 4}, {k}, {k * k / 100}\n" for k in range(COU
 
 
 def test_columns_by_name(tmp_path: Path) -> None:
-    """In any order, with the roll angle; without names in that of x, y, z and roll."""
+    """Named columns may be in any order, with the roll angle; without names the order is x, y, z and roll."""
     (tmp_path / "named.csv").write_text("Roll;z;x;y\n" + TABLE.replace(",", ";"))
     (tmp_path / "bare.csv").write_text(TABLE)
     named, bare = gqm.read_track(tmp_path / "named.csv"), gqm.read_track(str(tmp_path / "bare.csv"))
@@ -28,14 +30,14 @@ def test_columns_by_name(tmp_path: Path) -> None:
 
 
 def spec(folder: Path, points: str) -> Path:
-    """A curve file with these points."""
+    """Write a curve file with these points."""
     file = folder / "track.yaml"
     file.write_text(f"name: track\ncurve: {{points: {points}}}\nkernel: {{gravity: {{}}}}\n")
     return file
 
 
 def test_curve_files(tmp_path: Path) -> None:
-    """The column roll banks the track, unless the file says how else; coordinates keep their decimals."""
+    """The column roll banks the track, unless the file says otherwise; coordinates keep their decimals."""
     (tmp_path / "named.csv").write_text("roll,z,x,y\n" + TABLE)
     banked = gqm.read_spec(spec(tmp_path, "{file: named.csv, heartline: 0.9}")).curve
     assert banked.definition.points.startswith("0 0.0 3.0 0.0\n1 0.01 2.75 0.25\n")
@@ -48,7 +50,7 @@ def test_curve_files(tmp_path: Path) -> None:
 
 
 def gpx(points: str, head: str = "") -> str:
-    """A file of GPX with these points."""
+    """Write a file of GPX with these points."""
     other = '<trk><trkseg><trkpt lat="0" lon="0"/></trkseg></trk>'
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>{head}<gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1">'
@@ -57,7 +59,7 @@ def gpx(points: str, head: str = "") -> str:
 
 
 def test_places_on_the_earth(tmp_path: Path) -> None:
-    """East and north of the first point are those of the vectors between points of the ellipsoid; heights stay."""
+    """East and north of the first point are those of the vectors between points of the ellipsoid; heights are kept."""
     u = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     places = np.stack([46.95 + 0.004 * np.sin(u), 7.44 + 0.006 * np.cos(u), 540.0 + 30.0 * np.sin(2.0 * u)], axis=1)
     lines = [f'<trkpt lat="{a!r}" lon="{b!r}"><ele> {c!r}</ele><time/></trkpt>' for a, b, c in places.tolist()]
@@ -124,7 +126,7 @@ POINT = '<trkpt lat="46" lon="7"><ele>5</ele></trkpt>'
     ],
 )
 def test_what_is_no_track(tmp_path: Path, name: str, text: str, message: str) -> None:
-    """One error says what is wrong, and where; nothing is expanded."""
+    """Each file that is no track gives one error that says what is wrong and where; nothing in it is expanded."""
     if "/" not in name and len(name) < 300:
         (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=f"^{message}"):

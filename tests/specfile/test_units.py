@@ -1,4 +1,4 @@
-"""Units in curve files: converted exactly, checked against what they are given for, never run or rounded."""
+"""Units in curve files are converted exactly, checked against the required dimension, and never run or rounded."""
 
 import re
 import subprocess
@@ -18,7 +18,7 @@ from gqm_sym.parameters import in_si
 from gqm_sym.specfile.schema import _KERNEL_ARGUMENTS
 from gqm_sym.specfile.units import KERNEL_UNITS
 
-# Values of the SI brochure and of the international yard and pound agreement of 1959.
+# These are values of the SI brochure and of the international yard and pound agreement of 1959.
 EXACT = {
     "1": Fraction(1),
     "m": Fraction(1),
@@ -42,7 +42,7 @@ TURNS = {"deg": Fraction(1, 180), "rpm": Fraction(2, 60), "turn": Fraction(2), "
 
 @pytest.mark.parametrize("text", EXACT)
 def test_factors_are_exact(text: str) -> None:
-    """A unit is the fraction that it is defined as."""
+    """A unit is the fraction by which it is defined."""
     unit = read_unit(text, where="unit")
     assert (unit.factor, unit.turns) == (EXACT[text], 0)
 
@@ -95,7 +95,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_what_is_no_unit(text: str) -> None:
-    """Refused with the reason; nothing that a file says is evaluated or takes long."""
+    """A text that is no unit is refused with the reason; it is not evaluated and takes little time."""
     if REFUSED[text] is None:
         assert read_unit(text, where="unit") == Unit(metre=1)
         return
@@ -105,7 +105,7 @@ def test_what_is_no_unit(text: str) -> None:
 
 
 def test_dimensions() -> None:
-    """A unit fits where its dimension is the wanted one; an angle is a number."""
+    """A unit fits if its dimension is the required one; an angle is a number."""
     for text, wanted in (("cm", "m"), ("rpm", "1/s"), ("deg", "1"), ("N", None), ("slug", "kg")):
         check_unit(text, wanted)
     with pytest.raises(InputError, match=r"must be in m/s\*\*2 or a multiple of it, got cm"):
@@ -141,7 +141,7 @@ def read(folder: Path, text: str) -> gqm.specfile.Spec:
 
 
 def test_a_file_with_units(tmp_path: Path) -> None:
-    """Parameters and launch arrive in SI; what was written is kept for people."""
+    """Parameters and launch are converted to SI, and the text as written is kept for messages."""
     spec = read(tmp_path, FILE)
     assert dict(spec.parameters) == {"rod": "1.4", "g_moon": "1.62", "m": "0.25"}
     assert dict(spec.launch or {}) == {"lam0": "pi/2", "v0": "0.5", "t_max": "120"}
@@ -162,7 +162,7 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG.values(), ids=WRONG)
 def test_wrong_units_are_placed(case: tuple[str, str, str], tmp_path: Path) -> None:
-    """Line, column, and what would be right."""
+    """A wrong unit is reported with line, column, and what would be right."""
     before, after, said = case
     with pytest.raises(SpecFileError) as caught:
         read(tmp_path, FILE.replace(before, after))
@@ -177,7 +177,9 @@ def test_si_needs_no_library() -> None:
 
 
 def test_loading_the_library_is_not_reading(tmp_path: Path) -> None:
-    """A first unit by name costs a process the library's import: more than a file may take, on a slow machine."""
+    """Importing the library at the first unit by name does not count as reading, because it may exceed a file's
+    budget.
+    """
     code = (
         "import sys, gqm_sym as g; from gqm_sym.specfile import reader; reader.SECONDS = 0.2; "
         "g.read_spec(sys.argv[1]); "
@@ -222,7 +224,7 @@ launch: {lam0: 0.5}
     ],
 )
 def test_units_of_a_curve_s_parameters_are_checked(curve: str, parameters: str, wanted: str, tmp_path: Path) -> None:
-    """By the dimensions of its coordinates."""
+    """Units of a curve's parameters are checked by the dimensions of its coordinates."""
     text = WRONG.replace("CURVE", curve).replace("PARAMETERS", parameters)
     with pytest.raises(InputError, match=rf"a.yaml:5:\d+: parameters.\w+.unit: must be {re.escape(wanted)}.*, got "):
         read(tmp_path, text)
@@ -239,12 +241,12 @@ def test_units_of_a_curve_s_parameters_are_checked(curve: str, parameters: str, 
     ],
 )
 def test_units_that_fit_are_let_pass(curve: str, parameters: str, tmp_path: Path) -> None:
-    """Also where a number hides one."""
+    """Units that fit are accepted, also if a number hides one."""
     read(tmp_path, WRONG.replace("CURVE", curve).replace("PARAMETERS", parameters))
 
 
 def test_wrong_units_are_reported_with_everything_else(tmp_path: Path) -> None:
-    """Whatever other mistakes there are: in the kernel, in the curve, in the launch."""
+    """Wrong units are reported with all other mistakes: in the kernel, in the curve, in the launch."""
     text = WRONG.replace("CURVE", "graph: {z: a*x**2}").replace("PARAMETERS", "a: {value: 1, unit: kg}, q: 1")
     for old, new in (("{gravity: {}}", "{gravity: {h: 1}}"), ("lam0: 0.5", "lam0: 0.5, v0: {value: 1, unit: kg}")):
         text = text.replace(old, new)

@@ -1,4 +1,4 @@
-"""Fit files: estimates in closed form, the result as JSON and as a figure, and mistakes at their lines."""
+"""Fit files give estimates in closed form, the result as JSON and as a figure, and mistakes at their lines."""
 
 import json
 import math
@@ -30,7 +30,7 @@ fixed: {g: 9.81}
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a curve file, measurements of a pendulum of 1.3 m, and a fit file."""
+    """Return a folder with a curve file, measurements of a pendulum of 1.3 m, and a fit file."""
     monkeypatch.chdir(tmp_path)
     Path("swing.yaml").write_text(SWING)
     t = np.linspace(0.1, 12.0, 60)
@@ -42,7 +42,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_fit_from_files(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Numbers in their units, text, JSON and a figure."""
+    """A fit from files gives numbers in their units, text, JSON and a figure."""
     assert tool.main(["fit", "fit.yaml", "--json", "found.json", "--figure", "fit.svg"]) == 0
     said = capsys.readouterr()
     lines = said.out.splitlines()
@@ -61,8 +61,8 @@ def test_a_fit_from_files(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "<svg" in Path("fit.svg").read_text()
 
 
-def test_what_the_data_do_not_tell(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Periods tell g/L only; there is null in place of infinity. Deviations are a column, launches too."""
+def test_what_the_data_do_not_determine(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Periods determine g/L only, and infinity is written as null. Deviations may be a column, and so may launches."""
     Path("periods.csv").write_text("lam0,period,sigma\n10,2.29,5\n40,2.36,5\n80,2.60,5\n")
     Path("periods.yaml").write_text(
         "curve: swing.yaml\ndata: {file: periods.csv, units: {lam0: deg, sigma: ms}}\nfree: {L: 120 cm, g: null}\n"
@@ -76,7 +76,9 @@ def test_what_the_data_do_not_tell(here: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_passages_and_names(here: Path) -> None:
-    """Through the lowest point each half period; the launch is that of the curve file, but for what is fixed here."""
+    """Passages through the lowest point are fitted; the launch is that of the curve file, except for what is fixed
+    here.
+    """
     half = pendulum.solve(0.5, L=1.3).half_period
     Path("passages.csv").write_text("passages\n" + "\n".join(f"{half * (k + 0.5):.12f}" for k in range(6)))
     Path("passages.yaml").write_text(
@@ -90,7 +92,7 @@ def test_passages_and_names(here: Path) -> None:
 
 
 def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
-    """`gqm schema --fit` prints it."""
+    """`gqm schema --fit` prints the schema of what is read."""
     assert tool.main(["schema", "--fit"]) == 0
     schema = json.loads(capsys.readouterr().out)
     assert schema == fit_schema()
@@ -120,7 +122,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("case", MISTAKES)
 def test_mistakes_have_their_place(case: str, here: Path) -> None:
-    """Line, column, what is wrong, and what would be right."""
+    """Mistakes are reported with line, column, what is wrong, and what would be right."""
     (old, new), said = MISTAKES[case]
     text = Path("fit.yaml").read_text()
     assert old in text
@@ -141,7 +143,7 @@ TABLES = {
 
 @pytest.mark.parametrize("case", TABLES)
 def test_tables_with_mistakes(case: str, here: Path) -> None:
-    """Their rows are named."""
+    """The rows of mistakes in tables are named."""
     text, said = TABLES[case]
     Path("swings.csv").write_text(text)
     Path("fit.yaml").write_text("curve: swing.yaml\ndata: swings.csv\nfree: {L: 1.2}\n")
@@ -151,7 +153,7 @@ def test_tables_with_mistakes(case: str, here: Path) -> None:
 
 
 def test_a_fit_that_cannot_be(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Two measurements, three numbers: one line and exit code 2; nothing is written."""
+    """Two measurements for three numbers give one line and exit code 2, and nothing is written."""
     Path("swings.csv").write_text("t,lam\n1,0.2\n2,0.3\n")
     Path("fit.yaml").write_text("curve: swing.yaml\ndata: swings.csv\nfree: {L: 1.2, g: 9, lam0: 0.8}\n")
     assert tool.main(["fit", "fit.yaml", "--json", "found.json"]) == 2

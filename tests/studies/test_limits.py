@@ -1,4 +1,4 @@
-"""Sweep files at their limits: what takes too long to read, what is nowhere in a table, what has no value and why."""
+"""Sweep files at their limits are handled: long reading, wrong entries in tables, and launches without a value."""
 
 import os
 import time
@@ -22,7 +22,7 @@ SWEEP = "curve: swing.yaml\nquantities: [period]\n"
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a curve file, to run commands in."""
+    """Return a folder with a curve file, in which commands run."""
     monkeypatch.chdir(tmp_path)
     Path("swing.yaml").write_text(SWING)
     Path("a.csv").write_text("lam0\n1\n2\n")
@@ -30,7 +30,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def sweep(text: str) -> Path:
-    """A sweep file."""
+    """Write a sweep file."""
     path = Path("a.yaml")
     path.write_text(SWEEP + text)
     return path
@@ -47,7 +47,7 @@ def sweep(text: str) -> Path:
     ],
 )
 def test_keys_that_are_none(text: str, message: str, here: Path) -> None:
-    """At their place, with those there are."""
+    """Unknown keys are reported at their place, with the list of keys."""
     with pytest.raises(SpecFileError) as caught:
         read_sweep(sweep(text))
     assert any(mistake.startswith(f"a.yaml:{message}") for mistake in caught.value.mistakes), caught.value
@@ -61,7 +61,7 @@ def test_reading_has_a_budget(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_what_is_derived_and_emitted_is_not_reading(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those stages have budgets of their own: a slow machine's emission is no mistake of the sweep file."""
+    """Derivation and emission have budgets of their own, so that a slow machine is no mistake of the sweep file."""
 
     def slowly(*arguments: Any, **names: Any) -> Any:
         end = time.thread_time() + reader.SECONDS
@@ -75,13 +75,13 @@ def test_what_is_derived_and_emitted_is_not_reading(here: Path, monkeypatch: pyt
 
 
 def test_a_sweep_may_give_the_other_side_back(here: Path) -> None:
-    """The curve file's contact holds unless the sweep has one of its own; both sides is the plain case."""
+    """The curve file's contact holds unless the sweep has one of its own, which may be both sides."""
     assert read_sweep(sweep("grid: {lam0: [1, 2]}")).fixed["contact"] == "above"
     assert "contact" not in read_sweep(sweep("grid: {lam0: [1, 2]}\ncontact: bilateral")).fixed
 
 
 def test_what_has_no_value_is_counted(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A body at rest has no period; the file that was there is replaced, a folder too."""
+    """A body at rest has no period, which is counted; an earlier file or folder is replaced."""
     sweep("grid: {lam0: [0, 1, 2]}\ncontact: bilateral")
     for _ in range(2):
         assert tool.main(["sweep", "a.yaml", "-o", "a.zarr", "--force"]) == 0
@@ -92,15 +92,15 @@ def test_what_has_no_value_is_counted(here: Path, capsys: pytest.CaptureFixture[
     assert Path("a.zarr").is_dir()
 
 
-# What a file beside another may turn into while it is opened
+# These may take the place of a file while it is opened.
 
 
 @pytest.mark.parametrize("kind", ["a pipe", "no right"])
 def test_a_table_that_changes_meanwhile(kind: str, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is looked at again once it is open, and nothing waits for a pipe."""
+    """A table is checked again after it is opened, and a pipe does not block."""
     if kind == "a pipe":
         os.mkfifo("pipe")
-        monkeypatch.setattr(beside, "path_beside", lambda *_, **__: here / "pipe")
+        monkeypatch.setattr(beside, "companion_path", lambda *_, **__: here / "pipe")
         message = "'a.csv': is not a plain file; give a CSV file"
     else:
 

@@ -1,4 +1,6 @@
-"""Sweep files: read with care, stored part by part, the same whoever computes them and however often they are cut."""
+"""Sweep files are read with care, stored part by part, and give the same whoever computes them and however often they
+are interrupted.
+"""
 
 import io
 import json
@@ -40,13 +42,13 @@ grid:
   lam0: {start: 0.1, stop: 3, num: 30}
   L: {values: [50, 100], unit: cm}
 """
-# Half periods away from barriers, in units of the last place.
+# The tolerance of half periods away from barriers, in units in the last place.
 ULPS = 4.0
 
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with curve files and a sweep file, to run commands in."""
+    """Return a folder with curve files and a sweep file, in which commands run."""
     monkeypatch.chdir(tmp_path)
     for name, text in CURVES.items():
         Path(f"{name}.yaml").write_text(f"name: {name}\n{text}")
@@ -55,7 +57,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def half_period(amplitude: float, length: float) -> float:
-    """Half period of a pendulum in closed form."""
+    """Return the half period of a pendulum in closed form."""
     with mp.workdps(40):
         k = mp.sin(mpf(amplitude) / 2)
         return float(2 * mp.ellipk(k * k) * mp.sqrt(mpf(length) / mpf("9.81")))
@@ -65,7 +67,7 @@ def half_period(amplitude: float, length: float) -> float:
 
 
 def test_a_grid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All combinations, in SI, each with its closed form; with names, units and what it was made from."""
+    """A grid has all combinations, in SI, each with its closed form; with names, units and its origin."""
     import xarray
 
     assert tool.main(["sweep", "periods.yaml"]) == 0
@@ -94,7 +96,9 @@ def test_a_grid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_table_of_bodies_that_come_to_rest(here: Path) -> None:
-    """On a rough floor v0^2/(2 mu g) away, after v0/(mu g); a row that cannot be says so, and the others are there."""
+    """On a rough floor bodies stop after v0^2/(2 mu g) and v0/(mu g); an impossible row says so, and the others are
+    computed.
+    """
     import xarray
 
     Path("launches.csv").write_text("v0,mu,lam\n3.6,0.1,0.1\n7.2,0.2,0.1\n7.2,0.5,0.1\n0,0.1,0.1\n")
@@ -123,7 +127,7 @@ def test_a_table_of_bodies_that_come_to_rest(here: Path) -> None:
 
 
 def test_contact_and_horizon(here: Path) -> None:
-    """Outside a circle the body leaves at two thirds of its height; a horizon ends what would go on."""
+    """Outside a circle the body leaves at two thirds of its height; a horizon ends other motions."""
     Path("falls.yaml").write_text(
         "curve: swing.yaml\nquantities: [v_max, t_end]\ncontact: below\ngrid: {lam0: [2.5, 3.0], L: [1, 2]}\n"
     )
@@ -139,7 +143,7 @@ def test_contact_and_horizon(here: Path) -> None:
 
 
 def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
-    """Thirds, tenths and parts of pi, each rounded once."""
+    """Thirds, tenths and parts of pi are each rounded once."""
     assert evenly("0", "1", 4).tolist() == [0.0, 1 / 3, 2 / 3, 1.0]
     assert evenly("-0.3", "0.3", 7).tolist() == [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]
     with mp.workdps(40):
@@ -184,7 +188,7 @@ def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
     ],
 )
 def test_mistakes_have_their_place(line: str, instead: str, message: str, here: Path) -> None:
-    """File, line, column, what is wrong and what would be right; nothing is run."""
+    """Mistakes are reported with file, line, column, what is wrong and what would be right; nothing is run."""
     assert line in PERIODS
     Path("periods.yaml").write_text(PERIODS.replace(line, instead))
     Path("a.csv").write_text("v0\n1\n")
@@ -208,7 +212,7 @@ def test_mistakes_have_their_place(line: str, instead: str, message: str, here: 
     ],
 )
 def test_bad_tables_are_refused(rows: str | None, message: str, here: Path) -> None:
-    """With the file and its row."""
+    """Bad tables are refused with the file and its row."""
     if rows is not None:
         Path("a.csv").write_text(rows)
     Path("a.yaml").write_text("curve: swing.yaml\nquantities: [period]\ntable: a.csv\n")
@@ -218,7 +222,7 @@ def test_bad_tables_are_refused(rows: str | None, message: str, here: Path) -> N
 
 
 def test_columns_in_units(here: Path) -> None:
-    """Nearest doubles of exact products, angles too."""
+    """Columns in units, also of angles, give the nearest doubles of exact products."""
     Path("a.csv").write_text("lam0\tL\n90\t0.3\n-30\t110\n")
     Path("a.yaml").write_text(
         "curve: swing.yaml\nquantities: [period]\ntable: {file: a.csv, units: {lam0: deg, L: cm}}\n"
@@ -230,7 +234,7 @@ def test_columns_in_units(here: Path) -> None:
 
 
 def test_files_that_are_none_are_refused(here: Path) -> None:
-    """A link out of the folder, and a pipe that would never end."""
+    """A link out of the folder and a pipe without end are refused."""
     os.mkfifo("pipe.yaml")
     Path("inside").mkdir()
     Path("inside/link.yaml").symlink_to(here / "swing.yaml")
@@ -247,7 +251,7 @@ def test_every_quantity_has_a_name_and_a_unit() -> None:
 
 
 def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
-    """`gqm schema --sweep` prints it, in the draft that editors know."""
+    """`gqm schema --sweep` prints the schema, in the draft that editors know."""
     assert tool.main(["schema", "--sweep"]) == 0
     schema = json.loads(capsys.readouterr().out)
     assert schema == sweep_schema()
@@ -260,7 +264,7 @@ def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -
 
 LONG = "curve: swing.yaml\nquantities: [half_period]\ngrid: {lam0: {start: 0.1, stop: 2.9, num: 100000}}\n"
 
-# Ends itself as a power cut would when the second part is stored.
+# This process ends itself as in a power cut when the second part is stored.
 KILLED = """\
 import os, signal, sys
 from gqm_sym.cli import tool
@@ -322,7 +326,7 @@ def test_a_damaged_part_is_computed_again(here: Path, monkeypatch: pytest.Monkey
 def test_an_interruption_says_what_to_do(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The code of interrupted programs, and that nothing is lost."""
+    """The exit code is that of interrupted programs, and the message says that nothing is lost."""
 
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
@@ -333,7 +337,9 @@ def test_an_interruption_says_what_to_do(
 
 
 def test_what_is_there_is_not_lost(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A complete file stays; other files and parts are refused unless told; the ending says the format."""
+    """A complete file is kept; other files and parts are refused unless forced; the file's ending determines the
+    format.
+    """
     assert tool.main(["sweep", "periods.yaml", "-o", "a.nc"]) == 0
     made = Path("a.nc").stat().st_mtime_ns
     assert tool.main(["sweep", "periods.yaml", "-o", "a.nc"]) == 0
@@ -363,7 +369,7 @@ def test_without_xarray(here: Path, capsys: pytest.CaptureFixture[str], monkeypa
 
 
 def test_the_bar() -> None:
-    """Drawn in place on a terminal, and nowhere else."""
+    """The bar is drawn in place on a terminal, and nowhere else."""
 
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
@@ -383,7 +389,7 @@ def test_the_bar() -> None:
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[Any]:
-    """Two workers on this machine, each a process."""
+    """Return two workers on this machine, each a process."""
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as machines,
@@ -393,7 +399,9 @@ def client() -> Iterator[Any]:
 
 
 def test_a_cluster_gives_the_same_numbers(client: Any, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """To the last byte of the file, and of the arrays of `module.sweep`; by address from the command line."""
+    """The numbers are the same to the last byte of the file, and of the arrays of `module.sweep`; by address from the
+    command line.
+    """
     Path("long.yaml").write_text(LONG)
     plan = read_sweep("long.yaml")
     run(plan, "here.nc")
@@ -417,7 +425,7 @@ def test_a_cluster_gives_the_same_numbers(client: Any, here: Path, capsys: pytes
 
 
 def test_a_worker_of_another_version_is_refused(client: Any, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its numbers might differ in their last places."""
+    """A worker of another version is refused, because its numbers might differ in their last places."""
     monkeypatch.setattr(cluster, "STAMP", "another")
     module = gqm.build(gqm.read_spec("swing.yaml").derive(), name="swing")
     with pytest.raises(gqm.GQMError, match="another version of gqm_sym"):
@@ -425,7 +433,7 @@ def test_a_worker_of_another_version_is_refused(client: Any, here: Path, monkeyp
 
 
 def test_no_scheduler(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """An address where nobody answers."""
+    """An address at which no scheduler answers gives an error."""
     pytest.importorskip("distributed")
     monkeypatch.setattr(cluster, "TIMEOUT", 0.1)
     assert tool.main(["sweep", "periods.yaml", "--scheduler", "tcp://127.0.0.1:1"]) == 2

@@ -1,4 +1,4 @@
-"""Limits of time and memory around what hostile input is given to."""
+"""Time and memory are limited while hostile input is processed."""
 
 import gc
 import resource
@@ -20,15 +20,15 @@ class OutOfTime(BaseException):
 def confined(seconds: float = SECONDS, megabytes: int = MEGABYTES) -> Iterator[None]:
     """Let the block take this processor time, and this memory beyond what the process has.
 
-    Processor time of this thread, so that neither a busy machine nor threads that other tests left fail a test; what
-    those left in memory is kept from the garbage collector meanwhile.
+    Only the processor time of this thread counts, so that neither a busy machine nor threads of other tests fail a
+    test. What those left in memory is kept from the garbage collector meanwhile.
     """
     gc.freeze()
     begin = thread_time()
 
     def stop(*_: object) -> None:
         left = begin + seconds - thread_time()
-        # Once more soon after: an exception in a finalizer is lost.
+        # The signal is repeated soon, because an exception in a finalizer is lost.
         signal.setitimer(signal.ITIMER_VIRTUAL, left if left > 0.0 else 0.1)
         if left <= 0.0:
             raise OutOfTime(f"more than {seconds} s of processor time")

@@ -1,4 +1,4 @@
-"""Emitted modules as tests see them: their syntax audited, their compiled functions against the declared text."""
+"""Tests audit the syntax of emitted modules and compare their compiled functions with the declared text."""
 
 import ast
 from collections.abc import Callable
@@ -18,12 +18,12 @@ from gqm_sym.derivation import Model
 from gqm_sym.runtime import interface
 
 DIGITS = 50
-# Roundings (2**-53) of what a value is made of: worst measured 6.1, 2.0, 1.9 and 6.7.
+# The tolerances in roundings (2**-53) of the terms of a value. Worst measured: 6.1, 2.0, 1.9 and 6.7.
 PATH, POTENTIAL, DIVDIFF1, DIVDIFF2 = 8, 3, 3, 9
 # Bounds at a single place are as wide as a few roundings outwards of each operation.
 POINT_WIDTH = 1e-13
 
-# Ends and a place between or beyond them, near and far, whose differences are exact.
+# The ends, and a place between or beyond them, near and far, have exact differences.
 TRIPLES = (
     (0.25, 0.5, 1.125),
     (0.5, 0.75, 0.75),
@@ -61,7 +61,7 @@ def declared(text: str, *, title: str = "", parameter: str = "u", **parameters: 
 
 @cache
 def oracle(text: str, names: tuple[str, ...]) -> Callable[..., list[mpf]]:
-    """Give z, z' and z'' by the first name, as SymPy and mpmath read the text."""
+    """Return z, z' and z'' by the first name, as SymPy and mpmath read the text."""
     known = {name: sp.Symbol(name, real=True) for name in names} | {"e": sp.E, "ln": sp.log}
     known["cbrt"] = lambda w: w ** sp.Rational(1, 3)
     z = sp.sympify(text, locals=known, rational=True)
@@ -72,7 +72,7 @@ def oracle(text: str, names: tuple[str, ...]) -> Callable[..., list[mpf]]:
 
 
 def interpreted(model: Model, name: str) -> ModuleType:
-    """Return a module whose functions Python runs: each stands where the address of the compiled one would."""
+    """Return a module whose functions Python runs; each has the address at which the compiled one would be."""
     module = ModuleType(name)
     module.__file__ = f"{name}.py"
 
@@ -108,28 +108,28 @@ class Compiled:
         return out
 
     def path_and_contact_force(self, places: list[float], speeds: list[float]) -> np.ndarray:
-        """Rows x, z, ds, kappa, contact force."""
+        """Return the rows x, z, ds, kappa and contact force."""
         return self._call("path_and_contact_force", interface.PATH_ROWS, len(places), places, speeds)
 
     def effective_potential(self, places: list[float]) -> np.ndarray:
-        """Rows U, dU/dlam."""
+        """Return the rows U and dU/dlam."""
         return self._call("effective_potential", 2, len(places), places)
 
     def potential_divdiff1(self, a: float, places: list[float], offsets: list[float]) -> np.ndarray:
-        """Rows first difference, ds."""
+        """Return the rows of the first difference and ds."""
         return self._call("potential_divdiff1", 2, len(places), a, places, offsets)
 
     def potential_divdiff2(self, a: float, b: float, left: list[float], right: list[float]) -> np.ndarray:
-        """Rows second difference, ds."""
+        """Return the rows of the second difference and ds."""
         return self._call("potential_divdiff2", 2, len(left), a, b, left, right)
 
     def bounds(self, lo: float, hi: float) -> np.ndarray:
-        """Ends of the slope's enclosure, and of that of ds."""
+        """Return the ends of the slope's enclosure, and of that of ds."""
         return self._call("bounds", 4, None, lo, hi)[:, 0]
 
 
 def near(actual: float, truth: mpf, roundings: int, scale: mpf | None = None) -> None:
-    """Hold a number to a truth of 50 digits, in roundings of it or of its scale."""
+    """Check a number against a true one of 50 digits, in roundings of it or of its scale."""
     allowed = roundings * mpf(2) ** -53 * (abs(truth) if scale is None else scale)
     assert abs(mpf(float(actual)) - truth) <= allowed, (actual, mp.nstr(truth, 20))
 
@@ -137,9 +137,9 @@ def near(actual: float, truth: mpf, roundings: int, scale: mpf | None = None) ->
 def check_numbers(
     module: ModuleType, text: str, values: dict[str, float], parameter: str = "u", *, kink: float | None = None
 ) -> None:
-    """Hold all five compiled functions to the declared text, g = 9.75 and m = 2.
+    """Check all five compiled functions against the declared text, for g = 9.75 and m = 2.
 
-    At a kink the slope jumps: no bounds are asked for there, and they may be infinite across it.
+    At a kink the slope jumps, so that bounds are not checked there; across it they may be infinite.
     """
     compiled = Compiled(module, tuple(values.values()))
     with mp.workdps(DIGITS):
@@ -191,7 +191,7 @@ def check_numbers(
 
 
 def audit(text: str) -> ast.Module:
-    """Parse emitted text and hold every node, name, import and call to what a module may have."""
+    """Parse emitted text, and check every node, name, import and call against what a module may have."""
     tree = ast.parse(text)
     functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
     imported = {a.name for node in tree.body if isinstance(node, ast.ImportFrom) for a in node.names}

@@ -1,4 +1,4 @@
-"""Slow, obvious oracles: what a motion must be, from mpmath and SymPy alone, never from gqm_sym."""
+"""Slow and simple calculations say what a motion must be, from mpmath and SymPy alone, never from gqm_sym."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -23,7 +23,7 @@ class Point(NamedTuple):
 
 @cache
 def _geometry(track: Track) -> Callable[..., list[mpf]]:
-    """Coordinates and their derivatives, as SymPy gives them without any simplification."""
+    """Return coordinates and their derivatives, as SymPy gives them without any simplification."""
     names = sp.symbols([track.parameter, *track.parameters], real=True)
     known = {symbol.name: symbol for symbol in names}
     x, z = (sp.sympify(text, locals=known, rational=True) for text in (track.x, track.z))
@@ -33,7 +33,7 @@ def _geometry(track: Track) -> Callable[..., list[mpf]]:
 
 
 def point(problem: Problem, track: Track, lam: mpf | float | str) -> Point:
-    """The values at ``lam`` by the definitions, to 50 digits: V**2 = v0**2 - 2*g*(z - z0) and so on."""
+    """Return the values at ``lam`` by the definitions, to 50 digits: V**2 = v0**2 - 2*g*(z - z0) and so on."""
     given = dict(problem.parameters)
     with mp.workdps(DIGITS):
         geometry = _geometry(track)
@@ -58,9 +58,9 @@ class Scale(NamedTuple):
 
 @cache
 def scale(problem: Problem, track: Track) -> Scale:
-    """Largest |lam|, extent of the orbit in the plane, largest speed.
+    """Return the largest |lam|, the extent of the orbit in the plane, and the largest speed.
 
-    What rests has no extent: there it is the distance from the origin.
+    A body at rest has no extent; the distance from the origin takes its place.
     """
     seen = [number(row.lam) for row in (*problem.positions, *problem.samples)]
     seen += [number(text) for text in problem.turning_points or ()]
@@ -81,7 +81,7 @@ def scale(problem: Problem, track: Track) -> Scale:
 
 
 def pendulum(amplitude: mpf | float, frequency: mpf | float, t: mpf | float) -> mpf:
-    """Angle from the vertical after release at ``amplitude``: 2*asin(k*cd(omega*t, k))."""
+    """Return the angle from the vertical after release at ``amplitude``, 2*asin(k*cd(omega*t, k))."""
     with mp.workdps(DIGITS):
         k = mp.sin(mpf(amplitude) / 2)
         u = mpf(frequency) * mpf(t)
@@ -90,25 +90,25 @@ def pendulum(amplitude: mpf | float, frequency: mpf | float, t: mpf | float) -> 
 
 
 def pendulum_half_period(amplitude: mpf | float, frequency: mpf | float) -> mpf:
-    """Half period of a pendulum: 2*K(sin(A/2))/omega."""
+    """Return the half period of a pendulum, 2*K(sin(A/2))/omega."""
     with mp.workdps(DIGITS):
         return 2 * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2) / mpf(frequency)
 
 
 def error(actual: float, expected: str | mpf) -> float:
-    """|actual - expected|, subtracted at 50 digits."""
+    """Return |actual - expected|, subtracted at 50 digits."""
     with mp.workdps(DIGITS):
         truth = expected if isinstance(expected, mpf) else mpf(expected)
         return float(abs(mpf(float(actual)) - truth))
 
 
 def ulps(actual: float, expected: str | mpf) -> float:
-    """The same in units of the last place of the expected value."""
+    """Return the same in units of the last place of the expected value."""
     return error(actual, expected) / math.ulp(float(expected))
 
 
 def overstatement(motion: Any, positions: Iterable[tuple[str, str]], scale: float) -> float:
-    """How many times, at most, ``error_bound`` says what it should.
+    """Return the largest ratio of ``error_bound`` to what it should be.
 
     That is the larger of one unit in the last place of the scale and the largest error in the same decade of time.
     """

@@ -1,7 +1,7 @@
-"""Orbits in mpmath: half periods, laps and actions from formulas written once more, with derivatives by differences.
+"""Half periods, laps and actions in mpmath come from separate formulas, with derivatives by differences.
 
-Each track says its effective potential U, ds/dlam and 1 + beta as functions of the place and of all run-time parameters
-by name, beginning with a launch. Nothing here comes from gqm_sym.
+Each track gives its effective potential U, ds/dlam and 1 + beta as functions of the place and of all run-time
+parameters by name, beginning with a launch. Nothing here comes from gqm_sym.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-# Nodes of the midpoint rule, which gives 35 digits on all orbits here.
+# The number of nodes of the midpoint rule, which gives 35 digits on all orbits here.
 NODES = 128
 
 
@@ -72,14 +72,14 @@ FORMULAS = {
 
 
 def turning_point(name: str, launch: Mapping[str, Any], near: float) -> mpf:
-    """Where V**2 vanishes, from a double beside it."""
+    """Return the place where V**2 vanishes, from a double beside it."""
     potential, lam = FORMULAS[name].potential, mpf(near)
     level = potential(launch["lam0"], **launch) + launch["v0"] ** 2 / 2
     return mp.findroot(lambda u: potential(u, **launch) - level, lam)
 
 
 def half_orbit(name: str, launch: Mapping[str, Any], near: tuple[float, float]) -> tuple[mpf, mpf, mpf, mpf]:
-    """Half period, action, and both turning points of a libration, from doubles beside these."""
+    """Return half period, action, and both turning points of a libration, from doubles beside these."""
     formula = FORMULAS[name]
     a, b = sorted(turning_point(name, launch, end) for end in near)
     w0 = launch["v0"] ** 2 + 2 * formula.potential(launch["lam0"], **launch)
@@ -97,7 +97,7 @@ def half_orbit(name: str, launch: Mapping[str, Any], near: tuple[float, float]) 
 def by_differences(
     function: Callable[[dict[str, mpf]], Any], launch: Mapping[str, float], name: str, digits: int = 12
 ) -> list[mpf]:
-    """The derivatives of some numbers by one of a launch's: the step has so many digits."""
+    """Return the derivatives of some numbers with respect to one of a launch's; the step has so many digits."""
     step, numbers = mpf(10) ** -digits, {key: mpf(value) for key, value in launch.items()}
     after, before = (function({**numbers, name: numbers[name] + sign * step}) for sign in (1, -1))
     return [(up - down) / (2 * step) for up, down in zip(after, before, strict=True)]

@@ -1,4 +1,4 @@
-"""Where the repository and the tests' data lie."""
+"""The repository and the tests' data lie at these paths."""
 
 from pathlib import Path
 

@@ -1,8 +1,8 @@
-"""One table of conservative motions with known answers, for every test that wants a truth.
+"""One table has conservative motions with known answers, for every test that needs reference values.
 
-A track is a curve as a user declares it; a problem is a launch on a track with what must come out,
-where that is known from, and what makes it hard. Numbers stay text: they are exact. The truths are
-read from the files in ``data/`` (their README says who made them).
+A track is a curve as a user declares it; a problem is a launch on a track with the expected results, their source, and
+what makes it hard. Numbers are kept as text, which is exact. The reference values are read from the files in ``data/``
+(their README says who made them).
 """
 
 import json
@@ -19,7 +19,7 @@ DIGITS = 50
 
 
 def number(text: str | float) -> mpf:
-    """Exactly what a number says, to 50 digits."""
+    """Return exactly what a number says, to 50 digits."""
     with mp.workdps(DIGITS):
         if isinstance(text, float):
             return mpf(text)
@@ -28,7 +28,7 @@ def number(text: str | float) -> mpf:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """A curve as it is declared, and spelled out once more for the oracle."""
+    """A curve as it is declared, and in formulas for `naive`."""
 
     name: str
     x: str
@@ -40,7 +40,7 @@ class Track:
     family: str | None = None
 
     def declare(self) -> Any:
-        """Declare it through the public interface: by family, as a graph or parametrically."""
+        """Declare the curve through the public interface: by family, as a graph or parametrically."""
         import gqm_sym as gqm
 
         if self.family is not None:
@@ -54,7 +54,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Position:
-    """Where the body is at a time after launch; ``v`` is the signed ds/dt."""
+    """The place of the body at a time after launch; ``v`` is the signed ds/dt."""
 
     t: str
     lam: str
@@ -97,13 +97,13 @@ class Problem:
 
     @property
     def launch(self) -> dict[str, Any]:
-        """Arguments of ``module.solve``."""
+        """Return the arguments of ``module.solve``."""
         start = {"lam0": self.lam0, "v0": self.v0, "direction": self.direction}
         return start | dict(self.parameters)
 
     @property
     def period(self) -> float:
-        """The period, infinite where there is none."""
+        """Return the period, which is infinite if there is none."""
         if self.half_period is not None:
             return 2 * float(self.half_period)
         return math.inf if self.loop_time is None else float(self.loop_time)
@@ -178,8 +178,8 @@ TRACKS = {
     )
 }
 
-# Track and difficulty of the cases taken from paper_cases.json; the others there have forces that
-# are not conservative gravity.
+# The track and the difficulty of the cases taken from paper_cases.json; the others there have forces that are not
+# conservative gravity.
 PAPER = {
     "example1_pendulum": ("pendulum", "exact launch, 1e9 s"),
     "table3_1_graph": ("bowl", ""),
@@ -194,7 +194,7 @@ PAPER = {
     "table2_1b_frictionless_quartic": ("quartic", "no curvature at the bottom"),
 }
 
-# Curves of the corpus that are declared as one of the tracks, and how their parameters are called.
+# The curves of the corpus that are declared as one of the tracks, and the names of their parameters.
 CORPUS = {
     "Circle": ("pendulum", {"R": "L"}),
     "Ellipse": ("ellipse", {}),
@@ -237,7 +237,7 @@ def _read(name: str) -> Any:
 
 
 def _met(points: list[str], lam0: float, v0: str, direction: int) -> tuple[str, ...]:
-    """Turning points in the order met: a launch from rest is at the first of them."""
+    """Return turning points in the order in which they are met; a launch from rest is at the first of them."""
     if float(v0) == 0:
         return tuple(sorted(points, key=lambda point: abs(float(point) - lam0)))
     return tuple(sorted(points, key=float, reverse=direction > 0))
@@ -293,7 +293,7 @@ def _corpus() -> Iterator[Problem]:
             points = expected.get("turning_points", [])
             lam0, v0, direction = launch["lam0"], launch["v0"], launch["direction"]
             transit = expected.get("transit_time")
-            # A transit was only followed to where its timing stops; it may turn beyond.
+            # A transit was only followed to the place of its timing, and may turn beyond.
             met = _met(points, float(lam0), v0, direction) if transit is None else None
             yield Problem(
                 slug=f"corpus_{name.lower().replace(' ', '_')}_{count + 1}",
@@ -341,7 +341,7 @@ PROBLEMS = {problem.slug: problem for problem in (*_paper(), *_corpus(), *_close
 
 
 def where(**wanted: Any) -> list[Problem]:
-    """Give the problems whose fields have the wanted values; True and False ask for filled ones."""
+    """Return the problems whose fields have the given values; True and False ask for filled and empty ones."""
 
     def fits(problem: Problem) -> bool:
         return all(

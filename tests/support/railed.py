@@ -1,4 +1,4 @@
-"""Rails, their modules and their charts."""
+"""Tests make rails, their modules and their charts."""
 
 from pathlib import Path
 from types import ModuleType
@@ -7,7 +7,7 @@ from typing import Any
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.chart import Chart
 
-# A loop between clothoids.
+# The rail is a loop between clothoids.
 LOOP = [
     gqm.line(length="a"),
     gqm.clothoid(length="c", kappa_start=0, kappa_end="1/R"),
@@ -18,11 +18,11 @@ LOOP = [
 
 
 def built(folder: Path, name: str, pieces: list[Any], **options: Any) -> ModuleType:
-    """A module for motion under gravity along a rail."""
+    """Return a module for motion under gravity along a rail."""
     return gqm.build(gqm.derive(gqm.Curve.piecewise(pieces, **options), gqm.Gravity()), name=name, folder=folder)
 
 
 def chart_of(module: ModuleType, **given: Any) -> Chart:
-    """The chart that a module makes of its rail."""
+    """Return the chart that a module makes of its rail."""
     numbers = module.MODEL.numbers(tuple((module.PARAMETERS | given).values()))
     return module.MODEL.charted(numbers)

@@ -35,17 +35,17 @@ class Textbook:
     law: Callable[..., mpf] = lambda *_: mpf(0)
 
     def shape(self, lam: mpf) -> tuple[mpf, mpf, mpf, mpf]:
-        """σ, both components of the tangent, and the curvature."""
+        """Return σ, both components of the tangent, and the curvature."""
         return _shape(self.x, self.z, lam, mp.prec)
 
     def forces(self, lam: mpf) -> tuple[mpf, mpf]:
-        """F·t, and n₀ = -F·n with n a quarter turn to the left of t."""
+        """Return F·t, and n₀ = -F·n with n a quarter turn to the left of t."""
         _, tx, tz, _ = self.shape(lam)
         fx, fz = self.push(self.x(lam), self.z(lam))
         return fx * tx + fz * tz, fx * tz - fz * tx
 
     def acceleration(self, lam: mpf, w: mpf, v: int, nu: int | None = None, *, held: bool = False) -> mpf:
-        """A of a body at speed √w in direction v; ``nu`` stands for the sign of N where it is given."""
+        """Return A of a body at speed √w in direction v; ``nu`` stands for the sign of N if it is given."""
         _, tx, _, kappa = self.shape(lam)
         push, load = self.forces(lam)
         normal = kappa * w + load
@@ -54,11 +54,11 @@ class Textbook:
         return (push - v * braking + self.law(lam, self.x(lam), self.z(lam), w, v)) / self.inertia
 
     def rate(self, lam: mpf, w: mpf, v: int, nu: int | None = None) -> mpf:
-        """dW/dλ."""
+        """Return dW/dλ."""
         return 2 * self.shape(lam)[0] * self.acceleration(lam, w, v, nu)
 
     def centre(self, radius: mpf) -> "Textbook":
-        """The same for the centre of a body of this radius, to the left of the curve."""
+        """Return the curve of the centre of a body of this radius, to the left of the curve."""
 
         def across(lam: mpf) -> tuple[mpf, mpf]:
             _, tx, tz, _ = self.shape(lam)
@@ -73,7 +73,9 @@ class Textbook:
 
 @lru_cache(maxsize=4096)
 def _shape(x: Number, z: Number, lam: mpf, _precision: int) -> tuple[mpf, mpf, mpf, mpf]:
-    """The same, kept: all terms of an equation ask for it, and quadratures for either sign at the same places."""
+    """Return `shape`, cached, because all terms of an equation need it, and quadratures for either sign at the same
+    places.
+    """
     dx, dz = mp.diff(x, lam), mp.diff(z, lam)
     ddx, ddz = mp.diff(x, lam, 2), mp.diff(z, lam, 2)
     ds = mp.hypot(dx, dz)

@@ -1,4 +1,4 @@
-"""Charts of implicit curves, made by the tracer from functions that are written out here."""
+"""Tests trace charts of implicit curves from functions that are written out here."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.tracing import Traced
 from gqm_sym.runtime.interface import FIELD, INTERFACE
 
-# Of the curve's extent; worst measured 4e-16 where F is computed without cancellation.
+# The tolerance relative to the curve's extent. Worst measured: 4e-16 if F is computed without cancellation.
 ROUNDING = 1e-15
 
 DEGREE = 6
@@ -26,7 +26,7 @@ compiled = compiler(__file__, interface=INTERFACE)
 
 @compiled(FIELD)
 def _polynomial(n, xs, zs, p, out):
-    """F = sum of p[j, k] x**j z**k and its derivatives."""
+    """Return F = sum of p[j, k] x**j z**k and its derivatives."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, (DEGREE + 1, DEGREE + 1)), carray(out, (6, n))
     for i in range(n):
         x, z = xs[i], zs[i]
@@ -55,7 +55,7 @@ SQUARE, BEND, ROOT, WAVE = range(4)
 
 @compiled(FIELD)
 def _other(n, xs, zs, p, out):
-    """|x| + |z| - 1, z - x|x|, z - sqrt(x) and z - sin(x), by the number p[0]."""
+    """Return |x| + |z| - 1, z - x|x|, z - sqrt(x) or z - sin(x), by the number p[0]."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 1), carray(out, (6, n))
     for i in range(n):
         x, z, which = xs[i], zs[i], int(p[0])
@@ -79,7 +79,7 @@ def trace(
     domain: tuple[float | None, float | None] = (None, None),
     given: dict[str, Any] | None = None,
 ) -> Chart:
-    """The chart of a polynomial's curve."""
+    """Return the chart of a polynomial's curve."""
     x, z = sp.symbols("x z")
     polynomial = sp.Poly(sp.sympify(text, rational=True).subs(given or {}), x, z)
     coefficients = np.zeros((DEGREE + 1, DEGREE + 1))
@@ -89,7 +89,7 @@ def trace(
 
 
 def other(which: int, start: tuple[float, float], domain: tuple[float | None, float | None] = (None, None)) -> Chart:
-    """The chart of a curve that is no polynomial's."""
+    """Return the chart of a curve that is no polynomial's."""
     return _maker(_other, start, 1, domain).chart((float(which),))
 
 
@@ -104,7 +104,9 @@ def _maker(field: Any, start: tuple[float, float], tangent: int, domain: tuple[f
 
 
 def hold(chart: Chart, places: Any, truth: Callable[[int], tuple[Any, ...]], within: float = ROUNDING) -> None:
-    """Hold x, z, alpha (but for whole turns) and kappa to a truth; x and z of their extent, kappa of its largest."""
+    """Check x, z, alpha (up to whole turns) and kappa against true values, x and z relative to their extent, kappa to
+    its largest value.
+    """
     rows = chart.points(places)
     wanted = [truth(k) for k in range(len(places))]
     extent = max(max(float(w[i]) for w in wanted) - min(float(w[i]) for w in wanted) for i in (0, 1))

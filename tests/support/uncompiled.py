@@ -1,6 +1,6 @@
-"""The runtime as plain Python throughout: coverage is measured so, and mutants are run so.
+"""The runtime can run as plain Python throughout, which is how coverage is measured and mutants are run.
 
-Python runs what is not compiled yet, to the same bits. Here it never is.
+Python runs what is not compiled yet, to the same bits. Here nothing ever is.
 """
 
 import math

@@ -262,9 +262,9 @@ class Algebra:
         # 2 s c = S, 2 c² = 1 + C, and 2 s² = 1 - C (circular) or C - 1 (hyperbolic).
         result = self.ring.zero
         for monomial, coefficient in polynomial.terms():
-            rest = _with(_with(monomial, pair.sine, 0), pair.cosine, 0)
+            others = _with(_with(monomial, pair.sine, 0), pair.cosine, 0)
             result += (
-                self.ring({rest: coefficient})
+                self.ring({others: coefficient})
                 * (pair.sign * (1 - c)) ** (monomial[pair.sine] // 2)
                 * (1 + c) ** (monomial[pair.cosine] // 2)
                 * s ** (monomial[pair.sine] % 2)
@@ -283,7 +283,7 @@ class Algebra:
     # Derivatives
 
     def derivative(self, polynomial: Polynomial) -> Fraction:
-        """Return the derivative of a polynomial by the variable."""
+        """Return the derivative of a polynomial with respect to the variable."""
         total = Fraction(self.ring.zero, self.one)
         for place, name in enumerate(self.names):
             part = polynomial.diff(self.generators[place])

@@ -38,7 +38,7 @@ _OUTER: dict[type[sp.Basic], Callable[[sp.Expr], sp.Expr]] = {
 
 
 def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-    """Return the derivative of ``expression`` by ``variable``.
+    """Return the derivative of ``expression`` with respect to ``variable``.
 
     Raises
     ------

@@ -13,17 +13,17 @@ MAX_SQUARE_FREE = 6000
 
 def factors(algebra: Algebra, polynomial: Polynomial) -> tuple[int, list[tuple[Polynomial, int]]]:
     """Return the integer content of a polynomial and its factors with their multiplicities."""
-    content, rest = polynomial.primitive()
+    content, remainder = polynomial.primitive()
     found: list[tuple[Polynomial, int]] = []
-    lowest = tuple(min(powers) for powers in zip(*rest, strict=True))
+    lowest = tuple(min(powers) for powers in zip(*remainder, strict=True))
     for place, power in enumerate(lowest):
         if power:
             found.append((algebra.generators[place], power))
-    rest = rest.quo(algebra.ring({lowest: 1}))
-    if rest.is_ground:
-        return int(content) * int(rest.LC), found
+    remainder = remainder.quo(algebra.ring({lowest: 1}))
+    if remainder.is_ground:
+        return int(content) * int(remainder.LC), found
     # With c = 1 in every pair a homogeneous form has one variable less and keeps its factors.
-    flat, pairs = _flattened(algebra, rest)
+    flat, pairs = _flattened(algebra, remainder)
     size = prod(max(powers) + 1 for powers in zip(*flat, strict=True))
     if size <= MAX_FACTORED:
         number, parts = flat.factor_list()

@@ -156,12 +156,12 @@ def is_real_power(node: sp.Basic) -> bool:
 
 def angle_of(node: sp.Basic) -> tuple[sp.Rational, Angle]:
     """Return the rational factor and the rest of an argument; commensurate arguments share the rest."""
-    factor, rest = node.args[0].primitive()
-    inner, rest = rest.as_coeff_Mul()
+    factor, remainder = node.args[0].primitive()
+    inner, remainder = remainder.as_coeff_Mul()
     factor *= inner
-    if rest.could_extract_minus_sign():
-        factor, rest = -factor, -rest
-    return factor, (_KINDS[node.func], rest)
+    if remainder.could_extract_minus_sign():
+        factor, remainder = -factor, -remainder
+    return factor, (_KINDS[node.func], remainder)
 
 
 def root_of(node: sp.Basic) -> sp.Basic:

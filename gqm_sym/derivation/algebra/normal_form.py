@@ -76,8 +76,8 @@ def _in_powers(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():
         split = [(power, 0) if lead else (0, power) for power, lead in zip(monomial, leads, strict=True)]
-        wave, rest = zip(*split, strict=True)
-        _add(terms, _monomial(algebra, wave), rest, Fraction(int(coefficient)))
+        wave, remainder = zip(*split, strict=True)
+        _add(terms, _monomial(algebra, wave), remainder, Fraction(int(coefficient)))
     return _sum(algebra, terms)
 
 
@@ -102,7 +102,7 @@ def _sum(algebra: Algebra, terms: Terms) -> sp.Expr:
         if all(size < 0 for size in sizes):
             content = -content
         common = tuple(min(powers) for powers in zip(*kept, strict=True))
-        rest = sp.Add(
+        remainder = sp.Add(
             *(
                 _rational(size / content)
                 * _monomial(algebra, (power - low for power, low in zip(monomial, common, strict=True)))
@@ -112,10 +112,10 @@ def _sum(algebra: Algebra, terms: Terms) -> sp.Expr:
         number = _rational(content)
         if wave == 1 and not any(common):
             # In a sum with other terms, 2*(a + b) is written as 2*a + 2*b.
-            parts += [number * term for term in sp.Add.make_args(rest)]
+            parts += [number * term for term in sp.Add.make_args(remainder)]
         else:
             # All factors are multiplied at once, because SymPy distributes a single number over a sum.
-            parts.append(sp.Mul(number, _monomial(algebra, common), rest, wave))
+            parts.append(sp.Mul(number, _monomial(algebra, common), remainder, wave))
     return sp.Add(*parts)
 
 
@@ -130,9 +130,9 @@ def _as_exponential(algebra: Algebra, polynomial: Polynomial) -> sp.Expr | None:
             continue
         s, c = algebra.generators[pair.sine], algebra.generators[pair.cosine]
         for sign in (1, -1):
-            for way in (1, -1):
-                if polynomial == sign * (c + way * s):
-                    return sign * sp.exp(way * pair.angle)
+            for exponent_sign in (1, -1):
+                if polynomial == sign * (c + exponent_sign * s):
+                    return sign * sp.exp(exponent_sign * pair.angle)
     return None
 
 
@@ -151,14 +151,14 @@ def in_multiple_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
     """Write a polynomial in sines and cosines of multiple angles."""
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():
-        rest = list(monomial)
+        remainder = list(monomial)
         products = [(sp.S.One, Fraction(int(coefficient)))]
         for pair in algebra.pairs:
             series = _multiple_angles(pair, monomial[pair.sine], monomial[pair.cosine])
-            rest[pair.sine] = rest[pair.cosine] = 0
+            remainder[pair.sine] = remainder[pair.cosine] = 0
             products = [(wave * other, size * factor) for wave, size in products for other, factor in series]
         for wave, size in products:
-            _add(terms, wave, tuple(rest), size)
+            _add(terms, wave, tuple(remainder), size)
     return _sum(algebra, terms)
 
 
@@ -199,16 +199,16 @@ def _in_combined_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
     circular = [pair for pair in algebra.pairs if pair.sign > 0]
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():
-        rest = list(monomial)
+        remainder = list(monomial)
         products = [(sp.S.Zero, False, Fraction(int(coefficient)))]
         for pair in circular:
             sines, cosines = monomial[pair.sine], monomial[pair.cosine]
-            rest[pair.sine] = rest[pair.cosine] = 0
+            remainder[pair.sine] = remainder[pair.cosine] = 0
             for is_sine in (True,) * sines + (False,) * cosines:
                 products = [new for old in products for new in _times_wave(*old, pair.angle, is_sine)]
         for angle, is_sine, size in products:
             sign, wave = waves(sp.factor_terms(sp.cancel(angle)), 1)[1 - is_sine].as_coeff_Mul()
-            _add(terms, wave, tuple(rest), int(sign) * size)
+            _add(terms, wave, tuple(remainder), int(sign) * size)
     return _sum(algebra, terms)
 
 

@@ -142,15 +142,15 @@ def product(powers: Iterable[Power]) -> sp.Expr:
     """Multiply factors with their powers; u**p/u becomes u**(p - 1), and -(a - b) becomes b - a."""
     listed = [(base, exponent) for base, exponent in powers if base != 1]
     number = sp.Mul(*(base**exponent for base, exponent in listed if base.is_Rational))
-    rest = [(base, exponent) for base, exponent in listed if not base.is_Rational]
+    remainder = [(base, exponent) for base, exponent in listed if not base.is_Rational]
     if number.is_negative:
-        for place, (base, exponent) in enumerate(rest):
+        for place, (base, exponent) in enumerate(remainder):
             odd = exponent % 2 == 1
             if base.is_Add and odd and minus_signs(-base) <= minus_signs(base):
-                rest[place] = (-base, exponent)
+                remainder[place] = (-base, exponent)
                 number = -number
                 break
-    result = sp.Mul(number, *(base**exponent for base, exponent in rest))
+    result = sp.Mul(number, *(base**exponent for base, exponent in remainder))
     if any(not power.exp.is_number for power in result.atoms(sp.Pow)):
         return sp.powsimp(result, combine="exp")
     return result
@@ -234,10 +234,10 @@ def _merged(algebra: Algebra, waves: list[Polynomial]) -> tuple[sp.Rational, sp.
 
 def _content(form: sp.Expr) -> tuple[sp.Rational, sp.Expr]:
     """Return the numerical factor and the rest of a form, so that signs and numbers are in one place of a product."""
-    content, rest = form.primitive() if form.is_Add else form.as_coeff_Mul()
-    if rest.is_Add and minus_signs(-rest) < minus_signs(rest):
-        return -content, -rest
-    return content, rest
+    content, remainder = form.primitive() if form.is_Add else form.as_coeff_Mul()
+    if remainder.is_Add and minus_signs(-remainder) < minus_signs(remainder):
+        return -content, -remainder
+    return content, remainder
 
 
 def magnitudes(signs: Signs, powers: Iterable[Power]) -> list[Power]:

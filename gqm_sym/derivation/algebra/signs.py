@@ -9,7 +9,7 @@ _NEVER_NEGATIVE = (sp.Abs,)
 
 # The largest angle that is considered: no practical curve reaches further within half a wave, and SymPy would need more
 # digits for larger angles.
-FAR = 10**6
+MAX_ANGLE = 10**6
 _ODD = (sp.sinh, sp.tanh, sp.asinh, sp.atan, sp.asin, sp.atanh)
 
 
@@ -117,10 +117,10 @@ class Signs:
     def _sign_of_line(self, expression: sp.Add) -> int | None:
         """Return the sign of a linear function of the parameter whose coefficients are numbers."""
         slope = expression.coeff(self.parameter)
-        rest = sp.expand(expression - slope * self.parameter)
-        if not (slope.is_Rational and rest.is_number and slope):
+        remainder = sp.expand(expression - slope * self.parameter)
+        if not (slope.is_Rational and remainder.is_number and slope):
             return None
-        return self._sign_of_range(*self._image(slope, rest))
+        return self._sign_of_range(*self._image(slope, remainder))
 
     def _image(self, slope: sp.Rational, offset: sp.Expr) -> tuple[sp.Expr | None, sp.Expr | None]:
         low, high = (None if end is None else slope * end + offset for end in self.domain)
@@ -138,13 +138,13 @@ class Signs:
         """Return the sign of a sine or cosine whose argument stays within half a wave."""
         angle = expression.args[0]
         slope = angle.coeff(self.parameter)
-        rest = angle - slope * self.parameter
-        if not (slope.is_Rational and slope and rest.is_number):
+        remainder = angle - slope * self.parameter
+        if not (slope.is_Rational and slope and remainder.is_number):
             return None
-        low, high = self._image(slope, rest)
+        low, high = self._image(slope, remainder)
         if low is None or high is None or not (low.is_number and high.is_number):
             return None
-        if not (abs(low) < FAR and abs(high) < FAR):
+        if not (abs(low) < MAX_ANGLE and abs(high) < MAX_ANGLE):
             return None
         if isinstance(expression, sp.cos):
             low, high = low + sp.pi / 2, high + sp.pi / 2

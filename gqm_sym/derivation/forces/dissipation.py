@@ -65,7 +65,7 @@ def dissipation(
     pieces: dict[sp.Symbol, sp.Expr],
     coordinates: dict[sp.Symbol, sp.Expr],
     signs: Signs,
-    cars_load: sp.Expr | None = None,
+    mean_car_load: sp.Expr | None = None,
 ) -> Dissipation:
     """Put a curve into a force law that is not conservative.
 
@@ -80,7 +80,7 @@ def dissipation(
         The coordinates along the curve, for a user's own law that contains them.
     signs
         The signs of expressions on the curve.
-    cars_load
+    mean_car_load
         The mean of |N|/m over the cars of a train, in λ and W; None for one body.
     """
     v, nu = DIRECTION, CONTACT_SIGN
@@ -89,8 +89,8 @@ def dissipation(
     extra = kernel.tangential_law.xreplace(coordinates)
     sliding, other, contact = v * nu * kernel.friction, extra, (LOAD, KAPPA)
     rubbing = sp.S.Zero
-    if kernel.friction and cars_load is not None:
-        contact, rubbing, sliding = (cars_load, sp.S.Zero), v * kernel.friction * SIGMA * cars_load, sp.S.Zero
+    if kernel.friction and mean_car_load is not None:
+        contact, rubbing, sliding = (mean_car_load, sp.S.Zero), v * kernel.friction * SIGMA * mean_car_load, sp.S.Zero
     elif kernel.friction and TURNS[0] in pieces:
         # This is σ |N|/m, in which nothing is infinite at a cusp.
         vectors = zip(TURNS, LOADS, CORIOLIS if kernel.spin else (0, 0, 0), strict=True)
@@ -108,12 +108,14 @@ def dissipation(
     linear = W not in sp.expand(slope).free_symbols and not rubbing
     if linear:
         slope = sp.expand(slope)
-    rest = sp.expand(other - slope * W) if linear else other - slope * W
-    load = sp.Abs(LOAD) if cars_load is None else cars_load.xreplace({W: sp.S.Zero})
+    constant_part = sp.expand(other - slope * W) if linear else other - slope * W
+    load = sp.Abs(LOAD) if mean_car_load is None else mean_car_load.xreplace({W: sp.S.Zero})
     resisting, rubbing_slope = v * resistance.xreplace({KAPPA: TURN}), differentiate(rubbing, W)
     return Dissipation(
         pieces=tuple(pieces.items()),
-        drive=2 * (SIGMA * (PUSH - sliding * LOAD + rest) - resisting - (rubbing - rubbing_slope * W)) / kernel.inertia,
+        drive=2
+        * (SIGMA * (PUSH - sliding * LOAD + constant_part) - resisting - (rubbing - rubbing_slope * W))
+        / kernel.inertia,
         decay=2 * (SIGMA * (v * kernel.drag - slope) + sliding * TURN + rubbing_slope) / kernel.inertia,
         acceleration=(
             PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other - rubbing / SIGMA
@@ -127,9 +129,11 @@ def dissipation(
     )
 
 
-def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, way: int) -> sp.Expr:
+def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, direction: int) -> sp.Expr:
     against = resistance + kernel.static_friction * load
-    return (PUSH - way * against + extra.xreplace({DIRECTION: sp.Integer(way), W: sp.S.Zero})) / kernel.inertia
+    return (
+        PUSH - direction * against + extra.xreplace({DIRECTION: sp.Integer(direction), W: sp.S.Zero})
+    ) / kernel.inertia
 
 
 def _without_bars(resistance: sp.Expr, sign: int | None) -> sp.Expr:

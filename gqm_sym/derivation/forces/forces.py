@@ -52,7 +52,7 @@ class Forces:
 
 
 def potential_gradient(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
-    """Return the derivatives of the potential by x, y and z along a curve, and the potential itself."""
+    """Return the derivatives of the potential with respect to x, y and z along a curve, and the potential itself."""
     # The force is found before the coordinates are inserted, because the curve's own symbols may be called x or z.
     axes = (X, Y, Z)
     written = (*(differentiate(kernel.potential, axis) for axis in axes), kernel.potential)
@@ -115,9 +115,9 @@ def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> For
 
 def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
     """Return the forces along a curve in no vertical plane."""
-    way = (shape.along, shape.sideways, shape.across)
-    push = tidy(sp.Add(*(part * rate for part, rate in zip(pull, way, strict=True))))
-    crossed = [tidy(part) for part in cross(way, pull)]
+    tangent = (shape.along, shape.sideways, shape.across)
+    push = tidy(sp.Add(*(part * rate for part, rate in zip(pull, tangent, strict=True))))
+    crossed = [tidy(part) for part in cross(tangent, pull)]
     load = tidy(sp.sqrt(without_waves(sp.Add(*(part**2 for part in crossed)))))
     return Forces(
         potential=potential,

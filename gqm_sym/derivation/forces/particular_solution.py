@@ -28,7 +28,7 @@ MAX_EQUATIONS = 240
 MAX_KEPT = 8
 
 # The excess of the degree in each function over the degree in P and Q.
-MORE = 1
+EXCESS_DEGREE = 1
 PRIME = 2**61 - 1
 Monomial = tuple[int, ...]
 FieldElement: TypeAlias = Any
@@ -91,7 +91,7 @@ class _Search:
                     highest = max(_pair_degree(polynomial, pair) for polynomial in polynomials)
             root = isinstance(name, sp.Pow) and name.exp.is_Rational
             lone = place in sines or isinstance(name, sp.Abs)
-            ranges.append(range(name.exp.q if root else 2 if lone else highest + MORE + 1))
+            ranges.append(range(name.exp.q if root else 2 if lone else highest + EXCESS_DEGREE + 1))
         if prod(len(powers) for powers in ranges) > MAX_UNKNOWNS:
             raise OverBudget(f"more than {MAX_UNKNOWNS} candidates for a closed form")
         found = []

@@ -122,24 +122,24 @@ def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
 
 
 def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
-    way = shape.tangent
-    across, along, _ = way
+    tangent = shape.tangent
+    across, along, _ = tangent
     turned = _turned(shape, law, W)
     if banking.angle is None:
         loaded = turned if banking.speed is None else _turned(shape, law, banking.speed**2, forwards=sp.S.One)
         size = sp.sqrt(sp.Add(*(part**2 for part in loaded)))
-        up_x, up_y, up_z = (part / size for part in cross(loaded, way))
+        up_x, up_y, up_z = (part / size for part in cross(loaded, tangent))
         roll = (loaded[0] * along - loaded[1] * across, loaded[2])
         if banking.speed is None:
             return _Seat(vertical=size, lateral=sp.S.Zero, roll=roll, up=(up_x, up_y, up_z))
-        vertical, lateral = _dot(turned, loaded) / size, -_dot(cross(turned, way), loaded) / size
+        vertical, lateral = _dot(turned, loaded) / size, -_dot(cross(turned, tangent), loaded) / size
         return _Seat(vertical=vertical, lateral=lateral, roll=roll, up=(up_x, up_y, up_z))
     level = across**2 + along**2
     width = sp.sqrt(level)
     upwards, sideways = (turned[0] * along - turned[1] * across) / width, turned[2] / width
     upright, tilted = sp.cos(banking.angle), sp.sin(banking.angle)
     left = (-along / width, across / width, sp.S.Zero)
-    above = (-way[2] * across / width, -way[2] * along / width, width)
+    above = (-tangent[2] * across / width, -tangent[2] * along / width, width)
     up_x, up_y, up_z = (one * upright + other * tilted for one, other in zip(above, left, strict=True))
     return _Seat(
         vertical=upwards * upright + sideways * tilted,

@@ -122,23 +122,23 @@ class _Sum:
         ds: sp.Expr,
         lam: sp.Symbol,
     ) -> None:
-        rest = sp.expand(form)
+        remainder = sp.expand(form)
         self.lam = lam
         self.known, self.unknown = sp.S.Zero, sp.S.Zero
         known_rate = sp.S.Zero
         for piece, (rate, whole) in table.items():
-            coefficient = rest.coeff(piece)
-            rest -= sp.expand(coefficient * piece)
+            coefficient = remainder.coeff(piece)
+            remainder -= sp.expand(coefficient * piece)
             if whole is None or lam in coefficient.free_symbols:
                 self.unknown += coefficient * rate
             else:
                 self.known += coefficient * whole
                 known_rate += coefficient * rate
-        self.unknown += sp.factor_terms(rest).xreplace({SIGMA: ds})
+        self.unknown += sp.factor_terms(remainder).xreplace({SIGMA: ds})
         self.rate = tidy(known_rate + self.unknown)
 
     def antiderivative(self) -> sp.Expr | None:
-        """Return an antiderivative by λ, or None if no elementary one was found."""
+        """Return an antiderivative with respect to λ, or None if no elementary one was found."""
         found = particular_solution(self.unknown, sp.S.Zero, self.lam, _SIGNS)
         return None if found is None else self.known + found
 

@@ -89,8 +89,8 @@ def primitive(curve: Curve, components: Sequence[sp.Expr], frame: sp.Expr) -> Di
         algebra = Algebra((*components, sp.sin(frame)), lam, halved)
         fractions = [algebra.fraction(component) for component in components]
         if not any(fraction.top for fraction in fractions):
-            told = " and ".join(f"{name} = {form}" for name, form in curve.coordinates)
-            raise DeclarationError(f"{curve.kind} curve: {told} do not change with {lam.name}: a point, not a curve")
+            forms = " and ".join(f"{name} = {form}" for name, form in curve.coordinates)
+            raise DeclarationError(f"{curve.kind} curve: {forms} do not change with {lam.name}: a point, not a curve")
         parts = [part for fraction in fractions for part in (fraction.top, fraction.bottom)]
         uneven = algebra.uneven(parts) - halved
         if not uneven:
@@ -122,10 +122,10 @@ def _without_common_factor(algebra: Algebra, fractions: Sequence[Fraction], fram
     )
 
 
-def root_of_sum(way: Direction, signs: Signs) -> Root:
+def root_of_sum(direction: Direction, signs: Signs) -> Root:
     """Return the length of the parts of a direction in its simplest form."""
-    algebra, one = way.algebra, way.algebra.one
-    content, found = factors(algebra, way.square)
+    algebra, one = direction.algebra, direction.algebra.one
+    content, found = factors(algebra, direction.square)
     number, written = spell_factors(algebra, found)
     whole = magnitudes(signs, [(factor, power // 2) for factor, power in written if power > 1])
     number *= content
@@ -139,7 +139,7 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
     if not odd:
         return Root(powers=whole, square=None, weight=one)
     text = sp.count_ops(product(whole))
-    parts = way.parts
+    parts = direction.parts
     sums = [_sum_of_squares(algebra, parts, one)]
     if len(parts) == 2:
         # Components at 45 degrees may be simpler.
@@ -156,9 +156,9 @@ def root_of_sum(way: Direction, signs: Signs) -> Root:
         return Root(powers=whole, square=None, weight=one)
     for part in parts:
         # For a graph this is 1 + (dz/dx)², which also overflows later than with its denominator cleared.
-        if way.below != one and algebra.reduced(Fraction(part, way.below)).top.is_ground:
-            square = _sum_of_squares(algebra, parts, way.below)
-            return Root(powers=[(sp.sqrt(square), 1)], square=square, weight=way.below)
+        if direction.below != one and algebra.reduced(Fraction(part, direction.below)).top.is_ground:
+            square = _sum_of_squares(algebra, parts, direction.below)
+            return Root(powers=[(sp.sqrt(square), 1)], square=square, weight=direction.below)
     return Root(powers=[(sp.sqrt(kept), 1)], square=kept, weight=one)
 
 
@@ -171,14 +171,14 @@ def inverse_of(powers: Iterable[Power]) -> list[Power]:
     return [(base, -power) for base, power in powers]
 
 
-def change_of(way: Direction, pair: tuple[int, int]) -> Fraction:
+def change_of(direction: Direction, pair: tuple[int, int]) -> Fraction:
     """Return u v' - v u' for two parts; in a rotating frame, including the contribution of its rotation."""
-    algebra, one = way.algebra, way.algebra.one
-    first, second = (way.parts[k] for k in pair)
+    algebra, one = direction.algebra, direction.algebra.one
+    first, second = (direction.parts[k] for k in pair)
     change = algebra.add(
         algebra.multiply(Fraction(first, one), algebra.derivative(second)),
         algebra.multiply(Fraction(-second, one), algebra.derivative(first)),
     )
-    if way.frame != 0:
-        change = algebra.add(change, Fraction(way.square, one))
+    if direction.frame != 0:
+        change = algebra.add(change, Fraction(direction.square, one))
     return algebra.reduced(change)

@@ -171,10 +171,10 @@ def vertical_plane(curve: Curve) -> Heading | None:
     if rates[0] == 0:
         return sp.S.Zero, sp.S.One
     try:
-        way = primitive(curve, rates, sp.S.Zero)
+        tangent = primitive(curve, rates, sp.S.Zero)
     except OverBudget:
         return None
-    u, v = (product(spell_ratio(way.algebra, part, way.algebra.one)) for part in way.parts)
+    u, v = (product(spell_ratio(tangent.algebra, part, tangent.algebra.one)) for part in tangent.parts)
     if curve.parameter in u.free_symbols | v.free_symbols:
         return None
     if u.could_extract_minus_sign():
@@ -191,8 +191,8 @@ def _charted(curve: Curve) -> Geometry:
         kappa = sp.sqrt(sp.Add(*(part**2 for part in second)))
         return _undivided(first, one, kappa, positive=curve.positive, turning=cross(first, second))
     angle = chart_alpha(s)
-    way = (sp.cos(angle), sp.S.Zero, sp.sin(angle))
-    return _undivided(way, one, chart_kappa(s), positive=curve.positive, angle=angle)
+    tangent = (sp.cos(angle), sp.S.Zero, sp.sin(angle))
+    return _undivided(tangent, one, chart_kappa(s), positive=curve.positive, angle=angle)
 
 
 def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:
@@ -245,15 +245,15 @@ def _undivided(
 
 def _factored(curve: Curve, signs: Signs) -> Geometry:
     lam = curve.parameter
-    way = direction_of(curve)
-    algebra = way.algebra
-    root = root_of_sum(way, signs)
-    scale = way.scale(root)
+    tangent = direction_of(curve)
+    algebra = tangent.algebra
+    root = root_of_sum(tangent, signs)
+    scale = tangent.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
-    rate = _turning_rate(way, root, (0, 1))
+    rate = _turning_rate(tangent, root, (0, 1))
     inverse = inverse_of(root.powers)
     per_length = product([*direction(signs, scale), *inverse])
-    along, across = _in_plane(way, root)
+    along, across = _in_plane(tangent, root)
     turning_rate = product(rate)
     return Geometry(
         along=product(along),
@@ -267,7 +267,7 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
         turning_rate=turning_rate,
         angle=turning_rate * lam
         if lam not in turning_rate.free_symbols
-        else way.frame + tangent_angle(algebra, way.parts, root.weight, signs),
+        else tangent.frame + tangent_angle(algebra, tangent.parts, root.weight, signs),
         cusp=_cusp(signs, scale, lam),
         positive=signs.positive,
     )
@@ -275,15 +275,18 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
 
 def _in_space(curve: Curve, signs: Signs) -> Geometry:
     lam = curve.parameter
-    way = direction_of(curve)
-    algebra, root = way.algebra, root_of_sum(way, signs)
-    scale = way.scale(root)
+    tangent = direction_of(curve)
+    algebra, root = tangent.algebra, root_of_sum(tangent, signs)
+    scale = tangent.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
     per_length = product([*direction(signs, scale), *inverse_of(root.powers)])
-    along, sideways, across = (product(spell_ratio(algebra, part, root.weight)) for part in way.parts)
+    along, sideways, across = (product(spell_ratio(algebra, part, root.weight)) for part in tangent.parts)
     square = [(base, 2 * power) for base, power in root.powers]
     weight = product(spell_ratio(algebra, root.weight, algebra.one))
-    rate = [*length_of([change_of(way, pair) for pair in PAIRS], algebra, signs), *inverse_of([*square, (weight, 2)])]
+    rate = [
+        *length_of([change_of(tangent, pair) for pair in PAIRS], algebra, signs),
+        *inverse_of([*square, (weight, 2)]),
+    ]
     dxds, dyds, dzds = (absorb_bars(part * per_length) for part in (along, sideways, across))
     return Geometry(
         along=along,
@@ -297,7 +300,7 @@ def _in_space(curve: Curve, signs: Signs) -> Geometry:
         dzds=dzds,
         kappa=product([*rate, *inverse_of(ds)]),
         turning_rate=product(rate),
-        turning=tuple(product(_turning_rate(way, root, pair)) for pair in PAIRS),
+        turning=tuple(product(_turning_rate(tangent, root, pair)) for pair in PAIRS),
         angle=None,
         cusp=_cusp(signs, scale, lam),
         positive=signs.positive,
@@ -305,11 +308,11 @@ def _in_space(curve: Curve, signs: Signs) -> Geometry:
     )
 
 
-def _turning_rate(way: Direction, root: Root, pair: tuple[int, int]) -> list[Power]:
+def _turning_rate(tangent: Direction, root: Root, pair: tuple[int, int]) -> list[Power]:
     """Write dΘ/dλ = frame' + (u v' - v u')/(u² + v²), with the parts of a pair above."""
-    algebra = way.algebra
-    change = change_of(way, pair)
-    rate = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, way.square)))
+    algebra = tangent.algebra
+    change = change_of(tangent, pair)
+    rate = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, tangent.square)))
     reduced = spell_quotient(algebra, rate.top, rate.bottom)
     if root.square is None or rate.bottom.is_ground or not rate.top:
         return reduced
@@ -321,16 +324,16 @@ def _turning_rate(way: Direction, root: Root, pair: tuple[int, int]) -> list[Pow
     return shared if shortest(texts) == texts[0] else reduced
 
 
-def _in_plane(way: Direction, root: Root) -> tuple[list[Power], list[Power]]:
+def _in_plane(tangent: Direction, root: Root) -> tuple[list[Power], list[Power]]:
     """Write the components of (u, v) along x and z."""
-    algebra = way.algebra
-    first, second = (spell_ratio(algebra, part, root.weight) for part in way.parts)
-    if way.frame == 0:
+    algebra = tangent.algebra
+    first, second = (spell_ratio(algebra, part, root.weight) for part in tangent.parts)
+    if tangent.frame == 0:
         return first, second
-    sine, cosine = sp.sin(way.frame), sp.cos(way.frame)
+    sine, cosine = sp.sin(tangent.frame), sp.cos(tangent.frame)
     u, v = product(first), product(second)
     s, c = (algebra.fraction(wave).top for wave in (sine, cosine))
-    one, two = way.parts
+    one, two = tangent.parts
     tops = (
         algebra.times(one, c) - algebra.times(two, s),
         algebra.times(one, s) + algebra.times(two, c),

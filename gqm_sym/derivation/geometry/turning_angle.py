@@ -60,7 +60,7 @@ def _definite_in(algebra: Algebra, pair: Pair, signs: Signs, polynomial: Polynom
     pure = set()
     for monomial, coefficient in polynomial.terms():
         sines, cosines = monomial[pair.sine], monomial[pair.cosine]
-        rest = sp.Mul(
+        remainder = sp.Mul(
             int(coefficient),
             *(
                 name**power
@@ -68,9 +68,9 @@ def _definite_in(algebra: Algebra, pair: Pair, signs: Signs, polynomial: Polynom
                 if power and place not in (pair.sine, pair.cosine)
             ),
         )
-        if sines % 2 or cosines % 2 or not signs.nonzero(rest):
+        if sines % 2 or cosines % 2 or not signs.nonzero(remainder):
             return False
-        found.add(signs.sign(rest))
+        found.add(signs.sign(remainder))
         if not (sines and cosines):
             pure |= {"sine"} if sines else {"cosine"} if cosines else {"sine", "cosine"}
     return len(found) == 1 and None not in found and len(pure) == 2

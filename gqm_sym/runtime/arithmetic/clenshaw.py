@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import LANES, REGISTER, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.registers import LANES, REGISTER, broadcast, line_of, operation, register
 from gqm_sym.runtime.compiled.uncompiled import fma as plain_fma
 from gqm_sym.runtime.compiled.uncompiled import in_python
 
@@ -21,8 +21,8 @@ GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(MAX_TERMS)])
 DECAY = np.array([(k + 1) / (k + 2) for k in range(MAX_TERMS)])
 
 # The number of registers that are computed in parallel, and the number of places that they hold together.
-ABREAST = 4
-GROUP = LANES * ABREAST
+PARALLEL_REGISTERS = 4
+GROUP = LANES * PARALLEL_REGISTERS
 _COUNT = ir.IntType(64)
 
 
@@ -36,25 +36,25 @@ def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
             builder.gep(line_of(context, builder, signature.args[k], args[k]), [args[2]]) for k in (1, 3, 4)
         )
         zero = ir.Constant(REGISTER, [0.0] * LANES)
-        ahead = [cgutils.alloca_once_value(builder, zero) for _ in range(ABREAST)]
-        behind = [cgutils.alloca_once_value(builder, zero) for _ in range(ABREAST)]
-        for k in range(ABREAST):
+        ahead = [cgutils.alloca_once_value(builder, zero) for _ in range(PARALLEL_REGISTERS)]
+        behind = [cgutils.alloca_once_value(builder, zero) for _ in range(PARALLEL_REGISTERS)]
+        for k in range(PARALLEL_REGISTERS):
             builder.store(zero, ahead[k])
             builder.store(zero, behind[k])
         twice = []
-        for k in range(ABREAST):
+        for k in range(PARALLEL_REGISTERS):
             place = builder.load(register(builder, places, LANES * k), align=8)
             twice.append(builder.fadd(place, place))
         size = builder.extract_value(terms.shape, 0)
         start, stop, step = builder.sub(size, ir.Constant(_COUNT, 1)), ir.Constant(_COUNT, 1), ir.Constant(_COUNT, -1)
         with cgutils.for_range_slice(builder, start, stop, step, inc=False) as (index, _):
-            term = spread(builder, builder.load(builder.gep(terms.data, [index])))
-            for k in range(ABREAST):
+            term = broadcast(builder, builder.load(builder.gep(terms.data, [index])))
+            for k in range(PARALLEL_REGISTERS):
                 before = builder.load(ahead[k])
                 left = builder.fsub(term, builder.load(behind[k]))
                 builder.store(before, behind[k])
                 builder.store(operation(builder, "fma", twice[k], before, left), ahead[k])
-        for k in range(ABREAST):
+        for k in range(PARALLEL_REGISTERS):
             builder.store(builder.load(ahead[k]), register(builder, first, LANES * k), align=8)
             builder.store(builder.load(behind[k]), register(builder, last, LANES * k), align=8)
         return context.get_dummy_value()

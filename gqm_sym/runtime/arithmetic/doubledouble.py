@@ -51,18 +51,18 @@ def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     """
     count = float(floor(t / period))
     whole, error = two_product(count, period)
-    rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
+    remainder, remainder_low = add(t, t_low, -whole, -(error + count * period_low))
     # The quotient was rounded, so the count may be wrong by one. Only one correction is made, so that rounding at a
     # boundary cannot alternate between two counts.
-    if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
+    if remainder < 0.0 or (remainder == 0.0 and remainder_low < 0.0):
         count -= 1.0
-        rest, rest_low = add(rest, rest_low, period, period_low)
+        remainder, remainder_low = add(remainder, remainder_low, period, period_low)
     else:
-        over, over_low = add(rest, rest_low, -period, -period_low)
+        over, over_low = add(remainder, remainder_low, -period, -period_low)
         if over > 0.0 or (over == 0.0 and over_low >= 0.0):
             count += 1.0
-            rest, rest_low = over, over_low
-    return count, rest, rest_low
+            remainder, remainder_low = over, over_low
+    return count, remainder, remainder_low
 
 
 def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
@@ -98,7 +98,7 @@ def minus(a: Pair, b: Pair) -> Pair:
 @entry(types.Tuple((VECTOR, VECTOR, VECTOR))(VECTOR, VECTOR, REAL, REAL))
 def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     """Call `reduce` for many times from Python."""
-    count, rest, rest_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
+    count, remainder, remainder_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
     for i in range(t.size):
-        count[i], rest[i], rest_low[i] = reduce(t[i], t_low[i], period, period_low)
-    return count, rest, rest_low
+        count[i], remainder[i], remainder_low[i] = reduce(t[i], t_low[i], period, period_low)
+    return count, remainder, remainder_low

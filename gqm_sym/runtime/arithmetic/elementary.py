@@ -20,7 +20,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner
 ROUND = 1.5 * 2.0**52
 
 # pi/2 as the sum of three doubles. The first difference of the reduction is exact, since its product is fused.
-QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 TWO_OVER_PI = 0.6366197723675814
 
 # Minimax polynomials on |r| <= pi/4, highest power first: (1 - sin(r)/r)/r**2, (cos(r) - 1 + r**2/2)/r**4.
@@ -99,10 +99,10 @@ def reduced(x):  # type: ignore[no-untyped-def]
     """
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
-    t = fma(-k, QUARTER[0], x)
-    p = k * QUARTER[1]
+    t = fma(-k, HALF_PI[0], x)
+    p = k * HALF_PI[1]
     r = t - p  # the rounding error of this is a double, since t is a multiple of 2**-53 or p is zero
-    over = fma(k, QUARTER[2], fma(k, QUARTER[1], -p)) - ((t - r) - p)
+    over = fma(k, HALF_PI[2], fma(k, HALF_PI[1], -p)) - ((t - r) - p)
     lost = fabs(r) > 1.0  # beyond 1e15 the number of turns is not known to 1
     return bits(shifted), choose(lost, 1.0, r), choose(lost, 0.0, over)
 
@@ -119,8 +119,8 @@ def cosine_kernel(r, over):  # type: ignore[no-untyped-def]
     """cos(r - over), ``|r|`` <= pi/4."""
     z = r * r
     lead = fma(-0.5, z, 1.0)
-    rest = fma(r, over, fma(-0.5, z, 1.0 - lead))
-    return lead + fma(z * z, polynomial(COSINE, z), rest)
+    low = fma(r, over, fma(-0.5, z, 1.0 - lead))
+    return lead + fma(z * z, polynomial(COSINE, z), low)
 
 
 @Inlined
@@ -140,28 +140,31 @@ def cos(x):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def reduced_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The same as `reduced` gives of ``phase + rate*(middle + rest + offset)``, in which no rounding counts."""
+def reduced_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """Return what `reduced` would for ``phase + rate*(middle + middle_low + offset)`` if that were computed exactly.
+
+    The argument is formed in two doubles, so that its rounding errors do not count.
+    """
     place, place_low = two_sum(middle, offset)
-    way = rate * place
-    total, total_low = two_sum(phase, way)
+    product = rate * place
+    total, total_low = two_sum(phase, product)
     turns, r, over = reduced(total)
-    r, r_low = two_sum(r, fma(rate, rest + place_low, fma(rate, place, -way)) + total_low)
+    r, r_low = two_sum(r, fma(rate, middle_low + place_low, fma(rate, place, -product)) + total_low)
     return turns, r, over - r_low
 
 
 @Inlined
-def sin_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The sine of ``phase + rate*(middle + rest + offset)``."""
-    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
+def sin_of_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """The sine of ``phase + rate*(middle + middle_low + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, middle_low, offset)
     value = choose(turns & 1 == 1, cosine_kernel(r, over), sine_kernel(r, over))
     return choose(turns & 2 == 2, -value, value)
 
 
 @Inlined
-def cos_of_sum(phase, rate, middle, rest, offset):  # type: ignore[no-untyped-def]
-    """The cosine of ``phase + rate*(middle + rest + offset)``."""
-    turns, r, over = reduced_sum(phase, rate, middle, rest, offset)
+def cos_of_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
+    """The cosine of ``phase + rate*(middle + middle_low + offset)``."""
+    turns, r, over = reduced_sum(phase, rate, middle, middle_low, offset)
     value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
     return choose((turns + 1) & 2 == 2, -value, value)
 
@@ -179,10 +182,10 @@ def atan(x):  # type: ignore[no-untyped-def]
     z = top * inverse
     low = (fma(-z, bottom, top) - z * lost) * inverse  # the rounding error of the quotient
     start = choose(far, 1.0, choose(near, 0.0, 0.5))
-    lead = start * QUARTER[0] + z
-    rounded = (start * QUARTER[0] - lead) + z
+    lead = start * HALF_PI[0] + z
+    rounded = (start * HALF_PI[0] - lead) + z
     w = z * z
-    value = lead + (rounded + fma(z * w, polynomial(ARC, w), fma(start, QUARTER[1], low)))
+    value = lead + (rounded + fma(z * w, polynomial(ARC, w), fma(start, HALF_PI[1], low)))
     return choose(x < 0.0, -value, choose(x == 0.0, x, value))
 
 

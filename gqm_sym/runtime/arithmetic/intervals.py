@@ -9,7 +9,7 @@ from math import acos, acosh, asin, asinh, atan, atanh, fabs, inf, log, pi, sqrt
 from math import pow as power
 
 from gqm_sym.runtime.arithmetic.elementary import cos, cosh, exp, sin, sinh
-from gqm_sym.runtime.compiled.intrinsics import choose, whole_below
+from gqm_sym.runtime.compiled.intrinsics import choose, floor_of
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 # The relative error of one operation, which is at most 2**-53, and that of the C library's functions, which are
@@ -204,7 +204,7 @@ def ilog(a):  # type: ignore[no-untyped-def]
 def meets(a, point, period):  # type: ignore[no-untyped-def]
     """Return whether point + k*period may lie in the interval for an integer k; the answer is true in case of doubt."""
     slack = 1e-15 * (2.0 + fabs(a[0]) + fabs(a[1]))
-    return whole_below((a[1] - point) / period + slack) >= (a[0] - point) / period - slack
+    return floor_of((a[1] - point) / period + slack) >= (a[0] - point) / period - slack
 
 
 @Inlined

@@ -14,7 +14,17 @@ from numba import types
 from numba.core.cgutils import global_constant
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.compiled.registers import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.registers import (
+    INDEX,
+    LANES,
+    REAL,
+    REGISTER,
+    Lanes,
+    broadcast,
+    line_of,
+    operation,
+    register,
+)
 from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
 
 # The number of sums that run at the same time.
@@ -46,7 +56,7 @@ def multiply(table: Any) -> Any:
         entries = builder.asm(opaque, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
         totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
         for row in range(rows):
-            each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
+            each = broadcast(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
             chain = totals[row % chains]
             for block in range(blocks):
                 entry = builder.load(register(builder, entries, row * width + block * LANES), align=8 * LANES)

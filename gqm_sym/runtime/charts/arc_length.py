@@ -23,7 +23,8 @@ from gqm_sym.runtime.compiled.types import Array
 
 # A curve: a function of places (n,) and of offsets from each of them (n, m) that returns x, z, ds/dlam, dx/ds, dz/ds
 # and kappa as an array (6, n, m); of a curve in space x, y, z, ds/dlam and the first and second derivatives of the
-# coordinates by arc length, as an array (10, n, m), possibly followed by further rows that belong to the curve.
+# coordinates with respect to arc length, as an array (10, n, m), possibly followed by further rows that belong to the
+# curve.
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.integer[Any]]

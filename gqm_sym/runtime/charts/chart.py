@@ -48,7 +48,7 @@ ROW_ROUNDINGS, MAGNIFIED = 3.0, 2.0**20
 CORNER_ROUNDINGS = 4.0
 
 # The distance from a corner at which its two tangents are read, as a share of the curve's length.
-_BESIDE_CORNER = 2.0**-40
+_CORNER_DISTANCE_SHARE = 2.0**-40
 
 # The number of places on each piece among which the search for the nearest point begins.
 _SAMPLES = 8
@@ -152,7 +152,7 @@ class Chart:
         """Return the sign of the tangent's turn at each corner: 1 where the curve bends to the left."""
         if not self.corners.size:
             return self.corners
-        off = _BESIDE_CORNER * (self.high - self.low)
+        off = _CORNER_DISTANCE_SHARE * (self.high - self.low)
         before, after = self.points(np.append(self.corners - off, self.corners + off))[2].reshape(2, -1)
         signs: Array = np.sign(after - before)
         return signs
@@ -226,7 +226,7 @@ class SpaceChart(Chart):
 
     Its block is that of the chart of z, followed by those of x and y, and of the roll angle if there is one. In the
     chart of a coordinate, the row of the height contains this coordinate, and the rows of angle, curvature and x
-    contain its first three derivatives by arc length.
+    contain its first three derivatives with respect to arc length.
 
     Attributes
     ----------
@@ -241,7 +241,8 @@ class SpaceChart(Chart):
         return self.derivatives(s, 0)[:3]
 
     def derivatives(self, s: Any, order: int) -> Array:
-        """Return the derivatives of x, y and z by arc length, and of the roll angle if there is one, as rows.
+        """Return the derivatives of x, y and z with respect to arc length, and of the roll angle if there is one, as
+        rows.
 
         Parameters
         ----------
@@ -333,7 +334,7 @@ def assemble_in_space(
         x, y and z at the left edge of each piece, and the roll angle if there is one; floats longer than doubles keep
         their digits.
     derivatives : three (n, d, TERMS) arrays
-        Their first three derivatives by arc length at the nodes.
+        Their first three derivatives with respect to arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
@@ -377,7 +378,7 @@ def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Arr
     anchors : pair of (n, d) arrays
         The coordinates at the left edges, as two doubles.
     known, second : (n, d, TERMS) arrays
-        Their derivatives by arc length at the nodes, and the derivatives of these by u.
+        Their derivatives with respect to arc length at the nodes, and the derivatives of these with respect to u.
     """
     left, lows = anchors[0], np.broadcast_to(anchors[1], np.shape(anchors[0]))
     count, rows = left.shape

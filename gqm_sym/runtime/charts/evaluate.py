@@ -23,7 +23,7 @@ from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.intrinsics import item_at, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, broadcast, line_of, operation, register
 from gqm_sym.runtime.compiled.uncompiled import fma, in_python
 
 TERMS = 16
@@ -122,7 +122,9 @@ def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: i
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         lines = [line_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4)]
         powers, given, target = (builder.gep(line, [args[k]]) for line, k in zip(lines, (1, 3, 5), strict=True))
-        lap, middle, scale, limit, whole, rest = (spread(builder, builder.extract_value(args[7], k)) for k in range(6))
+        lap, middle, scale, limit, whole, low = (
+            broadcast(builder, builder.extract_value(args[7], k)) for k in range(6)
+        )
         s = builder.load(register(builder, given, 0), align=8)
         u = builder.fmul(builder.fsub(builder.fsub(s, lap), middle), scale)
         below = builder.fneg(limit)
@@ -130,9 +132,9 @@ def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: i
         u = builder.select(builder.fcmp_ordered(">", u, limit), limit, u)
         value = ir.Constant(REGISTER, [0.0] * LANES)
         for k in range(TERMS - 1, -1, -1):
-            term = spread(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
+            term = broadcast(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
             value = operation(builder, "fma", value, u, term)
-        value = builder.fadd(whole, builder.fadd(rest, value))
+        value = builder.fadd(whole, builder.fadd(low, value))
         old = builder.load(register(builder, target, 0), align=8)
         lane = ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
         bound = ir.Constant(ir.VectorType(ir.IntType(64), LANES), ir.Undefined)
@@ -147,13 +149,13 @@ def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: i
 
 @in_python(fill_lanes)
 def _fill_lanes(chart: Any, terms: int, places: Any, at: int, out: Any, to: int, first: int, numbers: Any) -> None:
-    lap, middle, scale, limit, whole, rest = numbers
+    lap, middle, scale, limit, whole, low = numbers
     for lane in range(max(first, 0), LANES):
         u = min(max(((places[at + lane] - lap) - middle) * scale, -limit), limit)
         value = 0.0
         for k in range(TERMS - 1, -1, -1):
             value = fma(value, u, chart[terms + k])
-        out.reshape(-1)[to + lane] = whole + (rest + value)
+        out.reshape(-1)[to + lane] = whole + (low + value)
 
 
 @Inner
@@ -184,17 +186,17 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
             i += 1
         for k in range(len(rows)):
             row = rows[k]
-            terms, (whole, rest) = start + 6 + row * TERMS, _constant(chart, start, row, laps)
+            terms, (whole, constant_low) = start + 6 + row * TERMS, _constant(chart, start, row, laps)
             if n < LANES:
                 for j in range(begin, i):
                     u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
-                    out[first + k, j] = whole + (rest + polynomial(_powers(chart, start, row), u))
+                    out[first + k, j] = whole + (constant_low + polynomial(_powers(chart, start, row), u))
                 continue
             # A register at the end of the places also takes places before the first one, whose values it does not
             # store.
             for j in range(begin, i, LANES):
                 at = min(j, n - LANES)
-                numbers = (lap, middle, scale, limit, whole, rest)
+                numbers = (lap, middle, scale, limit, whole, constant_low)
                 fill_lanes(chart, terms, places, at, out, (first + k) * n + at, begin - at, numbers)
 
 
@@ -302,8 +304,8 @@ def _divdiff1_between(chart, row, lower, upper, h):  # type: ignore[no-untyped-d
     if row >= 2:  # the angle increases with each lap
         return ((laps_t - laps_s) * chart[5] + (two - one)) / h
     whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]
-    rest = (chart[from_t + 3 + 2 * row] - chart[from_s + 3 + 2 * row]) + (two - one)
-    return (whole + rest) / h
+    difference = (chart[from_t + 3 + 2 * row] - chart[from_s + 3 + 2 * row]) + (two - one)
+    return (whole + difference) / h
 
 
 @Inner

@@ -73,7 +73,7 @@ class ChartTrack:
     maker, chart
         The maker of the curve's chart, and the chart.
     potential
-        ``f(op, x, z, p)``: the effective potential and its derivatives by x and z.
+        ``f(op, x, z, p)``: the effective potential and its derivatives with respect to x and z.
     offset : Number or None
         The distance of the body's path to the left of the curve; x and z are coordinates of that path. None if the path
         is the curve itself.
@@ -195,7 +195,7 @@ class ChartTrack:
         return total
 
     def _length_rate(self, lam: Any) -> Any:
-        """Return the derivative of arc length by lam, which is close to 1."""
+        """Return the derivative of arc length with respect to lam, which is close to 1."""
         return self.point(lam).ds
 
     def _beside(self, spot: CurvePoint) -> tuple[Any, Any]:
@@ -203,7 +203,9 @@ class ChartTrack:
         return spot.x - self._offset * spot.tz, spot.z + self._offset * spot.tx
 
     def _turning_rate(self, lam: Any) -> Any:
-        """Return the derivative of the tangent's angle by lam, from the tangents on both sides of a place."""
+        """Return the derivative of the tangent's angle with respect to lam, from the tangents on both sides of a
+        place.
+        """
         context, k = self._context, self._piece(lam)
         c, precision = lam - self._lap(lam) + self._shifts[k], context.prec
         with context.workprec(precision + precision // 2 + EXTRA_BITS):

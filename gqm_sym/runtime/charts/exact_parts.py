@@ -14,7 +14,8 @@ from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# The type of a part: a function of the part's own parameter that returns x, z and their derivatives by the parameter.
+# The type of a part: a function of the part's own parameter that returns x, z and their derivatives with respect to the
+# parameter.
 Part = Callable[[Any], tuple[Any, Any, Any, Any]]
 
 # Steps of Newton's method.

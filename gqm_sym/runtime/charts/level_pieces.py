@@ -107,7 +107,8 @@ def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
         x and z at the anchor, as two doubles each.
     piece : (11, POINTS) array
         Rows 0 and 1 are offsets from the anchor. The others are filled: tangent (2, 3), curvature (4), sum of the
-        magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative by arc length (8), places (9, 10).
+        magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative with respect to arc length (8),
+        places (9, 10).
     """
     sign = curve.sign
     offsets, x, z = piece, piece[9], piece[10]
@@ -144,11 +145,11 @@ def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
-    """Solve for the piece of a given length from ``at``, which is moved onto F = 0; return whether that succeeds."""
+def solve_piece(curve, start, length, piece):  # type: ignore[no-untyped-def]
+    """Solve for the piece of a given length from ``start``, which is moved onto F = 0; return whether that succeeds."""
     half, sign = 0.5 * length, curve.sign
     piece[:2] = 0.0
-    if not evaluate_points(curve, at, piece):
+    if not evaluate_points(curve, start, piece):
         return False
     kappa = piece[4, ANCHOR]
     for i in range(TERMS + 1):
@@ -157,7 +158,7 @@ def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
         piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * kappa * piece[2, ANCHOR])
     before, moved = inf, False
     for _ in range(MAX_ITERATIONS):
-        if not evaluate_points(curve, at, piece):
+        if not evaluate_points(curve, start, piece):
             return False
         change = 0.0
         for row in range(2):
@@ -182,10 +183,10 @@ def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
             shift = -level / piece[7, ANCHOR]
             if fabs(shift) > MAX_SHIFT * length:
                 return False
-            s, e = two_sum(at[0], sign * shift * piece[3, ANCHOR])
-            at[0], at[1] = two_sum(s, e + at[1])
-            s, e = two_sum(at[2], -sign * shift * piece[2, ANCHOR])
-            at[2], at[3] = two_sum(s, e + at[3])
+            s, e = two_sum(start[0], sign * shift * piece[3, ANCHOR])
+            start[0], start[1] = two_sum(s, e + start[1])
+            s, e = two_sum(start[2], -sign * shift * piece[2, ANCHOR])
+            start[2], start[3] = two_sum(s, e + start[3])
             change = inf
         before = change
     return False

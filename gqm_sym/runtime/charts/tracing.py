@@ -192,23 +192,23 @@ class Traced:
         if not (isfinite(x) and isfinite(z)):
             raise LaunchError(f"start: ({x!r}, {z!r}) is not a finite point; give one on the curve")
         size = max(abs(x), abs(z)) or 1.0
-        at = np.array([x, 0.0, z, 0.0])
+        point = np.array([x, 0.0, z, 0.0])
         moved, regular = inf, True
         for _ in range(MAX_STEPS):
-            found, _, tx, tz, _, bends, level, slope, fall, *_ = _rows_at(self.field, values, 1.0, at)
+            found, _, tx, tz, _, bends, level, slope, fall, *_ = _rows_at(self.field, values, 1.0, point)
             regular = bool(found) and slope > MIN_GRADIENT_SCALE * size * (bends * slope + abs(fall))
             if not regular:
                 break
             # Newton's method across the curve; along it to the foot of the perpendicular from the start point.
-            across, along = -level / slope, (x - at[0]) * tx + (z - at[2]) * tz
-            at[:2] = doubledouble.add.py_func(at[0], at[1], along * tx + across * tz, 0.0)
-            at[2:] = doubledouble.add.py_func(at[2], at[3], along * tz - across * tx, 0.0)
+            across, along = -level / slope, (x - point[0]) * tx + (z - point[2]) * tz
+            point[:2] = doubledouble.add.py_func(point[0], point[1], along * tx + across * tz, 0.0)
+            point[2:] = doubledouble.add.py_func(point[2], point[3], along * tz - across * tx, 0.0)
             before, moved = moved, hypot(along, across)
             if moved <= MAX_LAST_STEP * size and moved >= 0.5 * before:
                 break
-        away = hypot(at[0] - x, at[2] - z)
+        away = hypot(point[0] - x, point[2] - z)
         if regular and moved <= MAX_LAST_STEP * size and away <= MAX_DISTANCE * size:
-            return at
+            return point
         if not regular and away <= MAX_DISTANCE * size:
             raise LaunchError(
                 f"start: ({x!r}, {z!r}) is a singular point: grad F vanishes there, or F is not smooth or not real; "
@@ -216,7 +216,7 @@ class Traced:
             )
         what = f"start: ({x!r}, {z!r}) is not on the curve"
         if regular and moved <= MAX_LAST_STEP * size:
-            raise LaunchError(f"{what}: it is {away:.3g} from it; the nearest point is ({at[0]!r}, {at[2]!r})")
+            raise LaunchError(f"{what}: it is {away:.3g} from it; the nearest point is ({point[0]!r}, {point[2]!r})")
         raise LaunchError(f"{what}, and no point of the curve was found near it; give a point with F = 0")
 
     def _side(self, values: Array, start: Array, direction: int, limit: float) -> Side:
@@ -328,8 +328,8 @@ def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-de
                 high, low = product(step, rate)
                 out[row, i], out[2 + row, i] = add(out[row, i], out[2 + row, i], high, low + step_low * rate)
             # The relative error of the step is at most this.
-            doubt = work[value + ERROR + i] + 1e-14 * fabs(work[value + i])
-            error = max(error, doubt / fabs(slope) * sqrt(dx * dx + dz * dz))
+            uncertainty = work[value + ERROR + i] + 1e-14 * fabs(work[value + i])
+            error = max(error, uncertainty / fabs(slope) * sqrt(dx * dx + dz * dz))
     return error
 
 

@@ -27,13 +27,13 @@ def train_load(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignor
 
 @Inner
 def train_load_slope(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load` by w."""
+    """Return the derivative of `train_load` with respect to w."""
     return _change_of_load((along_x, along_y, along_z), s, w, length, cars, g, 0)
 
 
 @Inner
 def train_load_rate(along_x, along_y, along_z, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load` by s."""
+    """Return the derivative of `train_load` with respect to s."""
     return _change_of_load((along_x, along_y, along_z), s, w, length, cars, g, 1)
 
 
@@ -51,7 +51,7 @@ def _change_of_load(along, s, w, length, cars, g, which):  # type: ignore[no-unt
 
 @Inlined
 def _force_on_car(along, s, w, g):  # type: ignore[no-untyped-def]
-    """Return N/m at a place, and its derivatives by w and by s without their components along the track."""
+    """Return N/m at a place, and its derivatives with respect to w and s without their components along the track."""
     along_x, along_y, along_z = along
     k, u, laps = find(along_z, s)
     tx, kx, cx = derivatives_at(along_x, k, u, laps)
@@ -78,7 +78,7 @@ def train_load_in_plane(chart, s, w, length, cars, g):  # type: ignore[no-untype
 
 @Inner
 def train_load_slope_in_plane(chart, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load_in_plane` by w."""
+    """Return the derivative of `train_load_in_plane` with respect to w."""
     total = 0.0
     for car in range(cars):
         angle, kappa, _ = derivatives_at(chart, *find(chart, _place_of_car(s, length, cars, car)))

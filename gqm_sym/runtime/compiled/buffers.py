@@ -19,7 +19,7 @@ def longer(array, size):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def taller(array, rows):  # type: ignore[no-untyped-def]
+def with_rows(array, rows):  # type: ignore[no-untyped-def]
     """Return a matrix of so many rows that begins with those of ``array``."""
     out = np.empty((rows, array.shape[1]))
     for i in range(array.shape[0]):

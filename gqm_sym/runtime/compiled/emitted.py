@@ -141,7 +141,7 @@ class Emitted:
         try:
             self.run(*arguments)
         except BaseException as error:
-            jit.RAISED[threading.get_ident()] = error
+            jit.PENDING_EXCEPTIONS[threading.get_ident()] = error
 
 
 # The functions of generated modules that are in use, by their text, so that modules with the same function share it.

@@ -35,7 +35,7 @@ def nearest_whole(_, x):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def whole_below(_, x):  # type: ignore[no-untyped-def]
+def floor_of(_, x):  # type: ignore[no-untyped-def]
     """Return the largest integer that is not above x, as a float."""
     return _rounding("llvm.floor")
 

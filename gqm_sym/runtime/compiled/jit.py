@@ -81,12 +81,12 @@ COMPILING = threading.RLock()
 
 # Exceptions raised in Python code that compiled code had called, by thread. Python cannot pass them through compiled
 # code.
-RAISED: dict[int, BaseException] = {}
+PENDING_EXCEPTIONS: dict[int, BaseException] = {}
 
 
-def raise_raised() -> None:
+def raise_pending() -> None:
     """Raise the exception that was raised while compiled code ran in this thread, if there is one."""
-    raised = RAISED.pop(threading.get_ident(), None)
+    raised = PENDING_EXCEPTIONS.pop(threading.get_ident(), None)
     if raised is not None:
         raise raised
 
@@ -126,7 +126,7 @@ class Inner:
             return self._called(*arguments)
         finally:
             ANNOUNCER.end()
-            raise_raised()
+            raise_pending()
 
 
 class Inlined(Inner):
@@ -193,8 +193,8 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
                         finally:
                             ANNOUNCER.end()
             result = compiled(*arguments)
-            if RAISED:
-                raise_raised()
+            if PENDING_EXCEPTIONS:
+                raise_pending()
             return result
 
         return call

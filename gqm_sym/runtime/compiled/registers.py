@@ -34,7 +34,7 @@ def register(builder: Any, line: Any, offset: int) -> Any:
     return builder.bitcast(builder.gep(line, [ir.Constant(INDEX, offset)]), REGISTER.as_pointer())
 
 
-def spread(builder: Any, value: Any) -> Any:
+def broadcast(builder: Any, value: Any) -> Any:
     """Return a register with the same number in all lanes."""
     one = builder.insert_element(ir.Constant(REGISTER, ir.Undefined), value, ir.Constant(INDEX, 0))
     return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES))
@@ -104,7 +104,9 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
             None if isinstance(kind, types.Float) else builder.gep(line, [at])
             for kind, at in zip(signature.args[1:], args[1:], strict=True)
         ]
-        numbers = [spread(builder, value) if row is None else None for row, value in zip(rows, args[1:], strict=True)]
+        numbers = [
+            broadcast(builder, value) if row is None else None for row, value in zip(rows, args[1:], strict=True)
+        ]
         found = []
         for offset in range(0, width, LANES):
             given = [
@@ -166,7 +168,7 @@ def copied(width: int) -> Any:
 
 
 @intrinsic
-def hidden(_, count):  # type: ignore[no-untyped-def]
+def opaque(_, count):  # type: ignore[no-untyped-def]
     """Return an integer unknown to LLVM, which vectorises a loop of that length; it would unroll it otherwise."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -177,7 +179,7 @@ def hidden(_, count):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def uncounted(_, array):  # type: ignore[no-untyped-def]
+def borrowed(_, array):  # type: ignore[no-untyped-def]
     """Return an array whose references numba does not count, for calls that end before its owner does."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -189,8 +191,8 @@ def uncounted(_, array):  # type: ignore[no-untyped-def]
     return array(array), lower
 
 
-@in_python(hidden)
-@in_python(uncounted)
+@in_python(opaque)
+@in_python(borrowed)
 def _same(given: Any) -> Any:
     return given
 

@@ -254,7 +254,7 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         intrinsics.fma: fma,
         intrinsics.item_at: lambda array, index: array.reshape(-1)[index],
         intrinsics.nearest_whole: np.rint,
-        intrinsics.whole_below: np.floor,
+        intrinsics.floor_of: np.floor,
         intrinsics.bits: lambda x: int(np.float64(x).view(np.int64)),
         intrinsics.from_bits: lambda n: np.uint64(n % 2**64).view(np.float64),
         intrinsics.choose: lambda condition, x, y: np.float64(x if condition else y),

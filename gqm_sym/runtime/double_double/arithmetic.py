@@ -18,7 +18,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import ONE_OVER_LOG2, QUARTER, ROUND, TWO_OVER_PI, power_of_two
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI, ONE_OVER_LOG2, ROUND, TWO_OVER_PI, power_of_two
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.uncompiled import fma as plain_fma
@@ -38,8 +38,8 @@ MAX_EXPONENT = 700.0
 def split(number: Fraction) -> tuple[float, float]:
     """Return the two doubles nearest to a rational number."""
     high = number.numerator / number.denominator
-    rest = number - Fraction(high)
-    return high, rest.numerator / rest.denominator
+    residual = number - Fraction(high)
+    return high, residual.numerator / residual.denominator
 
 
 def _coefficients(first: int, step: int, precise: int, count: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -99,8 +99,8 @@ def multiply(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
 def divide(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
     """Return the quotient, within 2 UNIT."""
     q = a / b
-    rest = fma(-q, b, a) + fma(-q, b_low, a_low)
-    return fast_sum(q, rest / b)
+    residual = fma(-q, b, a) + fma(-q, b_low, a_low)
+    return fast_sum(q, residual / b)
 
 
 @Inlined
@@ -162,7 +162,7 @@ def sine_and_cosine(x, x_low):  # type: ignore[no-untyped-def]
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
     turns = bits(shifted)
-    r, r_low = remainder(x, x_low, k, QUARTER)
+    r, r_low = remainder(x, x_low, k, HALF_PI)
     z, z_low = multiply(r, r_low, r, r_low)
     f, f_low = series(SINE, z, z_low, polynomial(SINE_TAIL, z))
     f, f_low = multiply(f, f_low, z, z_low)
@@ -204,8 +204,8 @@ def improved_logarithm(x, x_low, guess, e, e_low):  # type: ignore[no-untyped-de
     that double.
     """
     p, p_low = multiply(x, x_low, e, e_low)
-    rest = (p - 1.0) + p_low
-    return fast_sum(guess, rest - 0.5 * rest * rest)
+    residual = (p - 1.0) + p_low
+    return fast_sum(guess, residual - 0.5 * residual * residual)
 
 
 @Inlined
@@ -214,5 +214,5 @@ def improved_arc_tangent(x, x_low, guess, sine, cosine):  # type: ignore[no-unty
     cosine.
     """
     p, p_low = multiply(x, x_low, cosine[0], cosine[1])
-    rest, rest_low = add(p, p_low, -sine[0], -sine[1])
-    return fast_sum(guess, (rest + rest_low) / (cosine[0] + x * sine[0]))
+    residual, residual_low = add(p, p_low, -sine[0], -sine[1])
+    return fast_sum(guess, (residual + residual_low) / (cosine[0] + x * sine[0]))

@@ -5,7 +5,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply, sine_and_cosine
@@ -41,7 +41,7 @@ def node_tables(kind):  # type: ignore[no-untyped-def]
         n = LEVELS[level]
         share = k / n if level == 1 else (2.0 * k + 1.0) / n - 1.0
         if kind == LIBRATION:
-            high, low = multiply(share, 0.0, QUARTER[0], QUARTER[1])
+            high, low = multiply(share, 0.0, HALF_PI[0], HALF_PI[1])
             s, s_low, c, c_low = sine_and_cosine(high, low)
             rows[0, k], rows[1, k] = multiply(s, s_low, s, s_low)
             rows[2, k], rows[3, k] = multiply(s, s_low, c, c_low)
@@ -71,12 +71,12 @@ def legendre_rule():  # type: ignore[no-untyped-def]
             up, up_low = multiply(x, x_low, p, p_low)
             up, up_low = add(up, up_low, -before, -before_low)
             square, square_low = multiply(x, x_low, x, x_low)
-            rest, rest_low = add(square, square_low, -1.0, 0.0)
-            slope, slope_low = divide(RULE * up, RULE * up_low, rest, rest_low)
+            square_less_one, square_less_one_low = add(square, square_low, -1.0, 0.0)
+            slope, slope_low = divide(RULE * up, RULE * up_low, square_less_one, square_less_one_low)
             step, step_low = divide(p, p_low, slope, slope_low)
             x, x_low = add(x, x_low, -step, -step_low)
         slope, slope_low = multiply(slope, slope_low, slope, slope_low)
-        slope, slope_low = multiply(slope, slope_low, -rest, -rest_low)
+        slope, slope_low = multiply(slope, slope_low, -square_less_one, -square_less_one_low)
         rows[0, k], rows[1, k] = add(0.5 * x, 0.5 * x_low, 0.5, 0.0)
         rows[2, k], rows[3, k] = divide(1.0, 0.0, slope, slope_low)
     return rows

@@ -11,9 +11,9 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, square_root
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, call_interpreter
@@ -51,7 +51,7 @@ LEVEL_AND_INTERVAL = types.Tuple((BOUNDED, types.UniTuple(REAL, 2), types.UniTup
 NO_TIMES = np.empty((3, 0))
 
 
-class Bounded(NamedTuple):
+class BoundedNumber(NamedTuple):
     """A number as two doubles, with a bound on its error."""
 
     high: float
@@ -82,7 +82,7 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
     lam0, lam0_low = launch[0], launch[1]
     for i in range(ENDS):
         work[place + i], work[place + LOW + i] = add(lam0, lam0_low, offsets[i] if i < 2 else 0.0, 0.0)
-    level, moved, rest = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
+    level, moved, residual = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
     for _ in range(MAX_STEPS):
         for i in range(ENDS):
             work[place + ERROR + i] = 0.25 * UNIT * fabs(work[place + i])
@@ -96,15 +96,15 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
             moved[i] += move
             rounding = level[2] + work[u + ERROR]
             has_converged = has_converged and fabs(half) <= rounding
-            rest[i] = rounding + fabs(half)
+            residual[i] = rounding + fabs(half)
             if offsets[i] == 0.0 and launch[2] == 0.0:  # the launch itself, which is exact up to its own rounding
-                rest[i] = 0.25 * UNIT * fabs(lam0 * work[up]) if lam0_low != 0.0 else 0.0
+                residual[i] = 0.25 * UNIT * fabs(lam0 * work[up]) if lam0_low != 0.0 else 0.0
             if not fabs(moved[i]) <= MAX_STEP * fabs(offsets[1] - offsets[0]):
-                rest[i] = nan
+                residual[i] = nan
         if has_converged:  # the other formulas are then known at the turning points themselves
             break
-    errors = rest[0] / fabs(work[slope]), rest[1] / fabs(work[slope + 1])
-    return (level[0], level[1], level[2] + rest[0] + rest[1]), errors
+    errors = residual[0] / fabs(work[slope]), residual[1] / fabs(work[slope + 1])
+    return (level[0], level[1], level[2] + residual[0] + residual[1]), errors
 
 
 @Inner
@@ -150,12 +150,12 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
     float
         A bound on the error of the times.
     """
-    work, p, rule, times = uncounted(work), uncounted(p), uncounted(rule), uncounted(times)
+    work, p, rule, times = borrowed(work), borrowed(p), borrowed(rule), borrowed(times)
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
+    tape = (address, borrowed(operations), parts, registers)
     fill_parameters(tape, p, work)
     integrand = Integrand(tape, work, *orbit)
-    angle, at, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
+    angle, last_angle, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     times[1, 0], times[2, 0] = 0.0, 0.0
     is_thrown = times[0, 0] != 0.0
     behind, behind_low = add(launch[0], launch[1], -integrand.start[0], -integrand.start[1])
@@ -163,15 +163,15 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
     for k in range(1, times.shape[1] + 1):
         is_last = k == times.shape[1]
         if is_thrown and (is_last or thrown_at[0] < times[0, k]):
-            part, part_low, of_part = time_between(integrand, kind, at, thrown_at, rule, MAX_PANEL_ERROR)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, thrown_at, rule, MAX_PANEL_ERROR)
             times[1, 0], times[2, 0] = add(high, low, part, part_low)
             is_thrown, of_launch = False, error + of_part
         if not is_last:
             # The upper turning point is at the angle pi itself.
-            angle = (times[0, k], 2.0 * QUARTER[1] if times[0, k] == 2.0 * QUARTER[0] else 0.0)
-            part, part_low, of_part = time_between(integrand, kind, at, angle, rule, MAX_PANEL_ERROR)
+            angle = (times[0, k], 2.0 * HALF_PI[1] if times[0, k] == 2.0 * HALF_PI[0] else 0.0)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, angle, rule, MAX_PANEL_ERROR)
             high, low = add(high, low, part, part_low)
-            times[1, k], times[2, k], at, error = high, low, angle, error + of_part
+            times[1, k], times[2, k], last_angle, error = high, low, angle, error + of_part
     return max(error, of_launch)
 
 
@@ -214,7 +214,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, rules, tolerance)
         start, end = (work[place], work[place + LOW]), (work[place + 1], work[place + LOW + 1])
         width = add(end[0], end[1], -start[0], -start[1])
         ends = mean_at_ends(work, registers, width)
-        scale = multiply(width[0], width[1], 2.0 * QUARTER[0], 2.0 * QUARTER[1])
+        scale = multiply(width[0], width[1], 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])
     else:
         for i in range(ENDS):
             at = place + i
@@ -247,8 +247,8 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, rules, tolerance)
 def orbit_time(tape, work, p, launch, offsets, direction, rules):  # type: ignore[no-untyped-def]
     """Return what `find_orbit_time` returns."""
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
-    work, p, rules = uncounted(work), uncounted(p), (uncounted(rules[0]), uncounted(rules[1]), uncounted(rules[2]))
+    tape = (address, borrowed(operations), parts, registers)
+    work, p, rules = borrowed(work), borrowed(p), (borrowed(rules[0]), borrowed(rules[1]), borrowed(rules[2]))
     return find_orbit_time(tape, work, p, launch, offsets, direction, rules, (MAX_RULE_ERROR, MAX_PANEL_ERROR))
 
 
@@ -263,25 +263,25 @@ class Orbit(NamedTuple):
 
     Attributes
     ----------
-    duration : Bounded
+    duration : BoundedNumber
         Half period or lap time in s.
-    low, high : Bounded
+    low, high : BoundedNumber
         The turning points of a libration.
     """
 
-    duration: Bounded
-    low: Bounded
-    high: Bounded
+    duration: BoundedNumber
+    low: BoundedNumber
+    high: BoundedNumber
 
 
 def find_turning_points(
     formulas: BoundTape, launch: tuple[Number, Number], offsets: tuple[float, float]
-) -> tuple[Bounded, Bounded]:
+) -> tuple[BoundedNumber, BoundedNumber]:
     """Return the lower and the upper turning point of a libration; the arguments are those of `time_orbit`."""
     lam0, v0 = launch
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low), (-offsets[0], offsets[1])
     _, low, high, _ = orbit_time(*given, 0, rules_for(LIBRATION, wanted=False))
-    return Bounded(*low), Bounded(*high)
+    return BoundedNumber(*low), BoundedNumber(*high)
 
 
 def time_orbit(
@@ -312,10 +312,10 @@ def time_orbit(
     kind, by_panels = CIRCULATION if direction else LIBRATION, times.shape[1] > 1
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
     *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, rules_for(kind, wanted=not by_panels))
-    duration, low, high = map(Bounded._make, found)
+    duration, low, high = map(BoundedNumber._make, found)
     if times.size:
         error = fill_times(*given, kind, orbit, panel_rule(), times)
-        duration = Bounded(float(times[1, -1]), float(times[2, -1]), error) if by_panels else duration
+        duration = BoundedNumber(float(times[1, -1]), float(times[2, -1]), error) if by_panels else duration
         if np.isnan(times).any():
             return None
     return Orbit(duration, low, high) if duration.error <= MAX_ERROR * duration.high else None

@@ -8,7 +8,7 @@ from numba import types
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
@@ -55,9 +55,9 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     bool
         Whether the errors are small enough at all nodes, and V**2 is positive there.
     """
-    work, p, nodes, out = uncounted(work), uncounted(p), uncounted(nodes), uncounted(out)
+    work, p, nodes, out = borrowed(work), borrowed(p), borrowed(nodes), borrowed(out)
     address, operations, parts, registers = tape
-    operations = uncounted(operations)
+    operations = borrowed(operations)
     tape = (address, operations, parts, registers)
     _, place, potential, ds, _, _ = registers
     fill_parameters(tape, p, work)
@@ -71,7 +71,7 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     for i in range(n):
         phi, low = multiply(reach[0], reach[1], nodes[i], 0.0)
         phi, low = add(middle[0], middle[1], phi, low)
-        # The share of the segment at each node, and its derivative by phi.
+        # The share of the segment at each node, and its derivative with respect to phi.
         rows[0, i], rows[1, i], rows[2, i], rows[3, i] = phi, low, 1.0, 0.0
         if kind == TURN_TURN:
             s, s_low, c, c_low = sine_and_cosine(0.5 * phi, 0.5 * low)

@@ -98,9 +98,9 @@ def fill_places(n, start, width, nodes, first, place):  # type: ignore[no-untype
     """Fill a register with the places of nodes."""
     shares, shares_low = nodes[0, first : first + n], nodes[1, first : first + n]
     for i in range(n):
-        way, way_low = multiply(width[0], width[1], shares[i], shares_low[i])
-        place[i], place[LOW + i] = add(start[0], start[1], way, way_low)
-        place[ERROR + i] = UNIT * (fabs(place[i]) + fabs(way))
+        distance, distance_low = multiply(width[0], width[1], shares[i], shares_low[i])
+        place[i], place[LOW + i] = add(start[0], start[1], distance, distance_low)
+        place[ERROR + i] = UNIT * (fabs(place[i]) + fabs(distance))
 
 
 @Inner

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.arithmetic import UNIT, split
@@ -23,7 +23,7 @@ from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW
 from gqm_sym.runtime.interface import ExactFormulas
 
 # pi and e as two doubles each.
-PI, E = (2.0 * QUARTER[0], 2.0 * QUARTER[1]), (2.718281828459045, 1.4456468917292502e-16)
+PI, E = (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), (2.718281828459045, 1.4456468917292502e-16)
 
 # In place of a register that does not exist.
 NOWHERE = -1
@@ -46,7 +46,7 @@ class Tape(NamedTuple):
         The positions in the work space of the registers of the first run-time parameter, the place, the effective
         potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative if there is none). For a
         function of the plane (`record_in_plane`): the first run-time parameter, x (z follows), the function, its
-        derivatives by x and z, and nothing.
+        derivatives with respect to x and z, and nothing.
     """
 
     operations: NDArray[np.int64]
@@ -342,7 +342,7 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
 
 @lru_cache(maxsize=64)
 def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded | None:
-    """Return the tape of a function ``f(op, x, z, p)`` that gives a value and its derivatives by x and z.
+    """Return the tape of a function ``f(op, x, z, p)`` that gives a value and its derivatives with respect to x and z.
 
     It is None if it is too long.
     """

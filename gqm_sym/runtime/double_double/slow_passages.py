@@ -10,7 +10,7 @@ from math import copysign, fabs, inf, log, nan, pi, sin
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
@@ -77,9 +77,9 @@ def fill_slopes(integrand, place, reach, table, values, errors):  # type: ignore
     (address, operations, parts, registers), work = integrand.tape, integrand.work
     at, slope = registers[1], registers[4]
     for j in range(WINDOW):
-        way, way_low = multiply(reach, 0.0, table[0, j], 0.0)
-        work[at + j], work[at + LOW + j] = add(place[0], place[1], way, way_low)
-        work[at + ERROR + j] = UNIT * fabs(work[at + j]) if way != 0.0 else 0.0
+        distance, distance_low = multiply(reach, 0.0, table[0, j], 0.0)
+        work[at + j], work[at + LOW + j] = add(place[0], place[1], distance, distance_low)
+        work[at + ERROR + j] = UNIT * fabs(work[at + j]) if distance != 0.0 else 0.0
     call_interpreter(address, operations, parts[0], parts[2], work, WINDOW)
     for j in range(WINDOW):
         values[0, j], values[1, j], errors[j] = work[slope + j], work[slope + LOW + j], work[slope + ERROR + j]
@@ -297,9 +297,9 @@ def fill_speeds(integrand, kind, v2):  # type: ignore[no-untyped-def]
     for i in range(BLOCK):
         share = (i + 0.5) / BLOCK
         share = share if kind == CIRCULATION else sin(0.5 * pi * share) ** 2
-        way, way_low = multiply(width[0], width[1], share, 0.0)
+        distance, distance_low = multiply(width[0], width[1], share, 0.0)
         at = place + i
-        work[at], work[at + LOW] = add(start[0], start[1], way, way_low)
+        work[at], work[at + LOW] = add(start[0], start[1], distance, distance_low)
         work[at + ERROR] = 0.0
     call_interpreter(address, operations, parts[0], parts[1], work, BLOCK)
     for i in range(BLOCK):
@@ -337,7 +337,7 @@ def time_in_parts(integrand, kind, errors, rules, tolerance):  # type: ignore[no
     total, begin, stop, count = (0.0, 0.0, 0.0), (0.0, 0.0), (1.0, 0.0), 0
     first = REACH * fabs(width[0])
     if kind == LIBRATION:
-        stop = 2.0 * QUARTER[0], 2.0 * QUARTER[1]
+        stop = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
         part, reach = time_beside_turn(integrand, start, first, errors[0], table)
         if part[2] == part[2]:
             total, begin, count = sum_of(total, part), phase_angle(integrand, kind, reach, 0.0), 1

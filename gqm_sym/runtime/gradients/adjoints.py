@@ -48,18 +48,18 @@ def _partials(op: Recorder, k: int) -> Iterator[tuple[int, TapeNumber]]:
     code, *operands = op.entries[k]
     if code in ("parameter", "place", "constant"):
         return
-    out, (a, *rest) = op.at(k), (op.at(operand) for operand in operands)
+    out, (a, *others) = op.at(k), (op.at(operand) for operand in operands)
     if code == "cosine":
         yield operands[0], -op.at(k - 1)
     elif code in (interpreter.ADD, interpreter.SUBTRACT):
         yield operands[0], op.number(1)
         yield operands[1], op.number(1 if code == interpreter.ADD else -1)
     elif code == interpreter.MULTIPLY:
-        yield operands[0], rest[0]
+        yield operands[0], others[0]
         yield operands[1], a
     elif code == interpreter.DIVIDE:
-        yield operands[0], 1 / rest[0]
-        yield operands[1], -(out / rest[0])
+        yield operands[0], 1 / others[0]
+        yield operands[1], -(out / others[0])
     else:
         yield operands[0], _slope(op, code, a, out, k)
 

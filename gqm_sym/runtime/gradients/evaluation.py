@@ -10,9 +10,9 @@ from math import fabs, inf
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
@@ -132,8 +132,8 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
         For each result the mean as two doubles, a bound on its rounding error, and the mean of the absolute values.
     """
     address, operations, first, count, outputs = program
-    program = (address, uncounted(operations), first, count, uncounted(outputs))
-    return fill_means_of(program, uncounted(work), uncounted(inputs), uncounted(nodes), uncounted(found))
+    program = (address, borrowed(operations), first, count, borrowed(outputs))
+    return fill_means_of(program, borrowed(work), borrowed(inputs), borrowed(nodes), borrowed(found))
 
 
 @Inner
@@ -184,7 +184,7 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
     found[:, :] = 0.0
     for k in range(edges.size - 1):
         # The upper turning point is at the angle pi itself.
-        right = edges[k + 1], 2.0 * QUARTER[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
+        right = edges[k + 1], 2.0 * HALF_PI[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
         left, panels, change = (edges[k], 0.0), MIN_PANELS, inf
         width = add(right[0], right[1], -left[0], 0.0)
         while not change <= MAX_PANEL_CHANGE:
@@ -202,7 +202,7 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
         for j in range(found.shape[0]):
             found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], now[j, 0], now[j, 1])
             found[j, 2], found[j, 3] = found[j, 2] + now[j, 2], found[j, 3] + now[j, 3]
-    rounding, whole = 0.0, (edges[edges.size - 1], 2.0 * QUARTER[1] if kind == LIBRATION else 0.0)
+    rounding, whole = 0.0, (edges[edges.size - 1], 2.0 * HALF_PI[1] if kind == LIBRATION else 0.0)
     for j in range(found.shape[0]):
         if not found[j, 3] <= found[j, 2]:
             rounding = max(rounding, found[j, 2] / found[j, 3])

@@ -66,7 +66,7 @@ def variables_of(problem: Problem) -> Array:
 
 
 class FormulaOrbitDerivatives(OrbitDerivatives):
-    """A libration or circulation along a curve with formulas, with derivatives by all variables.
+    """A libration or circulation along a curve with formulas, with derivatives with respect to all variables.
 
     The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
 
@@ -243,7 +243,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
-        variables.
+        """Return half of V**2, or the contact force, at places, with two derivatives with respect to the place and
+        those with respect to all variables.
         """
         return values(extreme_program(self.source, of_speed), self.variables, place)[:, 0]

@@ -28,11 +28,10 @@ UNDECIDED = (
 # The number of digits, and the factors by which it is multiplied until two precisions agree to the share AGREEMENT of
 # the means of absolute values. On a small orbit V**2 loses as many digits as the square of the orbit's width, and its
 # derivatives lose as many again.
-DIGITS, MORE, AGREEMENT = 60, (1, 2, 4), 1e-19
+DIGITS, DIGIT_FACTORS, AGREEMENT = 60, (1, 2, 4), 1e-19
 
-# With this number of nodes, changes must be below the second number; otherwise the largest number of nodes will not
-# suffice.
-SLOW = (256, 1e-2)
+# With so many nodes or more, changes must be below MAX_CHANGE; otherwise the largest number of nodes will not suffice.
+NODES_BEFORE_CHECK, MAX_CHANGE = 256, 1e-2
 
 # A number counts as zero if it vanishes to this share of the digits.
 ZERO_DIGITS = 0.6
@@ -44,7 +43,7 @@ MAX_ROUNDING = 1e-30
 NEWTON_STEPS = 6
 
 
-def carried_out(context: Any, program: Program, inputs: Sequence[Any], places: Sequence[Any]) -> Iterator[list[Any]]:
+def executed(context: Any, program: Program, inputs: Sequence[Any], places: Sequence[Any]) -> Iterator[list[Any]]:
     """Yield the results of a program at each of some places, as numbers of an mpmath context."""
     registers: list[Any] = [None] * (program.work.size // ROW)
     for slot, value in program.constants:
@@ -52,14 +51,14 @@ def carried_out(context: Any, program: Program, inputs: Sequence[Any], places: S
         registers[slot] = +given
     registers[: len(inputs)] = inputs
     rows = program.operations.tolist()
-    _carry_out(context, rows[: program.first], registers)
+    _execute(context, rows[: program.first], registers)
     for place in places:
         registers[program.inputs] = place
-        _carry_out(context, rows[program.first :], registers)
+        _execute(context, rows[program.first :], registers)
         yield [registers[output // ROW] for output in program.outputs]
 
 
-def _carry_out(context: Any, rows: list[list[int]], registers: list[Any]) -> None:
+def _execute(context: Any, rows: list[list[int]], registers: list[Any]) -> None:
     """Carry out operations."""
     functions = {
         interpreter.SQUARE_ROOT: context.sqrt,
@@ -128,9 +127,9 @@ class MultiprecisionOrbit:
         for offset in (-self._offsets[0], self._offsets[1]):
             place = lam0 + offset
             for _ in range(NEWTON_STEPS):
-                ((step, *_),) = carried_out(context, turns, variables, [place])
+                ((step, *_),) = executed(context, turns, variables, [place])
                 place += step
-            ((_, *row),) = carried_out(context, turns, variables, [place])
+            ((_, *row),) = executed(context, turns, variables, [place])
             ends.append(place)
             rows += row
         return [*variables, *ends, *rows]
@@ -140,7 +139,7 @@ class MultiprecisionOrbit:
         shares = [(self._context.mpf(2 * k) + 1) / (2 * n) for k in range(n)]
         if not self._direction:
             shares = [self._context.sin(self._context.pi * share / 2) ** 2 for share in shares]
-        return list(carried_out(self._context, self._program, inputs, shares))
+        return list(executed(self._context, self._program, inputs, shares))
 
     def _means(self, inputs: Sequence[Any]) -> tuple[list[Any], Array, int]:
         """Return the means of the results and of their absolute values, and the number of nodes; 0 if they do not
@@ -157,7 +156,7 @@ class MultiprecisionOrbit:
                     change <= MAX_RATIO * before < np.inf and change**2 / before <= MAX_NEXT_CHANGE
                 ):
                     return means, sizes, n
-                if n >= SLOW[0] and change > SLOW[1]:
+                if n >= NODES_BEFORE_CHECK and change > MAX_CHANGE:
                     break
                 before = change
             last = means
@@ -172,7 +171,7 @@ class MultiprecisionOrbit:
     def _found(self) -> tuple[Array, int, list[Any]]:
         last: list[Any] | None = None
         try:
-            for factor in MORE:
+            for factor in DIGIT_FACTORS:
                 self._context.dps = factor * (DIGITS + 4 * ceil(max(0.0, -log10(sum(self._offsets) or 1.0))))
                 inputs = self._inputs()
                 means, sizes, n = self._means(inputs)

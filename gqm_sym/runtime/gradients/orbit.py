@@ -16,7 +16,7 @@ from gqm_sym.runtime.launch.formulas import Formulas
 
 
 @contextmanager
-def asked_for(name: str) -> Iterator[None]:
+def requested_quantity(name: str) -> Iterator[None]:
     """Name the requested quantity in errors about gradients."""
     try:
         yield
@@ -58,7 +58,7 @@ SeriesOf = Callable[[Array], Array]
 
 
 class OrbitDerivatives(ABC):
-    """A libration or circulation with derivatives by all variables.
+    """A libration or circulation with derivatives with respect to all variables.
 
     The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
 
@@ -105,8 +105,8 @@ class OrbitDerivatives(ABC):
 
     @abstractmethod
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Return half of V**2, or the contact force, at places, with two derivatives by the place and those by all
-        variables.
+        """Return half of V**2, or the contact force, at places, with two derivatives with respect to the place and
+        those with respect to all variables.
         """
 
     @abstractmethod
@@ -119,7 +119,7 @@ class OrbitDerivatives(ABC):
         return self.ends
 
     @property
-    def launch_moves(self) -> Array:
+    def launch_changes(self) -> Array:
         """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
@@ -161,6 +161,6 @@ class OrbitDerivatives(ABC):
         """The number of half periods, or of laps, in a period."""
         return 1.0 if self.direction else 2.0
 
-    def without_shift(self, moved: Array, lam: Array) -> Array:
+    def relative_change(self, moved: Array, lam: Array) -> Array:
         """Convert the change of a place's parameter to the change of the place relative to the points of the curve."""
         return moved

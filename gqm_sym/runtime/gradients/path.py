@@ -24,8 +24,8 @@ class PathRows(NamedTuple):
     Attributes
     ----------
     rows : (k, m + 2, n) array
-        For x, z, ds/dlam, m*kappa, m*n0 and U (0 of a motion with losses) the values, and the derivatives by m
-        parameters and by the place. Those of y follow for a space curve, and those of m**2 times
+        For x, z, ds/dlam, m*kappa, m*n0 and U (0 of a motion with losses) the values, and the derivatives with respect
+        to m parameters and the place. Those of y follow for a space curve, and those of m**2 times
         ``load_along_curvature`` for one in no vertical plane.
     """
 

@@ -60,15 +60,17 @@ class Program(NamedTuple):
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
-class Local(NamedTuple):
-    """A motion at a place: half of V**2 and ds/dlam, each with its derivatives by the place and by all variables.
+class LocalMotion(NamedTuple):
+    """A motion at a place: half of V**2 and ds/dlam, each with its derivatives with respect to the place and all
+    variables.
 
     Attributes
     ----------
     half, half_slope, half_partials
-        Half of V**2, its derivative by the place, and those by the variables at a fixed place.
+        Half of V**2, its derivative with respect to the place, and those with respect to the variables at a fixed
+        place.
     ds, ds_slope, ds_partials
-        The same of ds/dlam; there are derivatives by the run-time parameters only.
+        The same of ds/dlam; there are derivatives with respect to the run-time parameters only.
     """
 
     half: TapeNumber
@@ -123,12 +125,12 @@ class Source(NamedTuple):
         found: TapeNumber = (v0 * v0 / 2 + energy) + (potential(op, lam0, p) - potential(op, lam, p))
         return found
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at a place that does not depend on the variables."""
         half, ds = self.half(op, lam), op.number(self.formulas.ds(op, lam, op.values[: self.parameters]))
         half_slope, *half_partials = gradient(op, half, [lam, *op.values[: self.variables]])
         ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[: self.parameters]])
-        return Local(half, half_slope, half_partials, ds, ds_slope, ds_partials)
+        return LocalMotion(half, half_slope, half_partials, ds, ds_slope, ds_partials)
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
@@ -156,7 +158,7 @@ class AnySource(Protocol):
     def coordinates(self) -> int:
         """The number of coordinates of a place."""
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at a place."""
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
@@ -205,7 +207,7 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 @lru_cache(maxsize=64)
 def turning_point_program(source: AnySource) -> Program:
     """Return the program of the Newton step from the place to a turning point, and of the turning point's derivatives
-    by all variables.
+    with respect to all variables.
     """
     op = Recorder(source.inputs, source.coordinates)
     here = source.local(op, op.place)
@@ -218,9 +220,10 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     angle.
 
     The coordinate of a place is the square of the sine of half the phase angle. The inputs after those of the source
-    are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables,
-    V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same
-    place. If variables are ``wanted``, the results are the derivatives of dt/dphi by these alone.
+    are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives with respect to
+    all variables, V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam with respect to the
+    run-time parameters at the same place. If variables are ``wanted``, the results are the derivatives of dt/dphi with
+    respect to these alone.
     """
     n, share = source.variables, (op := Recorder(source.inputs + 2 * source.variables + 2, source.coordinates)).place
     a, b, *ends = op.values[source.inputs :]
@@ -231,11 +234,11 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     rates, powers = [rate], [power]
     by_launch = [op.number(0)] * LAUNCH_VARIABLES
     for k, by in enumerate(gradient(op, inertia, op.values[:n])):
-        low, high, stretch = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
+        low, high, strain = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
         moved = low + (high - low) * share
         # The small change of V**2 is computed as a whole first, because its parts are large near the turning points.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
-        longer = (high - low) / width + (stretch + ds_slope * moved) / ds
+        longer = (high - low) / width + (strain + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:
@@ -259,9 +262,9 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
     the same share.
 
     The inputs are the variables and the place where the lap begins, which is that of the launch but does not change
-    with it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
-    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as in
-    `libration_program`.
+    with it. The results are dt/dshare, its derivatives with respect to all variables, V**2 dt/dshare (1+beta) with its
+    derivatives, ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as
+    in `libration_program`.
     """
     op, lap, ds, v2, rate = lap_rate(source, direction)
     if wanted is not None:
@@ -304,10 +307,10 @@ def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNum
 
 @lru_cache(maxsize=64)
 def extreme_program(source: Source, of_speed: bool) -> Program:
-    """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative by
-    the place.
+    """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative
+    with respect to the place.
 
-    The inputs are the variables; the derivatives by them follow.
+    The inputs are the variables; the derivatives with respect to them follow.
     """
     op = Recorder(source.variables)
     quantity = source.half(op, op.place)

@@ -38,7 +38,7 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
 
 
 def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, Any]:
-    """Return the derivatives of a quantity of a motion, by the names of the variables.
+    """Return the derivatives of a quantity of a motion, with respect to the names of the variables.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
 
 
 def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
-    """Return the second derivatives of a half period or a period, by two names.
+    """Return the second derivatives of a half period or a period, with respect to two names.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, w
 
 
 def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) -> Array:
-    """Return the derivatives of an extreme along the motion, by all variables.
+    """Return the derivatives of an extreme along the motion, with respect to all variables.
 
     Inside the orbit the extreme changes as the quantity does at a fixed place, because the quantity is stationary there
     (envelope theorem). At a turning point, or where a horizon cuts the motion, the place changes too.
@@ -112,7 +112,7 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
             everything = (*motion.problem.formulas.parameters, "lam0", "v0")
-            moved = derivatives.without_shift(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
+            moved = derivatives.relative_change(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
     (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total

@@ -10,8 +10,8 @@ from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, Source
 
 @lru_cache(maxsize=16)
 def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """Return the program of `turning_point_program` with the second derivatives by the pairs of variables (`pairs_of`)
-    in ``rows``.
+    """Return the program of `turning_point_program` with the second derivatives with respect to the pairs of variables
+    (`pairs_of`) in ``rows``.
     """
     op = Recorder(source.variables)
     here = source.local(op, op.place)
@@ -28,8 +28,8 @@ def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=16)
 def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """Return the program of the second derivatives of dt/dphi at the same phase angle, by the pairs of variables in
-    ``rows``.
+    """Return the program of the second derivatives of dt/dphi at the same phase angle, with respect to the pairs of
+    variables in ``rows``.
 
     The inputs are those of `libration_program`, where the first derivatives of each turning point are followed by the
     second ones.
@@ -63,8 +63,8 @@ def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
 
 @lru_cache(maxsize=16)
 def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
-    """Return the program of the second derivatives of dt/dshare at the same share of a lap, by the pairs of variables
-    in ``rows``.
+    """Return the program of the second derivatives of dt/dshare at the same share of a lap, with respect to the pairs
+    of variables in ``rows``.
     """
     op, *_, rate = lap_rate(source, direction)
     first = gradient(op, rate, op.values[: source.variables])

@@ -131,7 +131,7 @@ def points_of(found: Any, lam: Array, v: Array) -> Array:
 
 
 class OrbitSensitivity:
-    """The derivatives of the states of one orbit by all variables.
+    """The derivatives of the states of one orbit with respect to all variables.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class OrbitSensitivity:
         series, found = self._series(still[PHASE] / self._scale), np.empty((STATE_ROWS, variables, 1))
         path = derivatives.at_places(still[PLACE])
         fill_changes(still, orbit, series, path.rows, self._scale, found)
-        orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_moves
+        orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_changes
         orbit[LAUNCH_DELAY] = self._launch_delay(
             motion, path, self._scale * series[1, 1 : 1 + variables, 0], found[:, :, 0]
         )
@@ -188,7 +188,7 @@ class OrbitSensitivity:
             The changes of the state there at a fixed phase angle (`fill_changes`).
         """
         given, direction, ds = motion.problem.launch, motion.direction, path.ds[0, 0]
-        v0, moves = given.v0.value, self._derivatives.launch_moves
+        v0, moves = given.v0.value, self._derivatives.launch_changes
         if self._derivatives.direction:
             circulating: Array = direction * ds / v0 * moves
             return circulating
@@ -205,7 +205,7 @@ class OrbitSensitivity:
         return delay
 
     def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
-        """Return the derivatives of lam, s, x, z, v, N and y at times by some of the variables.
+        """Return the derivatives of lam, s, x, z, v, N and y at times with respect to some of the variables.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class OrbitSensitivity:
         return found
 
     def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
-        """Return the derivatives of lam alone, by all variables, given ds/dlam."""
+        """Return the derivatives of lam alone, with respect to all variables, given ds/dlam."""
         orbit, share = self._orbit(motion, phi)[:, :, None], points[PHASE] / self._scale
         times = self._scale * self._series(share)[1, 1 : 1 + orbit.shape[1]]
         delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times

@@ -8,7 +8,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
@@ -88,7 +88,7 @@ def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found)
     nodes : (4, k) array
         The table of shares (`nodes.trapezoidal_nodes`).
     found : (m, k) array
-        Filled with the derivatives by the variables of the orbit's program.
+        Filled with the derivatives with respect to the variables of the orbit's program.
     """
     n = launches.shape[1] - 2
     variables, inputs = np.zeros((3, n)), np.zeros((3, orbit[3]))
@@ -105,7 +105,7 @@ def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found)
         for j in range(means.shape[0]):
             high, low = means[j, 0], means[j, 1]
             if kind == LIBRATION:
-                high, low = multiply(high, low, 2.0 * QUARTER[0], 2.0 * QUARTER[1])
+                high, low = multiply(high, low, 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])
             found[m, j] = high if count > 0 else nan
 
 
@@ -214,7 +214,7 @@ def fill_extremes(turns, turns_work, extreme, work, kind, sign, launches, found)
 
 @entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX), nogil=True)
 def fill_ends(turns, turns_work, launches, found):  # type: ignore[no-untyped-def]
-    """Fill the derivatives of the lower and then of the upper turning point, by all variables.
+    """Fill the derivatives of the lower and then of the upper turning point, with respect to all variables.
 
     The arguments are as for `fill_gradients`.
     """
@@ -319,7 +319,7 @@ def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, .
 
 
 def _extreme_gradients(formulas: Formulas, quantity: str, launches: Launches, values: Array) -> Array:
-    """Return the derivatives of extremes of V or of the contact force by all variables.
+    """Return the derivatives of extremes of V or of the contact force with respect to all variables.
 
     They are also NaN where the extreme differs from that of the sweep, as it may near a pole.
     """

@@ -195,7 +195,7 @@ def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untype
     """
     bits, shape, launch = section(record, FUNCTIONS).view(np.int64), section(record, SHAPE), section(record, LAUNCH)
     fns, kind = Addresses(bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
-    a, b, ref, w0, stretching = shape[0], shape[1], shape[2], shape[3], shape[4]
+    a, b, ref, w0, width_ratio = shape[0], shape[1], shape[2], shape[3], shape[4]
     integrand = Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0)))
     direction, (reduced, v, v2) = 1.0 if b > a else -1.0, (found[0], found[1], found[2])
     phase_angles_at(section(record, TIMING), kind, table_of(record), t, n, phases)
@@ -203,7 +203,7 @@ def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untype
     fill_speeds(integrand, phases.phi[:n], work.reshape(-1)[: 4 * n].reshape(4, n), v)
     for i in range(n):
         launched = t[i] == 0.0
-        place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * stretching)
+        place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * width_ratio)
         reduced[i], v[i] = choose(launched, launch[0], place), choose(launched, launch[1], speed)
         v2[i] = v[i] * v[i]
 
@@ -229,7 +229,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         section(record, LAUNCH),
         section(record, FUNCTIONS).view(np.int64)[0],
     )
-    stretching, lap_length, s0, s_a = shape[4], launch[2], launch[3], launch[4]
+    width_ratio, lap_length, s0, s_a = shape[4], launch[2], launch[3], launch[4]
     time_error, drift = launch[5], launch[6]
     arcs = section(record, ARCS)
     edges, lengths, length_terms = (
@@ -256,7 +256,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             panels[i] = owners[segments[i]]
         read_off_block(edges, lengths, length_terms, phi, n, panels, spare, arc)
         for i in range(n):
-            s = (s_a + direction * stretching * arc[i]) + laps[i] * lap_length
+            s = (s_a + direction * width_ratio * arc[i]) + laps[i] * lap_length
             arc[i] = choose(block[i] == 0.0, s0, s + s0)
         frame = rows.reshape(-1)[: 5 * n].reshape(5, n)
         call_path_and_contact_force(address, n, reduced, v2, p, frame)

@@ -13,7 +13,7 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.compiled.buffers import longer, taller
+from gqm_sym.runtime.compiled.buffers import longer, with_rows
 from gqm_sym.runtime.compiled.intrinsics import fma, item_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
@@ -198,7 +198,7 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
                 capacity *= 2
                 middles, lows, scales = longer(middles, capacity), longer(lows, capacity), longer(scales, capacity)
                 ends, errors = longer(ends, capacity), longer(errors, capacity)
-                powers = taller(powers, capacity)
+                powers = with_rows(powers, capacity)
             middles[count], low = two_sum(times[k], middle)
             lows[count], scales[count], ends[count] = low + times_low[k], 1.0 / reach, times[k] + stop
             errors[count] = 0.0 if accepted else tail

@@ -10,7 +10,7 @@ from numba import types
 from gqm_sym.budgets import spend
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.compiled.calls import call_effective_potential
-from gqm_sym.runtime.compiled.intrinsics import choose, whole_below
+from gqm_sym.runtime.compiled.intrinsics import choose, floor_of
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, REAL, VECTOR
 from gqm_sym.runtime.launch import zeros
@@ -42,7 +42,7 @@ CUSP_SHARE = 1e-7
 
 # The share of the gains and losses of V**2 on the way to an end of the domain above which V**2 at that end excludes a
 # turning point; and the number of places on the way at which the slope of the potential is evaluated.
-LIP_SHARE, WAY_MARKS = 1e-12, 5
+DOMAIN_END_V2_SHARE, GAIN_SAMPLES = 1e-12, 5
 
 # The distance from a place at which ds is compared with ds at the place itself to decide whether that is a cusp, as a
 # share of the first step.
@@ -73,7 +73,7 @@ def first_zero_from(fns, p, lam0, w0, direction, begin, length, step):  # type: 
 def distance_to_axis(start, direction, axis, step):  # type: ignore[no-untyped-def]
     """Return the distance to the first axis of symmetry ahead; negative if the only axis (``step`` 0) is behind."""
     away = direction * (axis - start)
-    return choose(step > 0.0, away - step * whole_below(away / step), away)
+    return choose(step > 0.0, away - step * floor_of(away / step), away)
 
 
 @Inner
@@ -221,7 +221,7 @@ def search_beyond_barriers(
         what, near, far = found
         if what != CRITICAL:
             return found, None
-        end = problem.decider.resolve(lam0 + near, lam0 + far, direction)
+        end = problem.deciding_problem.resolve(lam0 + near, lam0 + far, direction)
         if end.what != "clear":
             return found, end
         begin = max(abs(far), 1e-300)
@@ -279,9 +279,9 @@ def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
         return end
     places = np.array([lam0, end.place])
     v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, problem.w0, places[1:], places[1:] - lam0)[0]
-    slopes = potential_at(f.addresses, f.p, lam0 + offset * np.linspace(0.0, 1.0, WAY_MARKS))[1]
+    slopes = potential_at(f.addresses, f.p, lam0 + offset * np.linspace(0.0, 1.0, GAIN_SAMPLES))[1]
     size = problem.w0 + 2.0 * abs(offset) * float(np.abs(slopes).max())
-    if v2 > LIP_SHARE * size:
+    if v2 > DOMAIN_END_V2_SHARE * size:
         return end
     if exact is None or problem.formulas.domain_of is None:
         stops = abs(v2) <= ZERO_SHARE * size

@@ -118,7 +118,7 @@ class Problem:
         return self.lam0 if self.formulas.chart is not None else 0.0
 
     @property
-    def decider(self) -> ExactProblem | RoundedProblem:
+    def deciding_problem(self) -> ExactProblem | RoundedProblem:
         """The problem that makes the decisions that doubles cannot make: by extended precision, or else by rounding
         margins.
         """

@@ -85,9 +85,9 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     lam0, v0, direction, point, t_max, contact = request
     if point is None and lam0 is not None:
         unit = None if type(lam0) is float else formulas.units.get(formulas.parameter)
-        place, at = read_number(lam0, where="lam0", unit=unit), None
+        place, point_place = read_number(lam0, where="lam0", unit=unit), None
     else:
-        place, at = _read_place(formulas, p, lam0, point)
+        place, point_place = _read_place(formulas, p, lam0, point)
     if type(direction) is not int or direction not in (1, -1):
         direction = _read_direction(direction)
     if type(contact) is not str or contact != "bilateral":
@@ -111,7 +111,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
             f"lam0: {place.text} is so many laps away that doubles cannot tell places apart; the curve repeats after "
             f"{domain.period!r}"
         )
-    return Launch(place, speed, direction, contact, horizon, at)
+    return Launch(place, speed, direction, contact, horizon, point_place)
 
 
 def _read_direction(given: Any) -> int:

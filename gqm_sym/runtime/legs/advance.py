@@ -65,15 +65,25 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, clearance
 from gqm_sym.runtime.legs.panels.equation import Forces
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, sign_of_load, slope_of_v2
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
-from gqm_sym.runtime.legs.runs.follow import follow, released
+from gqm_sym.runtime.legs.runs.ends import (
+    END_ASYMPTOTE,
+    END_LIFTOFF,
+    END_LIMIT,
+    END_PAUSE,
+    END_RECORD_FULL,
+    END_TOO_MANY_PANELS,
+    END_TOO_NARROW,
+    END_TURN,
+)
+from gqm_sym.runtime.legs.runs.follow import direction_from_rest, follow
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
-from gqm_sym.runtime.legs.runs.route import Route, Start
+from gqm_sym.runtime.legs.runs.route import Route, RunStart
 
-# Codes for the result of an advance, in addition to those of `runs.ends`. RESTS takes the place of TURN if the body
-# stays; ENDING has the same code if the motion ends. AT_ONCE: the track would have to pull the body at once, so that it
-# lifts off where it is. LEAVES: the body would leave the domain at once. BEYOND: it has left the range of doubles.
-RESTS, AT_ONCE, LEAVES, BEYOND = range(10, 14)
+# Codes for the result of an advance, in addition to those of `runs.ends`. END_REST takes the place of END_TURN if the
+# body stays; ENDING has the same code if the motion ends. END_LIFTOFF_AT_ONCE: the track would have to pull the body at
+# once, so that it lifts off at its place. END_OUT_OF_DOMAIN: the body would leave the domain at once. END_OVERFLOW: it
+# has left the range of doubles.
+END_REST, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW = range(10, 14)
 
 DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean), Dissipation)
 
@@ -100,7 +110,7 @@ CREEPING_PAUSES = 5.0
 MAX_WHOLE_SHARE = 0.9
 
 
-NOTHING: Array = np.empty(0)
+NO_NUMBERS: Array = np.empty(0)
 
 
 class Joints(NamedTuple):
@@ -123,7 +133,7 @@ class Joints(NamedTuple):
     corners: Array
     drops: Array
     ahead: Array
-    gaps: Array = NOTHING
+    gaps: Array = NO_NUMBERS
 
 
 def room_ahead(breaks: int) -> int:
@@ -190,7 +200,7 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
     off, period = 0.0, body[PERIOD]
     if is_break(joints.breaks, period, place):
         off = clearance(place, period if period > 0.0 else max(fabs(body[LOW]), fabs(body[HIGH])))
-    return released(dissipation.static_balance, p, place - off, place + off, preferred)[0]
+    return direction_from_rest(dissipation.static_balance, p, place - off, place + off, preferred)[0]
 
 
 @Inner
@@ -268,7 +278,8 @@ def expected_width(body):  # type: ignore[no-untyped-def]
 def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
-    A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
+    A body that the track would have to pull at once is followed over a short distance without contact, and ENDING is
+    END_LIFTOFF_AT_ONCE.
     """
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
@@ -288,14 +299,14 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     may_be_whole = width == 0.0 or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:
-        start = Start(
+        start = RunStart(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
             *(width, may_be_whole),
         )
         route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
-        if found.what == LIFTOFF and record[AHEAD] == 0.0:
-            pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
+        if found.what == END_LIFTOFF and record[AHEAD] == 0.0:
+            pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, END_LIFTOFF_AT_ONCE
         else:
             return found
 
@@ -328,7 +339,7 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
         Run-time parameters.
     joints : Joints
     body : array
-        The line of the body (`legs.body`), which has been launched. It is unchanged if the record is FULL.
+        The line of the body (`legs.body`), which has been launched. It is unchanged if the record is END_RECORD_FULL.
     reading : runs.route.Reading
     record : array
         Filled in (`leg_record`).
@@ -336,38 +347,42 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     Returns
     -------
     int
-        RESTS if the body comes to rest, one of the codes of `runs.ends` for the end of the run, LEAVES or BEYOND; SPENT
-        if the body could not be followed.
+        END_REST if the body comes to rest, one of the codes of `runs.ends` for the end of the run, END_OUT_OF_DOMAIN or
+        END_OVERFLOW; END_TOO_MANY_PANELS if the body could not be followed.
     """
     found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
-    if what == LIMIT and is_break(joints.drops, period, place):
-        what = LIFTOFF
-    if what == FULL or body[ENDING] == AT_ONCE:
-        return AT_ONCE if body[ENDING] == AT_ONCE else FULL
-    if what == LIMIT and not ahead:
-        return LEAVES
-    if what == SPENT or not (ahead or back) or (what == ASYMPTOTE and dissipation.linear and not back):
-        return SPENT
+    if what == END_LIMIT and is_break(joints.drops, period, place):
+        what = END_LIFTOFF
+    if what == END_RECORD_FULL or body[ENDING] == END_LIFTOFF_AT_ONCE:
+        return END_LIFTOFF_AT_ONCE if body[ENDING] == END_LIFTOFF_AT_ONCE else END_RECORD_FULL
+    if what == END_LIMIT and not ahead:
+        return END_OUT_OF_DOMAIN
+    if (
+        what == END_TOO_MANY_PANELS
+        or not (ahead or back)
+        or (what == END_ASYMPTOTE and dissipation.linear and not back)
+    ):
+        return END_TOO_MANY_PANELS
     body[LEG_TIME] += record[TIME_FROM_START] + record[TIME_FROM_END]
     elapsed, low = add(body[ELAPSED], body[ELAPSED_LOW], record[TIME_FROM_START], 0.0)
     body[ELAPSED], body[ELAPSED_LOW] = add(elapsed, low, record[TIME_FROM_END], 0.0)
     body[NO_TURN_UNTIL] = found.no_turn_until
-    if what == TURN:
-        what = RESTS if after_turn(dissipation, p, joints, body, found, record) else TURN
+    if what == END_TURN:
+        what = END_REST if after_turn(dissipation, p, joints, body, found, record) else END_TURN
     else:
         is_open = period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
         creeps = found.step <= CREEPING_SHARE * body[FIRST_STEP]
-        endless = what == PAUSED and (is_open or creeps)
+        endless = what == END_PAUSE and (is_open or creeps)
         body[PAUSES] = body[PAUSES] + (CREEPING_PAUSES if creeps else 1.0) if endless else 0.0
     body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction
     body[CONTACT_SIGN], body[STEP] = found.contact_sign, found.step
-    if what in (RESTS, NARROWED, LIFTOFF, ASYMPTOTE) or (what == LIMIT and period == 0.0):
+    if what in (END_REST, END_TOO_NARROW, END_LIFTOFF, END_ASYMPTOTE) or (what == END_LIMIT and period == 0.0):
         body[ENDING] = what
         return what
     fold(body)
     if fabs(body[PLACE]) > MAX_PARAMETER and fabs(body[PLACE]) > MAX_PARAMETER * fabs(body[LAM0]):
-        return BEYOND
-    if what == PAUSED and period == 0.0:
+        return END_OVERFLOW
+    if what == END_PAUSE and period == 0.0:
         body[REACH] *= 2.0
     return what

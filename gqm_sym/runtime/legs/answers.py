@@ -8,16 +8,16 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.legs.advance import (
-    AT_ONCE,
-    BEYOND,
     DISSIPATION,
-    LEAVES,
-    NOTHING,
-    RESTS,
+    END_LIFTOFF_AT_ONCE,
+    END_OUT_OF_DOMAIN,
+    END_OVERFLOW,
+    END_REST,
+    NO_NUMBERS,
     Joints,
     advance,
     launch,
@@ -64,7 +64,14 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.panels.equation import Forces
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIMIT, NARROWED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.ends import (
+    END_ASYMPTOTE,
+    END_LIMIT,
+    END_RECORD_FULL,
+    END_TOO_MANY_PANELS,
+    END_TOO_NARROW,
+    END_TURN,
+)
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Reading
 
@@ -73,7 +80,7 @@ from gqm_sym.runtime.legs.runs.route import Reading
 FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
 
 # The code for a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
-NEARBY = 14
+END_NEAR_EQUILIBRIUM = 14
 
 # The status of an answer; LEFT is that of a body that the loop does not decide.
 FOUND, LEFT, NONE = range(3)
@@ -101,7 +108,7 @@ MAX_KEPT = 8
 _LOCK = threading.Lock()
 
 # The joints of a curve that is smooth everywhere, for compiled code.
-SMOOTH = Joints(NOTHING, NOTHING, NOTHING, NOTHING)
+SMOOTH = Joints(NO_NUMBERS, NO_NUMBERS, NO_NUMBERS, NO_NUMBERS)
 
 
 class Track(NamedTuple):
@@ -125,7 +132,7 @@ class Track(NamedTuple):
         return dissipation.linear and self.breaks.size > 0
 
 
-class Observed(NamedTuple):
+class Findings(NamedTuple):
     """The findings of the legs so far.
 
     Attributes
@@ -154,7 +161,7 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def sought(question):  # type: ignore[no-untyped-def]
+def sought_extreme(question):  # type: ignore[no-untyped-def]
     """Return whether a question is about the contact force, and 1 if it is about the largest value, -1 if about the
     smallest.
     """
@@ -162,19 +169,19 @@ def sought(question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
+def after_leg(body, question, findings, record):  # type: ignore[no-untyped-def]
     """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
-    if question == ARRIVAL and body[ENDING] != AT_ONCE:
+    if question == ARRIVAL and body[ENDING] != END_LIFTOFF_AT_ONCE:
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
-        return Observed(begin + (low + spent), observed.peak)
-    if body[ENDING] == AT_ONCE and question in (LEAST_SPEED, MOST_SPEED):
+        return Findings(begin + (low + spent), findings.peak)
+    if body[ENDING] == END_LIFTOFF_AT_ONCE and question in (LEAST_SPEED, MOST_SPEED):
         v = sqrt(record[START_V2])
-        return Observed(observed.arrival, max(observed.peak, v if question == MOST_SPEED else -v))
+        return Findings(findings.arrival, max(findings.peak, v if question == MOST_SPEED else -v))
     if question >= LEAST_SPEED:
-        until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
-        return Observed(observed.arrival, peak_of_leg(record, until, sought(question), observed.peak))
-    return observed
+        until = 0.0 if body[ENDING] == END_LIFTOFF_AT_ONCE else (body[HORIZON] - begin) - low
+        return Findings(findings.arrival, peak_of_leg(record, until, sought_extreme(question), findings.peak))
+    return findings
 
 
 @Inner
@@ -196,43 +203,43 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def conclude(body, question, observed):  # type: ignore[no-untyped-def]
+def conclude(body, question, findings):  # type: ignore[no-untyped-def]
     """Return the answer for a body that has been followed long enough, and its status."""
     if question == ARRIVAL:
-        is_there = observed.arrival < inf and observed.arrival <= body[HORIZON]
-        return (observed.arrival, FOUND) if is_there else (np.nan, NONE)
-    ends = body[ENDING] != 0.0 and body[ENDING] != ASYMPTOTE
+        is_there = findings.arrival < inf and findings.arrival <= body[HORIZON]
+        return (findings.arrival, FOUND) if is_there else (np.nan, NONE)
+    ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
     if not isfinite(end):
         return np.nan, NONE
     if question == END_TIME:
         return end, FOUND
     if question == REST_PLACE:
-        rests = body[ENDING] == RESTS and body[ELAPSED] <= body[HORIZON]
+        rests = body[ENDING] == END_REST and body[ELAPSED] <= body[HORIZON]
         return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
-    if body[ENDING] == ASYMPTOTE:
+    if body[ENDING] == END_ASYMPTOTE:
         return np.nan, LEFT
-    return observed.peak if question in (MOST_SPEED, MOST_LOAD) else 0.0 - observed.peak, FOUND
+    return findings.peak if question in (MOST_SPEED, MOST_LOAD) else 0.0 - findings.peak, FOUND
 
 
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
-    observed = Observed(inf, -inf)
+    findings = Findings(inf, -inf)
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
-    force, sign = sought(question)
+    force, sign = sought_extreme(question)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, Reading(reads, force, sign, observed.peak), record)
+        what = advance(dissipation, p, joints, body, Reading(reads, force, sign, findings.peak), record)
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
-        if what in (FULL, SPENT, NARROWED, LEAVES, BEYOND):
+        if what in (END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_OUT_OF_DOMAIN, END_OVERFLOW):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        observed = after_leg(body, question, observed, record)
-        if observed.arrival != observed.arrival:
+        findings = after_leg(body, question, findings, record)
+        if findings.arrival != findings.arrival:
             break
-        if not goes_on(body, question, observed.arrival):
-            return conclude(body, question, observed)
+        if not goes_on(body, question, findings.arrival):
+            return conclude(body, question, findings)
     return np.nan, LEFT
 
 
@@ -255,7 +262,7 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
     for k in range(SIZE):
         before[k] = body[k]
     what = advance(dissipation, p, joints, body, Reading(TIMES, False, 1.0, -inf), record)
-    if what in (TURN, RESTS, LIMIT, FULL):
+    if what in (END_TURN, END_REST, END_LIMIT, END_RECORD_FULL):
         return what
     for k in range(SIZE):
         body[k] = before[k]
@@ -265,18 +272,18 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
 @Inner
 def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-untyped-def]
     """Advance a body by as many legs as there are records, or up to a leg after which Python decides how to go on."""
-    what, count, body = RESTS, 0, bodies[0]
+    what, count, body = END_REST, 0, bodies[0]
     while count < records.shape[0]:
         if joints.gaps.size > 0:
             what = follow_leg(dissipation, p, joints, body, bodies[1 + count], records[count])
         else:
             what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[count])
-        if what == FULL:
+        if what == END_RECORD_FULL:
             break
         count += 1
         body[PANEL_COUNT] += 1.0 + records[count - 1, AHEAD] + records[count - 1, BACK]
         body[STATUS] = 1.0 if is_tiny(records[count - 1], body[LEAST_SIZE]) else 0.0
-        if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
+        if what != END_TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
     body[VALUE] = count
     return what
@@ -311,11 +318,11 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     Returns
     -------
     int
-        The code for the last leg of the last body (`advance`), or NEARBY.
+        The code for the last leg of the last body (`advance`), or END_NEAR_EQUILIBRIUM.
     """
     breaks, corners, drops, ahead, gaps = joints
-    joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
-    parameters, bodies, records, what = uncounted(parameters), uncounted(bodies), uncounted(records), RESTS
+    joints = Joints(borrowed(breaks), borrowed(corners), borrowed(drops), borrowed(ahead), borrowed(gaps))
+    parameters, bodies, records, what = borrowed(parameters), borrowed(bodies), borrowed(records), END_REST
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
         if parameters.shape[0] > 1:
@@ -323,9 +330,9 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
             if question == FIRST_LEGS and may_be_small(dissipation, p, joints.corners, body):
-                return NEARBY
+                return END_NEAR_EQUILIBRIUM
         if question <= LEGS:
-            what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else RESTS
+            what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else END_REST
         elif question == RUN_AGAIN:
             what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[0])
         elif body[DIRECTION] != 0.0:
@@ -342,7 +349,7 @@ def drive_along(
     if not track.breaks.size:
         what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
         return what
-    key, kept = (dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()), NOTHING
+    key, kept = (dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()), NO_NUMBERS
     if track.is_kept(dissipation):
         with _LOCK:
             found = _KEPT.pop(key, None)

@@ -15,14 +15,14 @@ from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS
+from gqm_sym.runtime.legs.advance import CREEPING_SHARE, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW, END_REST
 from gqm_sym.runtime.legs.answers import (
+    END_NEAR_EQUILIBRIUM,
     FIRST_LEGS,
     LEAST_SWING,
     LEGS,
     MAX_PAUSES,
     MAX_TURNS,
-    NEARBY,
     RUN_AGAIN,
     Track,
     drive_along,
@@ -57,7 +57,17 @@ from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
 from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.ends import (
+    END_ASYMPTOTE,
+    END_LIFTOFF,
+    END_LIMIT,
+    END_PAUSE,
+    END_RECORD_FULL,
+    END_SLOW,
+    END_TOO_MANY_PANELS,
+    END_TOO_NARROW,
+    END_TURN,
+)
 from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
@@ -90,15 +100,15 @@ CUSP_SHARE = 1e-2
 
 # The codes for the end of a leg that may have been followed without panels, by the data kept of gaps
 # (`answers.follow_leg`).
-PASSED = TURN, RESTS, LIMIT
+PASSED = END_TURN, END_REST, END_LIMIT
 
 # The names of the ends of runs that the code alone determines.
 END_NAMES = {
-    TURN: "turn",
-    RESTS: "rest",
-    LIFTOFF: "liftoff",
-    AT_ONCE: "liftoff",
-    ASYMPTOTE: "asymptote",
+    END_TURN: "turn",
+    END_REST: "rest",
+    END_LIFTOFF: "liftoff",
+    END_LIFTOFF_AT_ONCE: "liftoff",
+    END_ASYMPTOTE: "asymptote",
 }
 
 # Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
@@ -216,7 +226,7 @@ class Driver:
         return elapsed
 
     @property
-    def goes_on_for_ever(self) -> bool:
+    def is_endless(self) -> bool:
         """Whether so many legs have been followed that no end of the motion is searched for any more."""
         turns, pauses = self.at[TURNS], self.at[PAUSES]
         return bool(pauses >= MAX_PAUSES or turns > MAX_TURNS or (turns and not self.at[MAY_REST]))
@@ -237,9 +247,9 @@ class Driver:
         self.at, count = at, int(at[VALUE]) or 1
         self._last_record = records[count - 1]
         before = self.body[1 : 1 + count].copy() if self._passes and frame is None else [None] * count
-        is_plain = what == TURN and frame is None and not at[STATUS]
+        is_plain = what == END_TURN and frame is None and not at[STATUS]
         for k in range(count if is_plain else count - 1):
-            self.runs.append(Run(records[k], TURN, END_NAMES[TURN], None, before[k]))
+            self.runs.append(Run(records[k], END_TURN, END_NAMES[END_TURN], None, before[k]))
         if not is_plain:
             self._end_run(what, self._last_record, before[-1])
 
@@ -254,11 +264,11 @@ class Driver:
             what = drive_along(self.track, self.dissipation, self._parameters, RUN_AGAIN, body, record)
             # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
             left = abs(float(run.record[END] - record[0, END]))
-            if what in PASSED or (what == PAUSED and left <= ULP * self.problem.period):
+            if what in PASSED or (what == END_PAUSE and left <= ULP * self.problem.period):
                 return run.with_panels([*parts, record[0]], self._horizon)
-            if what == FULL:
+            if what == END_RECORD_FULL:
                 space *= 4
-            elif what in (PAUSED, SLOWED):
+            elif what in (END_PAUSE, END_SLOW):
                 parts.append(record[0])
             else:
                 break
@@ -270,22 +280,22 @@ class Driver:
         if frame is not None:
             frame.move(record, 1)
             self.at[PLACE] = float(record[END])
-        heading, leaves_frame = int(record[HEADING]), frame is not None and what == LIMIT
+        heading, leaves_frame = int(record[HEADING]), frame is not None and what == END_LIMIT
         if leaves_frame:
             self._leave_frame(record)
         self._settle(what, float(record[START]), float(record[END]))
-        if what == LEAVES:
+        if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
         name = "" if leaves_frame else self._end_name(what, record, heading)
-        if name == "cusp" and what == NARROWED:
+        if name == "cusp" and what == END_TOO_NARROW:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
         # At a cusp dW/dlam vanishes, so that its rounding error is large compared with it there too.
-        if what == SPENT or (what == NARROWED and name != "cusp" and self._force_cancels(record)):
+        if what == END_TOO_MANY_PANELS or (what == END_TOO_NARROW and name != "cusp" and self._force_cancels(record)):
             raise self._lost(record)
         self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self.at[ENDING]:
             self.ending = name
-        if what == BEYOND:
+        if what == END_OVERFLOW:
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self.at[PLACE]!r}; "
                 "give a shorter t_max"
@@ -303,13 +313,13 @@ class Driver:
                 what = drive_along(self.track, self.dissipation, self._parameters, question, self.body, records)
             else:
                 what = drive_along(SMOOTH, frame.dissipation, frame.p[None], question, self.body, records)
-            if what == NEARBY:
+            if what == END_NEAR_EQUILIBRIUM:
                 self._launch_nearby()
                 question = LEGS
-            elif what != FULL:
+            elif what != END_RECORD_FULL:
                 return what, records
             elif self.body[0, VALUE]:
-                return TURN, records
+                return END_TURN, records
             else:
                 legs, self._space = 1, 4 * self._space
 
@@ -318,13 +328,13 @@ class Driver:
         frame.
         """
         in_frame, linear = self._frame is not None, self.dissipation.linear
-        if what in (TURN, PAUSED) and self._has_died_away(start, end):
+        if what in (END_TURN, END_PAUSE) and self._has_died_away(start, end):
             self.ending = "asymptote"
-        elif what == ASYMPTOTE and not linear:
+        elif what == END_ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame:
-            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
-            creeps = what == PAUSED and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
+            turns_nearby = what == END_TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
+            creeps = what == END_PAUSE and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
             if turns_nearby or creeps:
                 self._enter_frame()
 
@@ -445,8 +455,8 @@ class Driver:
     def _end_name(self, what: int, record: Array, heading: int) -> str:
         """Return the name of the end of a run."""
         problem = self.problem
-        if what == LIMIT and not problem.period:
+        if what == END_LIMIT and not problem.period:
             return domain_end(problem, heading).what
-        if what == NARROWED:
+        if what == END_TOO_NARROW:
             return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
         return END_NAMES.get(what, "")

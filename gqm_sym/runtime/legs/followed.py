@@ -141,7 +141,7 @@ class FollowedMotion(Motion):
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         driver = self._driver
         driver.go_on()
-        if self._horizon == inf and not self._beginning and driver.at and not driver.ending and driver.goes_on_for_ever:
+        if self._horizon == inf and not self._beginning and driver.at and not driver.ending and driver.is_endless:
             self._beginning = len(self._all_runs)
 
     def _follow(self, reach: float) -> None:

@@ -10,13 +10,13 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.advance import RESTS
+from gqm_sym.runtime.legs.advance import END_REST
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.frames.local_frame import Frame, error_of_chart
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_record import INHERITED, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIMIT, TURN
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_LIMIT, END_TURN
 from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
@@ -66,7 +66,7 @@ class InheritedErrors:
             return after.place, np.full_like(phi, after.time)
         of_frame = 0.0 if run.frame is None else self._errors_of(run.frame)[0]
         swing = 2.0 * self._driver.last_swing if timed.leg == len(self._runs) - 1 else 0.0
-        if swing and run.what != ASYMPTOTE:
+        if swing and run.what != END_ASYMPTOTE:
             # The error of so small a V**2 may be below the range of doubles, but the body stays where it is.
             return before.place + of_frame + swing, np.zeros_like(phi)
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
@@ -92,7 +92,7 @@ class InheritedErrors:
         distances.
         """
         run, before, driver = self._runs[leg], self._errors[leg], self._driver
-        frame, turns = run.frame, run.what in (TURN, RESTS)
+        frame, turns = run.frame, run.what in (END_TURN, END_REST)
         share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
         if frame is None:
             p = driver.problem.functions.p
@@ -105,7 +105,7 @@ class InheritedErrors:
         after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, NO_CHARTS, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
-        return after._replace(place=after.place + of_place) if run.what == LIMIT else after
+        return after._replace(place=after.place + of_place) if run.what == END_LIMIT else after
 
     def _errors_of(self, frame: Frame) -> tuple[float, float]:
         """Return the error of the place of a frame's equilibrium, and the relative error of the force there due to the

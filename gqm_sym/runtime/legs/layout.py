@@ -7,10 +7,10 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.legs.advance import AT_ONCE
+from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE
 from gqm_sym.runtime.legs.leg_record import BEGIN, END, MIDDLE, START, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIFTOFF
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_LIFTOFF
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
@@ -47,11 +47,11 @@ class Layout:
         self._clock, (ahead, back) = run.pair(BEGIN), run.pair(TIME_FROM_START)
         if run.ahead:
             segment = along_panels(f, run.pair(START), middle, run.half_c, ahead, run.panels_ahead)
-            if run.what == AT_ONCE:
+            if run.what == END_LIFTOFF_AT_ONCE:
                 self._append(segment, 1, [(ZERO, 0.0)] * 2, run.end, run.laps)
                 return
             self._add(segment, 1, run, "" if run.back else run.end)
-        if run.what == ASYMPTOTE and run.back:
+        if run.what == END_ASYMPTOTE and run.back:
             self._add(along_field(f, middle[0], end[0], run.field), 1, run, run.end)
         elif run.back:
             self._add(along_panels(f, end, middle, 0.0, back, run.panels_back), -1, run, run.end)
@@ -66,7 +66,7 @@ class Layout:
 
         # A change in the middle of a run belongs to the part that it ends, and not to the next one.
         changes = without(run.changes, segment.b) if sense < 0 and run.ahead else list(run.changes)
-        if not end or run.what == LIFTOFF:
+        if not end or run.what == END_LIFTOFF:
             found, changes = len(changes), without(changes, segment.b if sense > 0 else segment.a)
             end = "contact-sign" if not end and len(changes) < found else end
         inside = [place for place in changes if low < place < high]

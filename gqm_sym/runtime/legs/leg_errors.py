@@ -25,7 +25,7 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.charts.chart import MAGNIFIED
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.leg_reading import march_of
@@ -80,8 +80,8 @@ PLACE_ROUNDINGS, TIME_ROUNDINGS = 1.0, 6.0
 
 
 def _slopes() -> Array:
-    """Return the matrix that maps values at a panel's nodes to the derivative by the share of the panel, a row for each
-    node.
+    """Return the matrix that maps values at a panel's nodes to the derivative with respect to the share of the panel, a
+    row for each node.
     """
     degree, x = np.arange(COUNT), 2.0 * SHARES - 1.0
     angle = np.arccos(np.clip(x, -1.0, 1.0))
@@ -114,14 +114,14 @@ class Errors(NamedTuple):
     time: float
 
 
-class Half(NamedTuple):
+class RunHalf(NamedTuple):
     """Data of the motion on the panels from one end of the run to its middle.
 
     Attributes
     ----------
     by_place, by_v2 : float
-        The derivatives of the time by the place where the panels begin, at a given distance from there, and by V**2
-        there.
+        The derivatives of the time with respect to the place where the panels begin, at a given distance from there,
+        and V**2 there.
     damping : float
         The factor by which resistance reduces a change of V**2.
     gained : float
@@ -204,7 +204,7 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
         panel = Panel(left, v2, contact_sign, (-inf, inf))
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
-            return Half(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf, v2)
+            return RunHalf(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf, v2)
         size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], charts, work)
         fill_rates(march, panel, work)
         if k == 0:
@@ -231,12 +231,12 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
         rounded += 0.5 * (right - left) * work[TAILS + 6]
         carried = fabs(by_place) * errors[0] + fabs(by_v2) * errors[1] + rounded * errors[2]
         record[at + INHERITED] = max(inherited, carried)
-        rest = 1.0 / (1.0 + work[EXPM1_Q + COUNT])
-        damping, gained = damping * rest, (gained + size * work[D + COUNT]) * rest
+        share = 1.0 / (1.0 + work[EXPM1_Q + COUNT])
+        damping, gained = damping * share, (gained + size * work[D + COUNT]) * share
         last = right - 0.5 * (right - left) * (1.0 - SHARES[COUNT - 1])
         rate = work[TIME_RATE + COUNT - 1] / slope_at(last, march)
         left, v2 = right, max(work[W + COUNT], 0.0)
-    return Half(by_place, by_v2, damping, gained, rounded, slope, rate, least, most, v2)
+    return RunHalf(by_place, by_v2, damping, gained, rounded, slope, rate, least, most, v2)
 
 
 def rounding_share(linear: bool) -> float:
@@ -285,10 +285,10 @@ def carry(dissipation, p, turns, before, share, terms, charts, record):  # type:
     place, v2, time : float
         As in `Errors`.
     """
-    p, record, forward = uncounted(p), uncounted(record), march_of(record)
+    p, record, forward = borrowed(p), borrowed(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
-    errors, sizes = (before.place, before.v2, share), (terms, uncounted(charts))
+    errors, sizes = (before.place, before.v2, share), (terms, borrowed(charts))
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, sizes, record)
     rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded

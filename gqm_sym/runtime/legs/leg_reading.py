@@ -10,7 +10,7 @@ from numba import types
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum, legendre_sum
 from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import VECTOR, Array
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -138,14 +138,14 @@ def passage(record, place):  # type: ignore[no-untyped-def]
     such time.
     """
     ahead, back, march = int(record[AHEAD]), int(record[BACK]), march_of(record)
-    v, gone = march.direction, offset(place, march.origin, march.direction)
+    v, covered = march.direction, offset(place, march.origin, march.direction)
     left = 0.0 if place == record[END] else -offset(place, (record[END], record[END_LOW]), v)
-    if gone <= 0.0 or left < 0.0:
+    if covered <= 0.0 or left < 0.0:
         return inf
     if left == 0.0:
         return record[TIME_FROM_START] + record[TIME_FROM_END]
     if offset(place, (record[MIDDLE], record[MIDDLE_LOW]), v) <= 0.0 and ahead > 0:
-        return time_to(record, HEAD, ahead, marched(gone, march))
+        return time_to(record, HEAD, ahead, marched(covered, march))
     if back == 0 or record[TIME_FROM_END] == 0.0:
         return np.nan
     from_end = time_to(record, HEAD + ahead * COLUMNS, back, sqrt(left))
@@ -155,7 +155,7 @@ def passage(record, place):  # type: ignore[no-untyped-def]
 @entry(types.float64(VECTOR, types.float64))
 def place_at(record, time):  # type: ignore[no-untyped-def]
     """Return the place within the lap at a time in s from a leg's start; NaN if the record does not determine it."""
-    record, ahead, back = uncounted(record), int(record[AHEAD]), int(record[BACK])
+    record, ahead, back = borrowed(record), int(record[AHEAD]), int(record[BACK])
     march, v = march_of(record), record[HEADING]
     if record[WHOLE] > 0.0:
         return np.nan

@@ -10,7 +10,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.legs.advance import AT_ONCE
+from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE
 from gqm_sym.runtime.legs.frames.local_frame import Frame
 from gqm_sym.runtime.legs.leg_reading import to_integral, to_plain
 from gqm_sym.runtime.legs.leg_record import (
@@ -36,7 +36,7 @@ from gqm_sym.runtime.legs.leg_record import (
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, PAUSED
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_PAUSE
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
@@ -120,7 +120,7 @@ class Run(NamedTuple):
         clock = [BEGIN, BEGIN_LOW, TIME_FROM_START, TIME_FROM_END]
         last[TIME_FROM_END if last[BACK] else TIME_FROM_START] += sum((own[clock] - last[clock]).tolist())
         last[[END, END_LOW]] = own[[END, END_LOW]]
-        earlier = [Run(record, PAUSED, "", None, None, passed) for record in records[:-1]]
+        earlier = [Run(record, END_PAUSE, "", None, None, passed) for record in records[:-1]]
         return [*earlier, self._replace(record=last, before=None, passed=passed)]
 
     @property
@@ -152,8 +152,8 @@ class Run(NamedTuple):
         """Return the leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
         head = self.record[:HEAD].tolist()
         start, before = head[START], head[LAPS_BEFORE] * lap
-        end = start if self.what == AT_ONCE else head[END]
-        t_end = inf if self.what == ASYMPTOTE else t_end
+        end = start if self.what == END_LIFTOFF_AT_ONCE else head[END]
+        t_end = inf if self.what == END_ASYMPTOTE else t_end
         return Leg(start + before, end + before, head[BEGIN], t_end, int(head[HEADING]), self.end)
 
     @property

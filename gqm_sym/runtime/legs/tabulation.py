@@ -95,8 +95,8 @@ class Timing(NamedTuple):
 def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
     """Convert a time from the segment's end ``a`` to a time from launch, both as two doubles."""
     s, e = two_sum(r, -timing.r_start)
-    high, rest = two_sum(timing.t_start, timing.sense * s)
-    return two_sum(high, rest + timing.t_start_low + timing.sense * (e + r_low - timing.r_start_low))
+    high, rounding = two_sum(timing.t_start, timing.sense * s)
+    return two_sum(high, rounding + timing.t_start_low + timing.sense * (e + r_low - timing.r_start_low))
 
 
 TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)

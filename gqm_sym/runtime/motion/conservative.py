@@ -107,7 +107,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     if (direction == 0 or is_stuck) and is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
-        sign = problem.decider.slope_sign()
+        sign = problem.deciding_problem.slope_sign()
         if sign == 0:
             return MotionAtRest(problem)
         direction = -sign

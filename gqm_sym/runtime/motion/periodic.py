@@ -13,7 +13,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for, without_formulas
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
 from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
@@ -98,16 +98,16 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def action(self) -> float:
         """The integral of (1 + beta) V ds over one period, per mass, in m2/s."""
-        with asked_for("action"):
+        with requested_quantity("action"):
             return self._derivatives.action
 
     @property
     @locked
     def period_slope(self) -> float:
-        """dT/dE, the derivative of the period by the energy per mass, in s3/m2."""
+        """dT/dE, the derivative of the period with respect to the energy per mass, in s3/m2."""
         formulas = self.problem.formulas
         inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
-        with asked_for("period_slope"):
+        with requested_quantity("period_slope"):
             return float(self._derivatives.period_gradient[-1] / inertia)
 
     @locked

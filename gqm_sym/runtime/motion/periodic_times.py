@@ -28,7 +28,7 @@ from gqm_sym.runtime.quadrature.time_panels import slopes
 CHART_ROUNDING = 16 * ULP
 
 # The latest time that is computed in doubles if double-double arithmetic does not suffice, in periods from launch.
-EARLY = 0.999
+MAX_PERIODS_IN_DOUBLES = 0.999
 
 # The largest number of pieces of a chart on a segment for which times are computed in extended precision by default.
 MAX_CHART_PIECES = 250
@@ -186,7 +186,7 @@ class PeriodicTimes(Motion):
         """The largest distance in s of a time from launch for which extended precision would take too long."""
         if self._segment.from_multiprecision:
             return -inf
-        return EARLY * self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
+        return MAX_PERIODS_IN_DOUBLES * self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
 
     def _times_until(self, end_time: float) -> Times:
         """Return the times with as many digits as a phase requires at ``end_time`` in s from launch."""

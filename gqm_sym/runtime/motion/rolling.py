@@ -36,7 +36,7 @@ def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float)
             path_and_force_at(f.addresses, f.p, places, np.zeros(phi.size))[2],
             contact_force_on(problem, timed, phi),
         )
-        # The slope of the effective potential by arc length is -F.t/(1 + beta).
+        # The slope of the effective potential with respect to arc length is -F.t/(1 + beta).
         needed = beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
         signs: Array = np.sign(mu * np.abs(force) / mass - needed)
         return signs

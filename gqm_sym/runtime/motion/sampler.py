@@ -184,5 +184,5 @@ class Sampler:
 def _inverse(period: Pair) -> Pair:
     """Return the inverse of a period, as two doubles."""
     inverse = 1.0 / period[0]
-    product, rest = two_product.py_func(inverse, period[0])
-    return inverse, -((product - 1.0) + rest + inverse * period[1]) * inverse
+    product, rounding = two_product.py_func(inverse, period[0])
+    return inverse, -((product - 1.0) + rounding + inverse * period[1]) * inverse

@@ -14,7 +14,7 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Bounded, Orbit, find_turning_points, time_orbit
+from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, BoundedNumber, Orbit, find_turning_points, time_orbit
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends
@@ -89,8 +89,8 @@ def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float
     if pieces is None or formulas is None:
         return None
     sense = direction if kind == "circulation" else 0
-    ways = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
-    low, high = sorted(launch.lam0.value + way for way in ways)
+    distances = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
+    low, high = sorted(launch.lam0.value + distance for distance in distances)
     given, offset = (launch.lam0, launch.v0, launch.point), problem.formulas.offset(problem.p)
     return pass_along(pieces, formulas, given, (low, high), sense, offset)
 
@@ -140,7 +140,7 @@ def true_turning_points(
     precision. ``offsets`` are their distances from the launch to the accuracy of doubles, and ``orbit`` is the result
     of `orbit_of` for these, if it has been called.
     """
-    low = high = Bounded(nan, nan, nan)
+    low = high = BoundedNumber(nan, nan, nan)
     if problem.formulas.chart is not None:
         passage = passage_of(problem, "libration", 0, offsets)
         if passage is not None:

@@ -179,12 +179,12 @@ class Arithmetic:
         return self.track.effective_potential(lam)
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return the derivative of U by lam."""
+        """Return the derivative of U with respect to lam."""
         spend()
         return self.track.effective_potential_slope(lam)
 
     def potential_curvature(self, lam: Any) -> Any:
-        """Return the second derivative of U by lam, to about half of the digits."""
+        """Return the second derivative of U with respect to lam, to about half of the digits."""
         h = self.mpf(10) ** (-(self.digits // 3))
         return (self.effective_potential_slope(lam + h) - self.effective_potential_slope(lam - h)) / (2 * h)
 

@@ -22,7 +22,7 @@ class Track(Protocol):
         """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return the derivative of U by lam."""
+        """Return the derivative of U with respect to lam."""
 
     def ds(self, lam: Any) -> Any:
         """Return ds/dlam."""
@@ -65,7 +65,7 @@ class FormulaTrack:
         return self.formulas.effective_potential(self.context, lam, self.values)
 
     def effective_potential_slope(self, lam: Any) -> Any:
-        """Return the derivative of U by lam."""
+        """Return the derivative of U with respect to lam."""
         return self.formulas.effective_potential_slope(self.context, lam, self.values)
 
     def ds(self, lam: Any) -> Any:

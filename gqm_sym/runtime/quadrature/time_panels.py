@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_sum
-from gqm_sym.runtime.compiled.buffers import longer, taller
+from gqm_sym.runtime.compiled.buffers import longer, with_rows
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, Integrand, cancellation_range, fill_rates
@@ -219,7 +219,7 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
                 longer(times, capacity + 1),
                 longer(lengths, capacity + 1),
             )
-            time_terms, length_terms = taller(time_terms, capacity), taller(length_terms, capacity)
+            time_terms, length_terms = with_rows(time_terms, capacity), with_rows(length_terms, capacity)
         length_size, length_tail, length_middle = antiderivative(values[1], half, c, length_terms[count])
         size, tail, level = antiderivative(values[0], half, c, time_terms[count])
         duration, length, difference = _panel_sums(values, half)
@@ -329,7 +329,7 @@ def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(VECTOR, MATRIX, VECTOR))
 def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
-    """Return the derivatives by phi of the panels' Legendre series at phase angles."""
+    """Return the derivatives with respect to phi of the panels' Legendre series at phase angles."""
     out, series = np.empty(phi.size), np.empty(terms.shape[1])
     for i in range(phi.size):
         k = panel_of(edges, phi[i])

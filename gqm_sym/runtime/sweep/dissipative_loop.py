@@ -45,7 +45,7 @@ QUESTIONS = {
 }
 
 
-class Asked(NamedTuple):
+class Question(NamedTuple):
     """The question for all bodies.
 
     Attributes
@@ -63,7 +63,7 @@ class Asked(NamedTuple):
     only_sign: int
 
 
-def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
+def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Question | None:
     """Return the question to compiled code for a quantity; None if motions must be solved, or no energy is lost."""
     loss = formulas.dissipation
     if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
@@ -71,12 +71,12 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     if quantity.startswith("normal_force") and not formulas.signed:
         return None  # the panels of a leg resolve its law of motion, which may not contain the contact force
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
-    return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
+    return Question(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 
 
 def answer_driven(
     formulas: "Formulas",
-    asked: Asked,
+    asked: Question,
     track: legs.Track,
     columns: list[Array],
     answers: Answers,

@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import LAM0, PARAMETERS, V0, element
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, find_orbit_time, rules_for
@@ -59,12 +59,12 @@ def fill_orbits(exact, columns, quantity, spans, answers, rules):  # type: ignor
         The rules for librations and for laps (`orbit_time.rules_for`).
     """
     (address, operations, parts, registers), work, p = exact
-    tape, work, p = (address, uncounted(operations), parts, registers), uncounted(work), uncounted(p)
+    tape, work, p = (address, borrowed(operations), parts, registers), borrowed(work), borrowed(p)
     (nodes, rule, table), (lap_nodes, _, _) = rules
-    rule, table = uncounted(rule), uncounted(table)
-    half, lap = (uncounted(nodes), rule, table), (uncounted(lap_nodes), rule, table)
-    columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
-    statuses = uncounted(answers.status)
+    rule, table = borrowed(rule), borrowed(table)
+    half, lap = (borrowed(nodes), rule, table), (borrowed(lap_nodes), rule, table)
+    columns, spans, values = borrowed(columns), borrowed(spans), borrowed(answers.values)
+    statuses = borrowed(answers.status)
     for k in range(statuses.size):
         if statuses[k] != SPAN_KNOWN:
             continue

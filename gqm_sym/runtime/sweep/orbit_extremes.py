@@ -17,7 +17,7 @@ GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
 
 # A grid that does not resolve the orbit is followed by one that is finer by this factor, up to so many grids of the
 # first size side by side.
-FINER, MAX_GRIDS = 4, 256
+REFINEMENT, MAX_GRIDS = 4, 256
 
 # A grid resolves a function if its mean over every second point is the same up to this share of its range, and up to
 # rounding. The mean of the contact force converges later than those of the coordinates and of ds, which vary where the
@@ -69,7 +69,7 @@ def sample_loads(fns, p, orbit, force, shares, n, out, frame):  # type: ignore[n
 
 
 @Inner
-def take_in(sums, at, value, weight, is_coarse):  # type: ignore[no-untyped-def]
+def accumulate(sums, at, value, weight, is_coarse):  # type: ignore[no-untyped-def]
     """Add the value of a function at a point of the grid to the function's data, which begin at the index ``at``."""
     sums[at + SUM] += weight * value
     if is_coarse:
@@ -133,9 +133,9 @@ def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[
         for i in range(min(grid, 1), GRID_POINTS):
             j = grid * GRID_INTERVALS + i
             weight, is_coarse = 0.5 if j in (0, count) else 1.0, i % 2 == 0
-            take_in(sums, 0, out[i], weight, is_coarse)
+            accumulate(sums, 0, out[i], weight, is_coarse)
             for k in range(COORDINATES if force else 0):
-                take_in(sums, (1 + k) * FUNCTIONS, frame[k * GRID_POINTS + i], weight, is_coarse)
+                accumulate(sums, (1 + k) * FUNCTIONS, frame[k * GRID_POINTS + i], weight, is_coarse)
             second = out[i] if j == 1 else second
             if j > 1 or (j == 1 and not orbit.circulates):
                 note_peak(peaks, sign, j - 1, out[i] if j == 1 else f0, f1, out[i])
@@ -189,7 +189,7 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
         find_peaks(fns, p, orbit, force, sign, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, force):
             break
-        grids *= FINER
+        grids *= REFINEMENT
         if grids > MAX_GRIDS:
             return np.nan
     least, largest = sums[LEAST], sums[LARGEST]

@@ -178,7 +178,7 @@ class Sweep(SweepArrays):
         raise AttributeError(f"Sweep has no attribute {name!r}{hint}", name=name, obj=self)
 
 
-def told(sweep: Sweep, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
+def with_arguments(sweep: Sweep, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
     """Return the same values with the quantity and the launches to which they belong."""
     out = Sweep(*sweep)
     out.quantity, out.gradient = quantity, sweep.gradient

@@ -12,7 +12,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import (
     AXIS,
     AXIS_STEP,
@@ -68,7 +68,7 @@ from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
-from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_slacks, find_passage, passage_of
+from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_half_v2_at_edges, find_passage, passage_of
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
@@ -128,7 +128,7 @@ class Buffers(NamedTuple):
 
     work: Any
     series: Any
-    slacks: Any
+    half_v2_at_edges: Any
 
 
 @Inner
@@ -215,15 +215,15 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: ignore[no-untyped-def]
+def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):  # type: ignore[no-untyped-def]
     """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
     if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-        return passage_extreme(curve, orbit, passage, slacks, force, sign)
+        return passage_extreme(curve, orbit, passage, half_v2_at_edges, force, sign)
     low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
     if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # the orbit computed without the table is more accurate than a part of a panel
-    return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
+    return travel_time(curve, orbit, passage, half_v2_at_edges, target if quantity == ARRIVAL_TIME else nan)
 
 
 @Inner
@@ -262,7 +262,7 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
     """Return a quantity of an orbit by the first method that is accurate: on the table, without it, or in parts; NaN if
     none is.
     """
-    value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks) if tabulated else nan
+    value = value_from_table(curve, orbit, passage, quantity, target, buffers.half_v2_at_edges) if tabulated else nan
     if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
         value = time_on_panel_of_both(curve, passage)
     by_formulas = orbit.leaves == 0 or passage.panels == 0
@@ -279,14 +279,14 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
 
     ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side and the last time as in `GivenCurve`.
     """
-    (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
+    (quantity, target, side, t_max), limit, half_v2_at_edges = asked, inf, buffers.half_v2_at_edges
     by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
     tabulated = not by_ends or side != 0
-    tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, slacks)
+    tabulated = tabulated and passage.panels > 0 and fill_half_v2_at_edges(curve, passage, half_v2_at_edges)
     if orbit.leaves != 0 and needs_period:
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 and tabulated else nan
+        place = liftoff_place(curve, orbit, passage, half_v2_at_edges, side) if side != 0 and tabulated else nan
         if side != 0 and not tabulated:  # a small swing keeps contact if the track pushes at the extreme force
             least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
             if orbit.leaves != 0 or not side * least > 0.0:
@@ -346,16 +346,16 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     panels, count = given.levels.size, given.factors.size
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(panels + 1))
     taken = np.empty(count)
-    p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
-    edges, lows = uncounted(given.table.edges), uncounted(given.table.edge_lows)
-    paths, parts = uncounted(given.table.paths), uncounted(given.table.parts)
+    p, joints, side, t_max = borrowed(given.parameters), borrowed(given.joints), given.side, given.t_max
+    edges, lows = borrowed(given.table.edges), borrowed(given.table.edge_lows)
+    paths, parts = borrowed(given.table.paths), borrowed(given.table.parts)
     table = CurveTable(edges, lows, paths, parts, given.table.potentials, given.table.is_exact)
-    rows, levels, factors = uncounted(given.rows), uncounted(given.levels), uncounted(given.factors)
+    rows, levels, factors = borrowed(given.rows), borrowed(given.levels), borrowed(given.factors)
     (address, operations, tape_parts, registers), work, exact_p = given.exact
-    tape = address, uncounted(operations), tape_parts, registers
-    exact = RecordedFormulas(tape, uncounted(work), uncounted(exact_p))
-    columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
-    statuses, routes = uncounted(answers.status), uncounted(answers.route)
+    tape = address, borrowed(operations), tape_parts, registers
+    exact = RecordedFormulas(tape, borrowed(work), borrowed(exact_p))
+    columns, spans, values = borrowed(columns), borrowed(spans), borrowed(answers.values)
+    statuses, routes = borrowed(answers.status), borrowed(answers.route)
     for k in range(statuses.size):
         known = statuses[k] == SPAN_KNOWN
         if statuses[k] != UNDECIDED and not known:

@@ -65,8 +65,8 @@ def fill_exactly(curve, lam0, places, count, v2, slopes):  # type: ignore[no-unt
     level, low, _ = energy_level(work, registers, (lam0, 0.0, curve.v0, 0.0), 0)
     for i in range(count):
         u = registers[2] + 1 + i
-        high, rest = add(level, low, -work[u], -work[u + LOW])
-        v2[i], slopes[i] = 2.0 * (high + rest), work[registers[4] + 1 + i]
+        high, high_low = add(level, low, -work[u], -work[u + LOW])
+        v2[i], slopes[i] = 2.0 * (high + high_low), work[registers[4] + 1 + i]
 
 
 @Inner
@@ -132,8 +132,8 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
         return 0.0 if begin == end else nan
     v2, cuts, places = grid_buffer(), place_buffer(), place_buffer()
     slowest, slopes = place_buffer(), place_buffer()
-    way = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
-    sample_loads(fns, p, way, False, WIDTH_SHARES, GRID_POINTS, v2, v2)
+    part_orbit = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
+    sample_loads(fns, p, part_orbit, False, WIDTH_SHARES, GRID_POINTS, v2, v2)
     # The ends are known with their rounding errors; the places in between are doubles.
     (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
     count, peak, at_peak, largest = 0, -1.0, 0, 0.0

@@ -121,7 +121,7 @@ def sweep(
                 work, least = partial(answer_driven, formulas, asked, track, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 last = inf if t_max is None else as_doubles(t_max, "t_max").item()
-                ask = Asked(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
+                ask = Question(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
             if asked is None and group.corners.size:
@@ -158,7 +158,7 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, con
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
-class Asked(NamedTuple):
+class Question(NamedTuple):
     """The question for all launches: the code of a quantity, and the side and the last time as in `GivenCurve`.
 
     ``lows`` are the differences of the run-time parameters from their doubles; they are 0 for arrays.
@@ -170,7 +170,7 @@ class Asked(NamedTuple):
     lows: Array
 
 
-def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, part: slice) -> None:
+def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answers, part: slice) -> None:
     """Fill the answers of a part of a group of launches by compiled loops, as far as these decide them."""
     columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
     mass = list(formulas.parameters).index("m")

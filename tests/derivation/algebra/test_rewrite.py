@@ -1,4 +1,4 @@
-"""Simplification: what is found, what is kept for the digits' sake, and what is left alone."""
+"""Simplification finds short forms, keeps forms that do not cancel, and leaves other expressions as they are."""
 
 import pytest
 import sympy as sp
@@ -23,7 +23,7 @@ def read(text: str) -> sp.Expr:
 
 
 def factored(text: str) -> sp.Expr:
-    """Write an expression as a product, its angles halved where that is needed."""
+    """Write an expression as a product, with its angles halved if that is necessary."""
     expression = read(text)
     algebra = Algebra([expression], t)
     found = algebra.fraction(expression)
@@ -35,7 +35,7 @@ def factored(text: str) -> sp.Expr:
 
 
 def signs(domain=(None, None), positive=(), may_be_positive=()) -> Signs:
-    """Make the signs on a domain of t."""
+    """Return the signs on a domain of t."""
     ends = tuple(None if end is None else read(end) for end in domain)
     return Signs(parameter=t, domain=ends, positive=positive, may_be_positive=may_be_positive)
 
@@ -57,7 +57,7 @@ def signs(domain=(None, None), positive=(), may_be_positive=()) -> Signs:
     ],
 )
 def test_identities_are_found_by_factoring(text, expected):
-    """Half angles, Pythagoras, common factors: all exact algebra."""
+    """Half angles, Pythagoras' theorem and common factors are found by exact algebra."""
     assert sp.expand(factored(text) - read(expected)) == 0
     assert sp.count_ops(factored(text)) <= sp.count_ops(read(expected)) + 1
 
@@ -67,12 +67,12 @@ def test_identities_are_found_by_factoring(text, expected):
     [("1 - cos(t)", "2*sin(t/2)**2"), ("cosh(t) - 1", "2*sinh(t/2)**2")],
 )
 def test_a_half_angle_keeps_the_digits(text, expected):
-    """The factored form is the one that does not cancel, not only an equal one."""
+    """The factored form is not only equal, but it does not cancel."""
     assert factored(text) == read(expected)
 
 
 def test_a_sum_without_minus_signs_is_preferred():
-    """1 + s² and 2 - c² are as long; the second may cancel."""
+    """1 + s² and 2 - c² are equally long, but the second may cancel."""
     algebra = Algebra([sp.sin(t)], t)
     polynomial = algebra.fraction(2 - sp.cos(t) ** 2).top
     assert spell(algebra, polynomial) == sp.sin(t) ** 2 + 1
@@ -103,7 +103,7 @@ def test_signs_on_a_domain(text, domain, sign):
 
 
 def test_parameters_are_taken_as_positive_only_where_allowed():
-    """A negative default forbids it; a sum of allowed ones is allowed."""
+    """A parameter with a negative default is not taken as positive; a sum of positive ones is positive."""
     some = signs(may_be_positive=("a",))
     some.assume(b)
     assert some.positive == ()
@@ -124,7 +124,7 @@ def test_poles_that_cancel_are_multiplied_out_and_nothing_else():
 
 
 def test_tidy_takes_common_factors_out():
-    """And leaves what is short already."""
+    """`tidy` takes out common factors, and leaves short expressions as they are."""
     assert tidy(a * sp.cos(t) - a * sp.cos(b)) == a * (sp.cos(t) - sp.cos(b))
     assert tidy(a * t**2) == a * t**2
 
@@ -135,7 +135,7 @@ FUNCTIONS = ("tan(t)", "tanh(t)", "asin(t)*acos(t)", "asinh(t)*atan(t)", "acosh(
 
 @pytest.mark.parametrize("text", [*POWERS, *FUNCTIONS, "exp(-t**2)"])
 def test_derivatives_are_right(text):
-    """Against SymPy's own, at a place where both are regular."""
+    """Derivatives agree with SymPy's at a place where both are regular."""
     expression = read(text)
     place = {a: sp.Rational(5, 3), t: sp.Rational(3, 2) if "acosh" in text else sp.Rational(3, 5)}
     ours = differentiate(expression, t).subs(place).evalf(40)
@@ -143,7 +143,7 @@ def test_derivatives_are_right(text):
 
 
 def test_the_derivative_of_a_power_has_no_quotient():
-    """It is p u^(p-1) u', not p u^p/u, which is 0/0 where u = 0."""
+    """The derivative of a power is p u^(p-1) u', not p u^p/u, which is 0/0 at u = 0."""
     assert differentiate(t**a, t) == a * t ** (a - 1)
     assert differentiate(sp.sin(t) ** a, t) == a * sp.sin(t) ** (a - 1) * sp.cos(t)
 
@@ -152,7 +152,7 @@ def test_long_products_do_not_explode():
     """The length of a second derivative grows little faster than the product's."""
     names = [sp.Symbol(f"c{k}", real=True) for k in range(100)]
     second = differentiate(differentiate(sp.Mul(*(t + name for name in names)), t), t)
-    # Written out flat it has 9900 terms of 98 factors.
+    # Multiplied out it has 9900 terms of 98 factors.
     assert sp.count_ops(second) < 40_000
 
 
@@ -165,7 +165,7 @@ def test_long_products_do_not_explode():
     ],
 )
 def test_what_is_too_large_is_left_as_it_is_and_says_so(text):
-    """No simplification beyond the budget: the definitions, and a note."""
+    """An expression beyond the budget is not simplified: the definitions are kept, and a note says so."""
     shape = geometry(Curve.parametric(x="t", z=text, parameter="t"), may_be_positive=())
     (note,) = shape.notes
     assert "unsimplified" in note
@@ -181,7 +181,7 @@ def test_the_budget_counts_and_does_not_wait():
 
 
 def test_a_hidden_point_is_refused():
-    """sin² + cos² depends on t only in its text."""
+    """sin² + cos² contains t, but does not depend on it; such a point is refused."""
     with pytest.raises(DeclarationError, match="point"):
         geometry(Curve.parametric(x="sin(t)**2 + cos(t)**2", z="a", parameter="t"), may_be_positive=())
 
@@ -199,13 +199,13 @@ LONG, OTHER = (sum(name**k for k in range(40)) for name in (a, b))
     ],
 )
 def test_each_limit_says_what_was_too_large(made_of, expression, message):
-    """Each is counted before anything large is computed."""
+    """Each limit is checked before anything large is computed, and its message says what was too large."""
     with pytest.raises(OverBudget, match=message):
         Algebra([made_of], t).fraction(expression)
 
 
 def test_a_double_angle_that_is_too_long_is_not_taken():
-    """Sixteen terms of degree 30 are some 180 in sine and cosine of twice the angle."""
+    """A double angle is not used if it is longer: sixteen terms of degree 30 are some 180 in its sine and cosine."""
     mixed = sum(a**k * sp.sin(t) ** (2 * k) * sp.cos(t) ** (30 - 2 * k) for k in range(16))
     algebra = Algebra([mixed], t)
     (pair,) = algebra.pairs
@@ -215,7 +215,7 @@ def test_a_double_angle_that_is_too_long_is_not_taken():
 
 
 def test_odd_and_even_functions_whoever_wrote_the_sign():
-    """SymPy puts minus signs in front of sines, unless it is told not to; an algebra knows it anyway."""
+    """Odd and even functions are recognised although SymPy puts minus signs in front of sines."""
     minus = sp.Mul(-1, t, evaluate=False)
     algebra = Algebra([sp.sin(t)], t)
     assert algebra.fraction(sp.sin(minus, evaluate=False)) == algebra.fraction(-sp.sin(t))
@@ -223,7 +223,7 @@ def test_odd_and_even_functions_whoever_wrote_the_sign():
 
 
 def test_angles_that_have_nothing_in_common_stay_apart():
-    """A product of functions of two angles is no function of one."""
+    """A product of functions of two unrelated angles is no function of one angle."""
     assert factored("sin(t)*sin(a)") == read("sin(t)*sin(a)")
     assert factored("(1 - cos(t))*(1 - cos(a))") == read("4*sin(a/2)**2*sin(t/2)**2")
 

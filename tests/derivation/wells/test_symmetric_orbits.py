@@ -1,4 +1,4 @@
-"""Orbits about an axis as integrals without sines: their times are those of the motion."""
+"""Integrals without sines for orbits about an axis give the times of the motion."""
 
 from collections.abc import Callable
 from functools import cache
@@ -29,14 +29,14 @@ ModuleOf = Callable[[str], ModuleType]
 
 
 def graph(z: str) -> gqm.Curve:
-    """A curve z(x)."""
+    """Return a curve z(x)."""
     return gqm.Curve.graph(z, parameter="x")
 
 
 PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
 ELLIPSE = gqm.Curve.parametric(x="2*cos(theta)", z="3*sin(theta)", parameter="theta")
 GRAVITY = gqm.Gravity()
-# Curves, forces, and how far both turning points are from the axis.
+# A row has the curve, the force, and the distance of both turning points from the axis.
 CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
     "pendulum": (PENDULUM, GRAVITY, "2.8"),
     "ellipse": (ELLIPSE, GRAVITY, "1.3"),
@@ -58,13 +58,13 @@ CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
 
 @cache
 def model_of(name: str) -> gqm.Model:
-    """The model of a case, derived once."""
+    """Return the model of a case, derived once."""
     curve, force, _ = CASES[name]
     return gqm.derive(curve, force)
 
 
 def functions(model: gqm.Model, *forms: sp.Expr | None, by: tuple[sp.Symbol, ...]) -> list[Callable[..., Any]]:
-    """Forms as functions of extended precision, with the defaults put in."""
+    """Return forms as functions of extended precision, with the defaults put in."""
     values = {sp.Symbol(name, real=True): sp.Rational(str(value)) for name, value in model.defaults}
     return [sp.lambdify(by, sp.sympify(form or 0).xreplace(values), "mpmath") for form in forms]
 
@@ -75,7 +75,7 @@ def integral(rate: Callable[[Any], Any]) -> mpf:
 
 
 def by_integral(model: gqm.Model, half: mpf) -> mpf:
-    """The half period by the integral over u."""
+    """Return the half period by the integral over u."""
     orbits = model.symmetric_orbits
     assert orbits is not None
     at_ends = dict(
@@ -94,7 +94,7 @@ def by_integral(model: gqm.Model, half: mpf) -> mpf:
 
 
 def by_heights(model: gqm.Model, half: mpf) -> mpf:
-    """The half period as the integral of ds/V, over an angle: digits that cancel are there in plenty."""
+    """Return the half period as the integral of ds/V over an angle, with plenty of digits for cancellation."""
     assert model.symmetry is not None
     potential, ds = functions(model, model.effective_potential, model.ds, by=(model.parameter,))
     axis = mpf(sp.N(model.symmetry.place, mp.dps))
@@ -118,7 +118,7 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
 
 AGM = ["pendulum", "Duffing"]
 TURNING_POINTS = [name for name in CASES if name != "root of a wave"]
-# Of these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
+# In these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
 NOT_GROWING = ["double well", "two waves"]
 
 
@@ -147,7 +147,7 @@ def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
 @pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
 @pytest.mark.parametrize("name", TURNING_POINTS)
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
-    """Launched anywhere in the well, with the V**2 it has there, an orbit has the well's width."""
+    """An orbit launched anywhere in the well, with the V**2 of that place, has the well's width."""
     model, half = model_of(name), CASES[name][-1]
     assert model.symmetric_orbits is not None
     assert model.symmetric_orbits.turning_point is not None
@@ -166,14 +166,12 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     "z", ["x**3", "exp(x)", "cos(x) + x**2", "cos(x) + cosh(x)", "cos(x) + cos(9*x)", "exp(-x**2)"]
 )
 def test_there_is_none(z: str) -> None:
-    """There is no such form for wells that are not even, for unlike functions, and for waves of very different
-    frequencies.
-    """
+    """Wells that are not even, unlike functions, and waves of very different frequencies have no such form."""
     assert gqm.derive(graph(z), gqm.Gravity()).symmetric_orbits is None
 
 
 def test_a_pendulum_has_the_elliptic_integral() -> None:
-    """After Landen's transformation, (1 + k1)**2/(1 - k1**2*sin(u)**2) with k1 = tan(half/2/2)**2."""
+    """After Landen's transformation the integrand is (1 + k1)**2/(1 - k1**2*sin(u)**2) with k1 = tan(half/2/2)**2."""
     orbits = gqm.derive(PENDULUM, gqm.Gravity()).symmetric_orbits
     assert orbits is not None
     length, g = sp.Symbol("L", real=True), sp.Symbol("g", real=True)
@@ -185,8 +183,8 @@ def test_a_pendulum_has_the_elliptic_integral() -> None:
     assert dict(orbits.invariants)[T] == (sp.sin(HALF / 4) / sp.cos(HALF / 4)) ** 2
 
 
-def test_names_of_parameters_that_are_ours(tmp_path: Path) -> None:
-    """Run-time parameters may have the names of what an orbit is described by."""
+def test_parameters_with_the_names_of_variables_of_an_orbit(tmp_path: Path) -> None:
+    """Run-time parameters may have the names of the variables of an orbit."""
     names = ["fall", "half", "halves", "top", "top_lack", "top_apart", "top_sine", "stretch", "scale"]
     curve = gqm.Curve.graph(f"-({'+'.join(names)})*cos(x)", parameter="x", parameters=dict.fromkeys(names, "1/8"))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="ours", folder=tmp_path)
@@ -197,7 +195,7 @@ def test_names_of_parameters_that_are_ours(tmp_path: Path) -> None:
         assert abs(value - float(truth)) <= 5 * np.spacing(value)
 
 
-# Orbits whose times were taken for settled when one change of the rule was small by accident, and neighbours.
+# The times of these orbits were taken for converged when one change of the rule was small by accident.
 @pytest.mark.parametrize(
     ("track", "z", "places"),
     [
@@ -206,7 +204,7 @@ def test_names_of_parameters_that_are_ours(tmp_path: Path) -> None:
     ],
 )
 def test_half_periods_have_settled(track: str, z: str, places: list[float], module_of: ModuleOf) -> None:
-    """Within some last places, wherever branch points of ds make the rule's error swing."""
+    """Half periods converge to some last places, although branch points of ds make the rule's error oscillate."""
     model = gqm.derive(graph(z), gqm.Gravity())
     swept = module_of(track).sweep("half_period", places).values
     for value, place in zip(swept, places, strict=True):
@@ -216,7 +214,9 @@ def test_half_periods_have_settled(track: str, z: str, places: list[float], modu
 
 
 def test_high_powers_of_a_square_are_not_evaluated() -> None:
-    """Of three times a rate, and of its square in ds: they cancel, and second differences of waves do not."""
+    """Three times a rate and its square in ds are not evaluated as such, because they cancel and second differences of
+    waves do not.
+    """
     curve = gqm.Curve.parametric(x="sin(2*t)", z="-cos(t) - cos(3*t)/2", parameter="t", period="2*pi")
     orbits = gqm.derive(curve, GRAVITY).symmetric_orbits
     assert orbits is not None

@@ -1,4 +1,4 @@
-"""Places of symmetry: that forms are even about them, and that slopes which are said to vanish only there do."""
+"""Forms are even about places of symmetry, and slopes that are said to vanish only there do."""
 
 import pytest
 import sympy as sp
@@ -7,7 +7,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 
 PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
-# Curves, a place of symmetry, the step to the next, and whether heights between them only rise or only fall.
+# A row has a curve, a place of symmetry, the step to the next, and whether heights between them are monotone.
 CASES = {
     "pendulum": (PENDULUM, -sp.pi / 2, sp.pi, True),
     "parabola": (gqm.Curve.graph("x**2", parameter="x"), 0, None, True),
@@ -24,7 +24,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_symmetry(name: str) -> None:
-    """The places are the textbook's, and numbers agree."""
+    """The places are those of textbooks, and numerical values agree."""
     curve, place, step, monotone = CASES[name]
     model = gqm.derive(curve, gqm.Gravity())
     found = model.symmetry

@@ -1,4 +1,4 @@
-"""Sums, products and reductions of two doubles against exact rational arithmetic."""
+"""Sums, products and reductions of two doubles agree with exact rational arithmetic."""
 
 import math
 from collections.abc import Iterable
@@ -12,16 +12,17 @@ from hypothesis import strategies as st
 from gqm_sym.runtime.arithmetic.doubledouble import add, minus, plus, reduce_many, two_product, two_sum
 
 U = Fraction(1, 2**53)
-# Proved for the accurate sum of two pairs: Joldes, Muller, Popescu, ACM TOMS 44 (2017), theorem 3.1.
+# The bound is proved for the accurate sum of two pairs: Joldes, Muller, Popescu, ACM TOMS 44 (2017), theorem 3.1.
 SUM_OF_PAIRS = 3 * U**2 / (1 - 4 * U)
-# What is left of a time by the period: the product of the count is right to 2**-106 of itself, and two rounded
-# additions follow, each within SUM_OF_PAIRS of numbers no larger than the time. In units of 2**-106 of the time.
+# The error of the remainder of a time by the period: the product with the count is right to 2**-106 of itself, and two
+# rounded additions follow, each within SUM_OF_PAIRS of numbers no larger than the time. The unit is 2**-106 of the
+# time.
 REDUCTION = 8
 
-# Neither overflow nor a product whose error falls below the least double.
+# In this range nothing overflows, and no error of a product falls below the smallest double.
 SIZES = st.floats(2.0**-200, 2.0**200)
 NUMBERS = st.one_of(st.just(0.0), SIZES, SIZES.map(lambda x: -x))
-# A low part in units of the high part's last place; at most half of one.
+# A low part is given in units of the high part's last place, and is at most half of one.
 SHARES = st.floats(-0.5, 0.5)
 PERIODS = st.floats(1e-3, 1e3)
 COUNTS = st.one_of(
@@ -33,24 +34,24 @@ COUNTS = st.one_of(
 
 
 def exact(parts: Iterable[float]) -> Fraction:
-    """The exact sum of doubles."""
+    """Return the exact sum of doubles."""
     return sum((Fraction(float(part)) for part in parts), Fraction(0))
 
 
 def pair(high: float, share: float) -> tuple[float, float]:
-    """Two doubles, the first of them the one nearest to their sum."""
+    """Draw two doubles, the first of which is the double nearest to their sum."""
     low = share * math.ulp(high)
     return (high, low) if high + low == high else (high, 0.0)
 
 
 def nearest_pair(value: Fraction) -> tuple[float, float]:
-    """A rational number as two doubles."""
+    """Return a rational number as two doubles."""
     high = float(value)
     return high, float(value - Fraction(high))
 
 
 def reduced(t: tuple[float, float], period: tuple[float, float]) -> tuple[int, Fraction]:
-    """Whole periods in a time, and exactly what the pair says that is left."""
+    """Return the whole periods in a time, and exactly the remainder that the pair gives."""
     count, rest, low = reduce_many(np.array([t[0]]), np.array([t[1]]), *period)
     assert count[0] == int(count[0])
     return int(count[0]), exact((rest[0], low[0]))
@@ -58,7 +59,7 @@ def reduced(t: tuple[float, float], period: tuple[float, float]) -> tuple[int, F
 
 @given(NUMBERS, NUMBERS)
 def test_a_sum_and_its_error_are_exact(a: float, b: float) -> None:
-    """The rounded sum is IEEE's own, and with its error it is the exact sum; in Python and compiled alike."""
+    """The rounded sum is IEEE's own, and together with its error it is the exact sum, in Python and compiled."""
     s, e = two_sum(a, b)
     assert s == a + b
     assert exact((s, e)) == exact((a, b))
@@ -67,7 +68,7 @@ def test_a_sum_and_its_error_are_exact(a: float, b: float) -> None:
 
 @given(NUMBERS, NUMBERS)
 def test_a_product_and_its_error_are_exact(a: float, b: float) -> None:
-    """The rounded product is IEEE's own, and with its error it is the exact product."""
+    """The rounded product is IEEE's own, and together with its error it is the exact product."""
     p, e = two_product(a, b)
     assert p == a * b
     assert exact((p, e)) == Fraction(a) * Fraction(b)
@@ -77,7 +78,7 @@ def test_a_product_and_its_error_are_exact(a: float, b: float) -> None:
 @example(1.0, 0.25, -1.0, 0.375)
 @example(1.0, -0.5, -(1.0 - 2.0**-53), 0.5)
 def test_pairs_add_to_the_proved_bound(a: float, a_share: float, b: float, b_share: float) -> None:
-    """The sum of two pairs keeps its relative accuracy however much cancels, and is zero only if it is."""
+    """The sum of two pairs keeps its relative accuracy however much cancels, and is zero only if the exact sum is."""
     first, second = pair(a, a_share), pair(b, b_share)
     truth = exact((*first, *second))
     assert abs(exact(add(*first, *second)) - truth) <= SUM_OF_PAIRS * abs(truth)
@@ -90,7 +91,9 @@ def test_pairs_add_to_the_proved_bound(a: float, a_share: float, b: float, b_sha
 def test_a_time_is_its_whole_periods_and_what_is_left(
     high: float, share: float, whole: int, part: float, t_share: float
 ) -> None:
-    """Count and rest give the time back; the rest is at least zero and less than a period, for negative times too."""
+    """Count and remainder add up to the time; the remainder is at least zero and less than a period, for negative times
+    too.
+    """
     period = pair(high, share)
     t = pair(float((whole + Fraction(part)) * exact(period)), t_share)
     count, rest = reduced(t, period)
@@ -104,9 +107,9 @@ def test_a_time_is_its_whole_periods_and_what_is_left(
 @example(0.1, 0.0, 3)
 @example(1.0, -0.5, 2**52 - 1)
 def test_at_a_whole_count_of_periods(high: float, share: float, whole: int) -> None:
-    """Exactly at a boundary the reduction ends, and the rest is zero or one period, to rounding of the pair.
+    """Exactly at a boundary the reduction ends, and the remainder is zero or one period, to rounding of the pair.
 
-    This once went to and fro for ever.
+    This once alternated for ever.
     """
     period = pair(high, share)
     t = nearest_pair(whole * exact(period))
@@ -118,7 +121,7 @@ def test_at_a_whole_count_of_periods(high: float, share: float, whole: int) -> N
 
 @given(PERIODS, st.integers(-(2**52), 2**52))
 def test_a_boundary_that_doubles_can_tell_is_kept(high: float, whole: int) -> None:
-    """Where the period and its multiple are exact, the count is exact and nothing at all is left."""
+    """If the period and its multiple are exact, the count is exact and the remainder is zero."""
     period = math.ldexp(math.floor(math.ldexp(math.frexp(high)[0], 20)), -20)
     t = nearest_pair(whole * Fraction(period))
     assert exact(t) == whole * Fraction(period)
@@ -127,7 +130,7 @@ def test_a_boundary_that_doubles_can_tell_is_kept(high: float, whole: int) -> No
 
 @given(PERIODS, st.integers(-(2**40), 2**40))
 def test_next_to_a_boundary_the_count_is_that_of_its_side(high: float, whole: int) -> None:
-    """A double past a multiple of the period counts that period, the double before it does not."""
+    """A double above a multiple of the period counts that period, and the double below it does not."""
     period = math.ldexp(math.floor(math.ldexp(math.frexp(high)[0], 12)), -12)
     boundary = whole * period
     assert Fraction(boundary) == whole * Fraction(period)
@@ -139,7 +142,7 @@ def test_next_to_a_boundary_the_count_is_that_of_its_side(high: float, whole: in
 
 @pytest.mark.parametrize(("t", "count"), [(0.0, 0), (-0.0, 0), (5e-324, 0), (1.0, 1), (-1.0, -1), (-0.25, -1)])
 def test_at_and_about_zero(t: float, count: int) -> None:
-    """Zero, signed or not, belongs to the first period; a time before it to the one before."""
+    """Zero of either sign belongs to the first period, and a time before it to the period before."""
     assert reduced((t, 0.0), (1.0, 0.0)) == (count, Fraction(t) - count)
 
 

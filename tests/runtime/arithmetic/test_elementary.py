@@ -1,4 +1,4 @@
-"""Elementary functions that vectorise, against mpmath with digits to spare."""
+"""Elementary functions that vectorise agree with mpmath with digits to spare."""
 
 import math
 import random
@@ -14,7 +14,7 @@ from gqm_sym.runtime.arithmetic import elementary
 # Worst measured on 5000 arguments of each kind: 0.75 (cosine), 0.62 (exp), 0.93 (sinh), 0.86 (cosh).
 ULPS = 1.0
 DIGITS = 60
-# Roundings of the argument that a sine of a very large one may stand for: worst measured 5.
+# The number of roundings of a very large argument that its sine may correspond to. Worst measured: 5.
 LARGE = 8
 # Below this the rounding of the last sum of the argument's low parts counts, which is 2**-106 of the argument.
 SMALL_SINE = 1e-12
@@ -22,7 +22,7 @@ COUNT = 500
 
 FUNCTIONS: dict[str, Callable[[mpf], mpf]] = {"sin": mp.sin, "cos": mp.cos}
 
-# Kinds of arguments, and what draws one.
+# Kinds of arguments, and strategies that draw them.
 KINDS: dict[str, Callable[[random.Random], float]] = {
     "kernel": lambda source: source.uniform(-0.8, 0.8),
     "turns": lambda source: source.uniform(-10, 10),
@@ -43,7 +43,7 @@ def arguments(name: str) -> Iterator[float]:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_error_is_below_one_last_place(name: str, kind: str) -> None:
-    """Everywhere up to 1e9, next to zeros too."""
+    """The error is below one last place everywhere up to 1e9, also next to zeros."""
     with mp.workdps(DIGITS):
         for x in arguments(kind):
             truth = FUNCTIONS[name](mpf(x))
@@ -53,7 +53,7 @@ def test_error_is_below_one_last_place(name: str, kind: str) -> None:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_no_rounding_of_a_sum_counts(name: str) -> None:
-    """Of a phase and a rate times a place in two doubles and an offset: the sine is that of the exact sum."""
+    """The sine of a phase and a rate times a place in two doubles and an offset is that of the exact sum."""
     source = random.Random(name)
     with mp.workdps(DIGITS):
         for _ in range(COUNT):
@@ -70,7 +70,7 @@ GROWING: dict[str, Callable[[mpf], mpf]] = {"exp": mp.exp, "sinh": mp.sinh, "cos
 @pytest.mark.parametrize("reach", [1e-9, 0.4, 1.0, 2.0, 20.0, 708.0])
 @pytest.mark.parametrize("name", GROWING)
 def test_growing_functions_too(name: str, reach: float) -> None:
-    """Up to where they overflow, and next to zero."""
+    """Growing functions are right up to where they overflow, and next to zero."""
     source = random.Random(name)
     with mp.workdps(DIGITS):
         for _ in range(COUNT):
@@ -82,7 +82,7 @@ def test_growing_functions_too(name: str, reach: float) -> None:
 
 @pytest.mark.parametrize("reach", [1e-300, 1e-9, 0.5, 1.0, 2.0, 3.0, 1e3, 1e20, 1e300])
 def test_arc_tangent(reach: float) -> None:
-    """Through all three forms."""
+    """The arc tangent is right in all three of its forms."""
     source = random.Random(reach)
     with mp.workdps(DIGITS):
         for _ in range(COUNT):
@@ -92,7 +92,7 @@ def test_arc_tangent(reach: float) -> None:
 
 
 def test_limits_of_the_arc_tangent() -> None:
-    """A quarter turn at infinity, signed zeros, and NaN."""
+    """The arc tangent is a quarter turn at infinity, and keeps signed zeros and NaN."""
     assert [elementary.atan(x) for x in (math.inf, -math.inf)] == [math.pi / 2, -math.pi / 2]
     assert [math.copysign(1.0, elementary.atan(x)) for x in (0.0, -0.0)] == [1.0, -1.0]
     assert math.isnan(elementary.atan(math.nan))
@@ -100,7 +100,9 @@ def test_limits_of_the_arc_tangent() -> None:
 
 @pytest.mark.parametrize("power", [-1022, -700, -2, -1, 0, 1, 53, 1022])
 def test_inverse_root(power: int) -> None:
-    """From the least normal numbers to the largest, through a whole period of its first guess."""
+    """The inverse root is right from the smallest normal numbers to the largest, over a whole period of its first
+    guess.
+    """
     source = random.Random(power)
     with mp.workdps(DIGITS):
         for x in (math.ldexp(source.uniform(1.0, 2.0), power + odd) for odd in (0, 1) for _ in range(COUNT)):
@@ -111,7 +113,7 @@ def test_inverse_root(power: int) -> None:
 @pytest.mark.parametrize("x", [0.0, -0.0, 710.4, -710.4, 709.782712893384, 750.0, -745.0, -750.0, math.inf, -math.inf])
 @pytest.mark.parametrize("name", GROWING)
 def test_limits_are_those_of_the_library(name: str, x: float) -> None:
-    """Overflow, underflow, signed zeros and infinities; NaN is NaN."""
+    """At overflow, underflow, signed zeros, infinities and NaN the results are those of the library."""
     with np.errstate(over="ignore"):
         expected = float(getattr(np, name)(x))
     actual = getattr(elementary, name)(x)
@@ -123,7 +125,9 @@ def test_limits_are_those_of_the_library(name: str, x: float) -> None:
 @pytest.mark.parametrize("x", [3e11, -7.7e13, 1.2e15, 8e15, -4.3e16, 1e17, 6e22, 1e300, -1.7e308])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_beyond_it_is_that_of_an_argument_nearby(name: str, x: float) -> None:
-    """A sine of x*(1 + eps), eps a few roundings: where such arguments span a turn, anything from -1 to 1."""
+    """Beyond the limit the result is the sine of x*(1 + eps), with eps a few roundings; if such arguments span a turn,
+    it is anything from -1 to 1.
+    """
     value = getattr(elementary, name)(x)
     assert -1.0 <= value <= 1.0
     with mp.workdps(400):
@@ -135,19 +139,19 @@ def test_beyond_it_is_that_of_an_argument_nearby(name: str, x: float) -> None:
 @pytest.mark.parametrize("x", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_what_is_not_a_finite_number_gives_nan(name: str, x: float) -> None:
-    """NaN and infinities, quietly."""
+    """NaN and infinities give NaN without a warning."""
     assert math.isnan(getattr(elementary, name)(x))
 
 
 def test_zero_keeps_its_sign() -> None:
-    """Signed zeros go through, as in the C library."""
+    """Signed zeros keep their signs, as in the C library."""
     assert math.copysign(1.0, elementary.sin(-0.0)) == -1.0
     assert math.copysign(1.0, elementary.sin(0.0)) == 1.0
     assert elementary.cos(0.0) == 1.0
 
 
 def test_a_loop_fills_vector_registers() -> None:
-    """LLVM makes the loop one over packed doubles: no branch and no call is left in it."""
+    """LLVM turns the loop into one over packed doubles, without branches and calls."""
     sin, cos = elementary.sin, elementary.cos
 
     @njit(error_model="numpy")
@@ -164,7 +168,7 @@ def test_a_loop_fills_vector_registers() -> None:
 
 @pytest.mark.parametrize("reach", [1e-300, 1e-9, 0.4, 1.0, 3.0, 45.0, 1e300])
 def test_what_is_lost_in_falling(reach: float) -> None:
-    """exp(x) - 1 for x <= 0, to the last place next to zero too."""
+    """exp(x) - 1 for x <= 0 is right to the last place, also next to zero."""
     source = random.Random(reach)
     with mp.workdps(DIGITS):
         for _ in range(COUNT):

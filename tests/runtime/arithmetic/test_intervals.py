@@ -1,4 +1,4 @@
-"""Intervals hold what they must, are tight where signs depend on it, and are never NaN."""
+"""Intervals contain what they must, are tight where signs depend on it, and are never NaN."""
 
 import math
 from collections.abc import Callable
@@ -15,10 +15,10 @@ from gqm_sym.runtime.arithmetic import intervals
 Interval = tuple[float, float]
 
 ALL = (-math.inf, math.inf)
-# Both ends: what the C library's functions are widened by, then rounding.
+# The widening of both ends: that for the C library's functions, and the rounding.
 WIDTH = 2 * (2.0**-50 + 2.0**-52)
 DIGITS = 40
-# Far enough for every overflow and underflow, while mpmath still answers at once.
+# This is large enough for every overflow and underflow, while mpmath is still fast.
 LARGEST = 1e9
 
 UNARY = {
@@ -51,7 +51,7 @@ def holds(interval: Interval, true: mpf) -> bool:
 
 
 def drawn(data: st.DataObject, low: float, high: float) -> tuple[Interval, float]:
-    """An interval and a number in it, often close to each other or to the ends of the domain."""
+    """Draw an interval and a number in it, often close to each other or to the ends of the domain."""
     narrow = st.floats(max(low, -10.0), min(high, 10.0))
     lo, hi = sorted(data.draw(st.tuples(*[narrow | st.floats(low, high)] * 2)))
     inside = st.just(lo) if lo == hi else st.floats(lo, hi) | st.sampled_from([lo, hi])
@@ -76,9 +76,9 @@ def test_function_of_a_number_is_tight(name: str, data: st.DataObject) -> None:
     _true, low, high = UNARY[name]
     x = data.draw(st.floats(max(low, -3.0), min(high, 3.0), allow_subnormal=False))
     lo, hi = getattr(intervals, f"i{name}")((x, x))
-    assume(name != "tan" or abs(abs(x) - math.pi / 2) >= 1e-12)  # else a pole lies too close
+    assume(name != "tan" or abs(abs(x) - math.pi / 2) >= 1e-12)  # otherwise a pole is too close
     if name in ("sin", "cos") and math.cos(2 * x) ** 2 > 1 - 1e-14:
-        assert hi - lo <= 1e-14  # a zero or an extremum lies too close
+        assert hi - lo <= 1e-14  # a zero or an extremum is too close
     else:
         assert hi - lo <= WIDTH * max(abs(lo), abs(hi)) + 1e-322
 
@@ -125,7 +125,7 @@ def test_real_powers_hold_every_value(data: st.DataObject, p: float) -> None:
 @given(a=st.tuples(*[st.floats(allow_nan=True)] * 2), b=st.tuples(*[st.floats(allow_nan=True)] * 2))
 def test_never_nan(a: Interval, b: Interval) -> None:
     """No bound is NaN for any input, even NaN and infinities."""
-    assume(not (a[0] > a[1] or b[0] > b[1]))  # NaN is let through
+    assume(not (a[0] > a[1] or b[0] > b[1]))  # NaN is accepted
     results = [getattr(intervals, f"i{name}")(a, b) for name in BINARY]
     results += [intervals.ipow(a, 2), intervals.ipow(a, 3), intervals.ipow(a, -1), intervals.ipow(a, -2)]
     results += [intervals.irpow(a, 0.3), intervals.irpow(a, -0.3)]
@@ -134,7 +134,7 @@ def test_never_nan(a: Interval, b: Interval) -> None:
         assert bounds[0] <= bounds[1]
 
 
-# An operation, its arguments, which end of the result is meant (None: both), and what it must be.
+# A row has an operation, its arguments, which end of the result is meant (None: both), and the expected value.
 EXACT = [
     (intervals.ipow, [(-2.0, 1.0), 2], 0, 0.0),
     (intervals.ipow, [(-2.0, 1.0), 4], 0, 0.0),
@@ -184,12 +184,12 @@ def test_signs_and_extrema_are_exact(
     ],
 )
 def test_gaps_in_the_domain_prove_nothing(operation: Callable[..., Interval], arguments: list[Any]) -> None:
-    """Partly outside the domain, or across a pole, anything is possible."""
+    """An interval partly outside the domain, or across a pole, gives bounds without information."""
     assert operation(*arguments) == ALL
 
 
 def test_pole_at_an_end_bounds_one_side() -> None:
-    """Towards a pole from one side the values go to one infinity."""
+    """At a pole at one end of an interval the values go to one infinity."""
     assert intervals.idiv((1.0, 2.0), (0.0, 4.0)) == (pytest.approx(0.25), math.inf)
     assert intervals.idiv((1.0, 2.0), (-4.0, 0.0)) == (-math.inf, pytest.approx(-0.25))
     assert intervals.ilog((0.0, 1.0)) == (-math.inf, 0.0)
@@ -204,7 +204,7 @@ def test_overflow_is_no_infinite_lower_bound() -> None:
 
 
 def test_rounded_constants_hold_what_they_stand_for() -> None:
-    """The float next to 1/10 and to pi hold these two."""
+    """The enclosures of constants rounded to floats contain 1/10 and pi."""
     lo, hi = intervals.ipoint(0.1)
     assert Fraction(lo) < Fraction(1, 10) < Fraction(hi)
     with mp.workdps(DIGITS):

@@ -1,4 +1,4 @@
-"""Charts: curves known by numbers only, through the whole chain, against the same curves with formulas."""
+"""Charts, which are curves known by numbers only, give the results of the same curves with formulas in all stages."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -25,14 +25,14 @@ RADIUS = 1.3
 
 @dataclass(frozen=True)
 class Ring:
-    """A circle's chart, from the lowest point counter-clockwise, in as many pieces as asked."""
+    """The chart of a circle, counter-clockwise from the lowest point, in a given number of pieces."""
 
     pieces: int = 9
     closed: bool = True
     shaped_by: tuple[int, ...] = (0,)
 
     def chart(self, p: tuple[float, ...]) -> Chart:
-        """The chart; its radius is the first run-time parameter."""
+        """Return the chart, with its radius as the first run-time parameter."""
         radius = p[0]
         edges = np.linspace(0.0, 2.0 * np.pi * radius, self.pieces + 1)
         s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
@@ -49,13 +49,13 @@ class Ring:
         )
 
     def is_exact(self, chart: Chart) -> bool:
-        """No: here the chart is all there is."""
+        """Return false, because only the chart is known."""
         return False
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.3, 700.0])
 def test_rows_are_off_by_no_more_than_they_may(radius: float) -> None:
-    """The changed charts of a circle are farther from it than the chart itself is, in each row."""
+    """In each row the changed charts of a circle are farther from it than the chart itself is."""
     chart = Ring().chart((radius,))
     s = np.linspace(0.0, 2.0 * np.pi * radius, 400, endpoint=False)
     angle = s.astype(np.longdouble) / np.longdouble(radius)
@@ -69,7 +69,7 @@ def test_rows_are_off_by_no_more_than_they_may(radius: float) -> None:
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
-    """A pendulum whose circle is known by its chart only."""
+    """Return a pendulum whose circle is known by its chart only."""
     s = sp.Symbol("s", real=True)
     curve = gqm.Curve(
         kind="ring", x=chart_x(s), z=chart_z(s), parameter=s, defaults=(("R", "13/10"),), definition="a circle"
@@ -82,18 +82,18 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
 
 @pytest.fixture(scope="module")
 def pendulum(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The same with formulas."""
+    """Return the same pendulum with formulas."""
     curve = gqm.Curve.parametric(x="R*sin(s/R)", z="-R*cos(s/R)", parameter="s", period="2*pi*R", positive=["R"])
     model = gqm.derive(curve, gqm.Gravity(), parameters={"R": "13/10"})
     return gqm.build(model, name="formulas", folder=tmp_path_factory.mktemp("formulas"))
 
 
 def test_rows() -> None:
-    """A chart's rows are the curve's, round and round."""
+    """A chart's rows are those of the curve, lap after lap."""
     chart = Ring().chart((RADIUS,))
     s = np.linspace(-20.0, 20.0, 501)
     x, z, alpha, kappa = chart.points(s)
-    # A place reduced by the period is known to an ulp of itself.
+    # A place reduced by the period has an error of an ulp of the original place.
     assert np.abs(x - RADIUS * np.sin(s / RADIUS)).max() <= 20.0 * ULP
     assert np.abs(z + RADIUS * np.cos(s / RADIUS)).max() <= 20.0 * ULP
     assert np.abs(alpha - s / RADIUS).max() <= 20.0 * ULP
@@ -111,7 +111,7 @@ def test_rows_in_any_order(ring_: Ring) -> None:
 
 @pytest.mark.parametrize("size", [3.0, 0.3, 1e-2, 1e-5, 1e-8])
 def test_divided_differences(size: float) -> None:
-    """Differences within a piece, over a joint, over many pieces and over the closing point subtract nothing."""
+    """Differences within a piece, over a joint, over many pieces and over the closing point do not cancel."""
     chart = Ring().chart((RADIUS,))
     rng = np.random.default_rng(7)
     period = mpf(chart.period)
@@ -127,14 +127,16 @@ def test_divided_differences(size: float) -> None:
             first = (height(mpf(b)) - height(mpf(a))) / (mpf(b) - mpf(a))
             second = ((height(mpf(c)) - height(mpf(b))) / (mpf(c) - mpf(b)) - first) / (mpf(c) - mpf(a))
             assert abs(evaluate.divdiff1_chart_z(chart.block, a, b, b - a) - first) <= 16 * ULP
-            # Next to a joint a second difference is a derivative of the fit: 16 nodes cost it three digits.
+            # Next to a joint a second difference is a derivative of the fit, which with 16 nodes loses three digits.
             assert abs(evaluate.divdiff2_chart_z(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
             swapped = evaluate.divdiff2_chart_z(chart.block, c, a, b, a - c, b - a)
             assert abs(swapped - second) <= 4e-13
 
 
 def test_differences_far_from_the_origin() -> None:
-    """Where coordinates are a million times the distances, these keep their digits: constants are two doubles."""
+    """If coordinates are a million times the distances, differences keep their digits, because constants are two
+    doubles.
+    """
     edges = np.linspace(0.0, 2.0 * np.pi * RADIUS, 10)
     s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
 
@@ -161,7 +163,7 @@ def test_differences_far_from_the_origin() -> None:
 
 
 def test_two_places_at_one_joint() -> None:
-    """Beside a joint by rounding only, a first difference is the slope there."""
+    """If two places differ from a joint by rounding only, the first difference is the slope there."""
     chart = Ring().chart((RADIUS,))
     for edge in map(float, chart.edges[1:-1]):
         beside = np.nextafter(edge, 0.0)
@@ -171,16 +173,17 @@ def test_two_places_at_one_joint() -> None:
 
 @pytest.mark.parametrize("size", [1e-3, 1e-6, 1e-9])
 def test_differences_of_the_angle_across_joints(size: float) -> None:
-    """Where the curvature jumps, and where it does not: what the fits of neighbours differ by is rounding, and no jump.
+    """The angle's differences are right across jumps of curvature; the difference of two neighbouring fits is taken for
+    rounding, not for a jump.
 
-    A line becomes a clothoid, that winds up, unwinds and becomes a line again, which becomes an arc.
+    A line becomes a clothoid, which winds up, unwinds and becomes a line again, which becomes an arc.
     """
     edges = np.array([0.0, 0.4, 1.1, 1.9, 2.2, 3.0, 4.6, 5.25, 7.5, 8.3, 9.0, 9.9, 10.5])
     s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
     jump = 9.0
 
     def angle(s: Fraction) -> Fraction:
-        """The integral of the curvature."""
+        """Return the integral of the curvature."""
         winding = sum(times * max(s - Fraction(at), Fraction(0)) ** 2 for times, at in ((1, 3.0), (-2, 5.25), (1, 7.5)))
         return Fraction(0.3) * winding / 2 + Fraction(0.7) * max(s - Fraction(jump), Fraction(0))
 
@@ -198,8 +201,8 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
             u, v, w = map(Fraction, (a, b, c))
             truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
             found = evaluate.divdiff2_chart_alpha(chart.block, a, b, c, b - a, c - b)
-            # It is a derivative of the fit, which costs short pieces five digits; and the distances from the joint
-            # count, which are known to an ulp of the place.
+            # The tangent is a derivative of the fit, which costs short pieces five digits; distances from the joint
+            # count too, with errors of an ulp of the place.
             assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size
 
 
@@ -218,13 +221,13 @@ def test_bounds_enclose() -> None:
 
 
 def test_nearest_point() -> None:
-    """The foot of the perpendicular, and the distance."""
+    """The nearest point is the foot of the perpendicular, and its distance is right."""
     s, distance = Ring().chart((RADIUS,)).nearest(0.5, -0.9)
     assert abs(s - RADIUS * np.arctan2(0.5, 0.9)) <= 4 * ULP
     assert abs(distance - (RADIUS - np.hypot(0.5, 0.9))) <= 4 * ULP
     flat = np.zeros((2, NODES.size))
     line = assemble([0.0, 1.0, 2.0], PieceData([[0.0, 0.0], [1.0, 0.0]], flat, flat))
-    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
+    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end, the end is the nearest point
         assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
 
 
@@ -254,7 +257,7 @@ def test_motion_as_with_formulas(ring: ModuleType, pendulum: ModuleType, launch:
 
 
 def test_small_swings(ring: ModuleType, pendulum: ModuleType) -> None:
-    """Small against a piece, V**2 hangs on the curvature of the fit, which has three digits less."""
+    """On swings small against a piece, V**2 depends on the curvature of the fit, which has three digits less."""
     assert abs(ring.solve(lam0=1e-6).period - pendulum.solve(lam0=1e-6).period) <= 1e-12
 
 
@@ -267,7 +270,9 @@ def test_pass1(ring: ModuleType, pendulum: ModuleType) -> None:
 
 
 def test_launch_by_point(ring: ModuleType) -> None:
-    """A point of the curve says where; one that is off it is refused with the nearest one."""
+    """A launch by a point of the curve is at its place; a point off the curve is refused, and the message gives the
+    nearest one.
+    """
     s = 0.7
     point = (RADIUS * np.sin(s / RADIUS), -RADIUS * np.cos(s / RADIUS))
     assert abs(ring.solve(point=point).half_period - ring.solve(lam0=s).half_period) <= 4 * ULP
@@ -280,7 +285,7 @@ def test_launch_by_point(ring: ModuleType) -> None:
 
 
 def test_equilibria(ring: ModuleType) -> None:
-    """At rest on top or at the bottom it rests; the period has no more digits than doubles."""
+    """A body at rest on top or at the bottom stays; the period has no more digits than doubles."""
     assert ring.solve(lam0=0.0).kind == "rest"
     assert ring.solve(lam0=np.pi * RADIUS).kind == "rest"
     with pytest.raises(SolutionError, match="a chart in doubles"):

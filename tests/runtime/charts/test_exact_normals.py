@@ -1,4 +1,4 @@
-"""Charted curves in extended precision, against closed forms and quadrature in the curves' own parameters."""
+"""Charted curves in extended precision agree with closed forms and with quadrature in the curves' own parameters."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +17,8 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# A position of its scale; a period in its last place; how much error_bound may say too much.
+# The tolerances: a position relative to its scale; a period in its last place; the largest ratio of error_bound to the
+# error.
 POSITION = 8e-15
 PERIOD_ULPS = 0.5
 USEFUL = 100
@@ -27,7 +28,7 @@ G = "9.81"
 
 
 def exactly(text: str) -> mpf:
-    """A number as the package reads it."""
+    """Return a number as the package reads it."""
     return read_number(text, where="text").at(mp)
 
 
@@ -40,19 +41,19 @@ def agrees(text: str, truth: mpf) -> bool:
 
 @pytest.fixture(scope="module")
 def ring(generated_folder: Path) -> ModuleType:
-    """A pendulum's circle as x**2 + z**2 = R**2, arc length from its lowest point."""
+    """Return a pendulum's circle as x**2 + z**2 = R**2, with arc length from its lowest point."""
     curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1}, tangent=-1)
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_ring", folder=generated_folder)
 
 
 def pendulum_period(angle: mpf, speed: mpf) -> mpf:
-    """Period, or time of a round, of a pendulum of length 1 by Legendre's integral."""
+    """Return the period, or the time of a round, of a pendulum of length 1 by Legendre's integral."""
     g = mpf(G)
     k2 = (speed**2 + 4 * g * mp.sin(angle / 2) ** 2) / (4 * g)
     return 4 * mp.ellipk(k2) / mp.sqrt(g) if k2 < 1 else 2 * mp.ellipk(1 / k2) / mp.sqrt(g * k2)
 
 
-# Beside the separatrix, where a period takes many panels, to fewer digits.
+# Beside the separatrix, where a period takes many panels, fewer digits are tested.
 SWINGS = [
     ({"lam0": "6/5"}, "libration", DIGITS),
     ({"lam0": 0, "v0": "3"}, "libration", DIGITS),
@@ -68,7 +69,7 @@ SWINGS = [
 
 @pytest.mark.parametrize(("launch", "kind", "digits"), SWINGS, ids=lambda value: str(value))
 def test_pendulum(ring: ModuleType, launch: dict[str, Any], kind: str, digits: int) -> None:
-    """Kind and period to many digits, to the edges of what tells a swing from a round."""
+    """Kind and period are right to many digits, up to the limits between swings and rounds."""
     motion = ring.solve(**launch)
     assert motion.kind == kind
     with mp.workdps(DIGITS + 20):
@@ -78,7 +79,9 @@ def test_pendulum(ring: ModuleType, launch: dict[str, Any], kind: str, digits: i
 
 
 def test_what_does_not_swing(ring: ModuleType) -> None:
-    """Decided for the numbers given: rest on top and below, and the separatrix between swings and rounds."""
+    """Rest on top and at the bottom, and the separatrix between swings and rounds, are decided for the given
+    numbers.
+    """
     assert ring.solve(lam0="pi").kind == ring.solve(lam0=0).kind == "rest"
     assert ring.solve(lam0=float(np.pi)).kind == "libration"
     assert ring.solve(lam0=0, v0="2*sqrt(9.81)").kind == "asymptotic"
@@ -91,7 +94,7 @@ def test_a_hundred_digits(ring: ModuleType) -> None:
 
 
 def test_late(ring: ModuleType) -> None:
-    """A billion seconds on: positions of the closed form, within an honest and useful bound."""
+    """After a billion seconds, positions are those of the closed form within a right and useful bound."""
     motion = ring.solve(lam0="6/5", R="7/5")
     with mp.workdps(DIGITS):
         frequency = mp.sqrt(mpf(G) / mpf("1.4"))
@@ -106,7 +109,7 @@ def test_late(ring: ModuleType) -> None:
 
 @pytest.mark.parametrize("lam0", ["0", "1/2", "-2"])
 def test_towards_the_top(ring: ModuleType, lam0: str) -> None:
-    """On the separatrix tan((angle + pi)/4) grows as exp(omega*t); the bound holds there too."""
+    """On the separatrix tan((angle + pi)/4) grows as exp(omega*t), and the bound holds there too."""
     motion = ring.solve(lam0=lam0, v0=f"2*sqrt(9.81)*cos(({lam0})/2)")
     assert motion.kind == "asymptotic"
     with mp.workdps(DIGITS):
@@ -121,14 +124,14 @@ def test_towards_the_top(ring: ModuleType, lam0: str) -> None:
 
 
 def test_launch_by_point_and_by_length(ring: ModuleType) -> None:
-    """The same place however it is given, to every digit."""
+    """A launch by point and one by length at the same place agree to every digit."""
     by_length = ring.solve(lam0="pi/3")
     by_point = ring.solve(point=("sqrt(3)/2", "-1/2"))
     assert by_length.period_to(DIGITS) == by_point.period_to(DIGITS)
 
 
 def test_start_point_off_the_curve(ring: ModuleType, generated_folder: Path) -> None:
-    """A start with few digits means the foot of its perpendicular: lengths count from there."""
+    """A start point with few digits means the foot of its perpendicular, from which lengths count."""
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=("0.6000001", "-0.8"))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_ring_beside", folder=generated_folder)
     with mp.workdps(DIGITS + 20):
@@ -137,7 +140,9 @@ def test_start_point_off_the_curve(ring: ModuleType, generated_folder: Path) -> 
 
 
 def test_beside_a_singular_point(generated_folder: Path) -> None:
-    """The strophoid's loop is traced to its node; a swing on it (of the corpus) that stays away has all digits."""
+    """The strophoid's loop is traced to its node; a swing on it (of the corpus) that stays away from the node has all
+    digits.
+    """
     start = ("-3*sqrt(3)/10", "-9/10")
     curve = gqm.Curve.implicit("x**2*(a - z) - z**2*(a + z)", start=start, tangent=-1, parameters={"a": "9/5"})
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_strophoid", folder=generated_folder)
@@ -146,7 +151,7 @@ def test_beside_a_singular_point(generated_folder: Path) -> None:
 
 
 def test_another_force(generated_folder: Path) -> None:
-    """A bead on a turning hoop: V**2 changes with x as well."""
+    """On a rotating hoop V**2 changes with x as well."""
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
     force = gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")
     module = gqm.build(gqm.derive(curve, force), name="exact_hoop", folder=generated_folder)
@@ -155,7 +160,7 @@ def test_another_force(generated_folder: Path) -> None:
         g, rate = mpf(G), mpf(9) / 4
 
         def quarter(phi: mpf) -> mpf:
-            # sin(angle/2) = k sin(phi): V**2 = (cos(angle) - cos(1)) (2 g - rate (cos(angle) + cos(1))).
+            # With sin(angle/2) = k sin(phi), V**2 = (cos(angle) - cos(1)) (2 g - rate (cos(angle) + cos(1))).
             k = mp.sin(mpf("0.5"))
             angle = 2 * mp.asin(k * mp.sin(phi))
             return 2 / (mp.cos(angle / 2) * mp.sqrt(2 * (2 * g - rate * (mp.cos(angle) + mp.cos(1)))))
@@ -171,14 +176,16 @@ VALLEY = [("-3", "4"), ("0", "0"), ("2", "0"), ("7", "12")]
 
 @pytest.fixture(scope="module")
 def valley(generated_folder: Path) -> ModuleType:
-    """Down a slope of 4:3, over a level, up a slope of 12:5."""
+    """Return a track down a slope of 4:3, over a level, and up a slope of 12:5."""
     curve = gqm.Curve.sampled(VALLEY, kind="linear")
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_valley", folder=generated_folder)
 
 
 @pytest.mark.parametrize("lam0", ["0", "1/3", "2.7"])
 def test_planes(valley: ModuleType, lam0: str) -> None:
-    """Even acceleration on slopes, none on the level: the period to 50 digits, late places."""
+    """With constant acceleration on slopes and none on the level, the period is right to 50 digits, and so are late
+    places.
+    """
     motion = valley.solve(lam0=lam0)
     with mp.workdps(DIGITS + 20):
         left, g = 5 - exactly(lam0), mpf(G)
@@ -203,7 +210,7 @@ def test_planes(valley: ModuleType, lam0: str) -> None:
 
 
 def swing_time(rate: Callable[[mpf], mpf], low: mpf, high: mpf, cuts: list[mpf]) -> mpf:
-    """The integral of what has the root of the distance from both ends beneath it."""
+    """Return an integral over a function with the root of the distances from both ends in its denominator."""
     middle = (low + high) / 2
 
     def half(end: mpf, way: int) -> mpf:
@@ -216,7 +223,7 @@ def swing_time(rate: Callable[[mpf], mpf], low: mpf, high: mpf, cuts: list[mpf])
 
 @pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 def test_spline(generated_folder: Path) -> None:
-    """The period is that of the spline with just the coefficients that interpolate in doubles."""
+    """The period is that of the spline with exactly the coefficients that interpolate in doubles."""
     points = np.array([(-3.0, 2.0), (-2.0, 0.5), (-0.5, -0.25), (1.0, 0.125), (2.0, 1.0), (3.5, 3.0), (4.0, 5.0)])
     curve = gqm.Curve.sampled(points)
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_spline", folder=generated_folder)
@@ -227,7 +234,7 @@ def test_spline(generated_folder: Path) -> None:
     spline = make_interp_spline(knots, points, k=5)
     motion = module.solve(lam0=0.25)
     with mp.workdps(40):
-        # Each polynomial between breaks through six places of de Boor's algorithm in extended precision.
+        # Each polynomial between breaks is found from six places by de Boor's algorithm in extended precision.
         breaks = np.unique(spline.t)
 
         def at(place: mpf, derivative: int) -> tuple[mpf, mpf]:
@@ -270,7 +277,9 @@ def _spline_place(at: Callable[[mpf, int], tuple[mpf, mpf]], length: mpf, breaks
 
 
 def test_rail(generated_folder: Path) -> None:
-    """A half-pipe: quarters of a pendulum's swing, and a level between; the ends of its pieces are irrational."""
+    """A half-pipe has quarters of a pendulum's swing and a level between them; the ends of its pieces are
+    irrational.
+    """
     pieces = [gqm.arc(radius="R", angle="pi/2"), gqm.line(length="sqrt(2)"), gqm.arc(radius="R", angle="pi/2")]
     curve = gqm.Curve.piecewise(pieces, start=(0, "R"), heading="-pi/2", parameters={"R": "3/2"})
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_half_pipe", folder=generated_folder)
@@ -285,7 +294,7 @@ def test_rail(generated_folder: Path) -> None:
 
 
 def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
-    """Down half a parabola, up a clothoid: each side by its own quadrature."""
+    """On half a parabola down and a clothoid up, the time on each side agrees with a separate quadrature."""
     bowl = gqm.Curve.parametric(x="u", z="a*u**2", parameter="u", domain=("-2", "0"), parameters={"a": "1/2"})
     pieces = [bowl, gqm.clothoid(length="4", kappa_start="1", kappa_end="1/10")]
     curve = gqm.Curve.piecewise(pieces)
@@ -296,7 +305,7 @@ def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
         by_gauss = partial(mp.quad, method="gauss-legendre")
 
         def fall(w: mpf) -> mpf:
-            """Down the parabola, from w**2 behind the launch: V**2 = g*(1 - u**2)."""
+            """Return the integrand of the time down the parabola at u = 1 - w**2, where V**2 = g*(1 - u**2)."""
             return 2 * mp.sqrt((1 + (1 - w * w) ** 2) / (g * (2 - w * w)))
 
         def height(low: mpf, high: mpf) -> mpf:
@@ -310,7 +319,9 @@ def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
 
 
 def test_launch_by_a_length_over_many_pieces(generated_folder: Path) -> None:
-    """Far along a parabola: the length is (u sqrt(1 + u**2) + asinh(u))/2, the swing's time a quadrature."""
+    """Far along a parabola the length is (u sqrt(1 + u**2) + asinh(u))/2, and the swing's time agrees with a
+    quadrature.
+    """
     bowl = gqm.Curve.parametric(x="u", z="a*u**2", parameter="u", domain=("-2", "2"), parameters={"a": "1/2"})
     module = gqm.build(
         gqm.derive(gqm.Curve.piecewise([bowl]), gqm.Gravity()), name="exact_bowl", folder=generated_folder

@@ -1,4 +1,4 @@
-"""Rails put together from pieces: against Fresnel integrals, closed forms and an integration in time."""
+"""Rails put together from pieces agree with Fresnel integrals, closed forms and an integration in time."""
 
 import math
 from pathlib import Path
@@ -19,7 +19,7 @@ G = 9.81
 
 
 def standard_truth(segments: list[tuple[mpf, mpf, mpf]], s: mpf, x: mpf, z: mpf, angle: mpf) -> tuple[mpf, ...]:
-    """x, z, angle and curvature along lengths with end curvatures, by quadrature in 30 digits."""
+    """Return x, z, angle and curvature along lengths with given end curvatures, by quadrature in 30 digits."""
     for length, first, last in segments:
         part = min(length, s)
         bent = (last - first) / (2 * length)
@@ -32,7 +32,9 @@ def standard_truth(segments: list[tuple[mpf, mpf, mpf]], s: mpf, x: mpf, z: mpf,
 
 
 def test_standard_pieces(tmp_path: Path) -> None:
-    """Lines, arcs both ways and clothoids through zero curvature, placed end to start: every row to rounding."""
+    """Every row is right to rounding for lines, arcs in both directions and clothoids through zero curvature in
+    sequence.
+    """
     module = built(
         tmp_path,
         "standard",
@@ -70,7 +72,7 @@ def test_standard_pieces(tmp_path: Path) -> None:
 
 
 def test_a_ring_is_a_circle(tmp_path: Path) -> None:
-    """An arc all the way round, closed: the pendulum's half period, and the loop time of a fast round."""
+    """A closed arc all the way round has the pendulum's half period, and the loop time of a fast round."""
     module = built(tmp_path, "ring", [gqm.arc(radius="R", angle="2*pi")], closed=True, parameters={"R": 2})
     chart = chart_of(module)
     assert chart.period == chart.high
@@ -85,7 +87,7 @@ def test_a_ring_is_a_circle(tmp_path: Path) -> None:
 
 
 def test_a_curve_among_pieces(tmp_path: Path) -> None:
-    """A parabola with a line before it and an arc behind: in arc length, to rounding, with its own place."""
+    """A parabola between a line and an arc is right to rounding, in arc length and with its own place."""
     pieces = [
         gqm.line(length="sqrt(5)"),
         gqm.Curve.graph("a*x**2", domain=(-1, 1), parameters={"a": 1}),
@@ -103,7 +105,7 @@ def test_a_curve_among_pieces(tmp_path: Path) -> None:
             row = chart.points([float(s)])[:, 0]
             assert abs(row[0] - x) <= 4 * ULP
             assert abs(row[1] - x * x) <= 8 * ULP
-            # A place is known to an ulp, over which the angle turns by up to twice that.
+            # A place has an error of an ulp, over which the angle turns by up to twice that.
             assert abs(row[2] - mp.atan(2 * mpf(float(x)))) <= 4 * ULP + 2 * ULP * s
             if abs(x) < 1.0:  # curvature jumps at the joints
                 assert abs(row[3] - 2 / (1 + 4 * mpf(float(x)) ** 2) ** mpf(1.5)) <= 16 * ULP + 4 * ULP * s
@@ -115,7 +117,9 @@ def test_a_curve_among_pieces(tmp_path: Path) -> None:
 
 
 def test_a_curve_comes_first(tmp_path: Path) -> None:
-    """It says where the rail starts; a parametric and a polar curve are pieces too, whole turns aside."""
+    """A first piece with formulas determines where the rail starts; parametric and polar curves may be pieces too, up
+    to whole turns.
+    """
     pieces = [
         gqm.Curve.parametric(x="2*sin(u)", z="-2*cos(u)", parameter="u", domain=("-pi/2", "5*pi/2")),
         gqm.Curve.polar("2", parameter="theta", domain=(0, "pi/2")),
@@ -130,10 +134,12 @@ def test_a_curve_comes_first(tmp_path: Path) -> None:
 
 
 def test_a_stadium(tmp_path: Path) -> None:
-    """Two lines and two half circles, closed and upright: the time of a round, plane by plane and by quadrature."""
+    """On two lines and two half circles, closed and upright, the time of a round agrees with constant acceleration and
+    quadrature.
+    """
     pieces = [gqm.line(length=3), gqm.arc(radius=1, angle="pi")] * 2
     module = built(tmp_path, "stadium", pieces, closed=True)
-    joints = [0.0, 3.0, 3.0 + math.pi, 6.0 + math.pi]  # at the start too the curvature jumps
+    joints = [0.0, 3.0, 3.0 + math.pi, 6.0 + math.pi]  # the curvature jumps at the start too
     chart = chart_of(module)
     assert chart.breaks == pytest.approx(joints, abs=8 * ULP)
     one, two = chart.points([0.5, 0.5 + chart.high])[2]
@@ -147,18 +153,18 @@ def test_a_stadium(tmp_path: Path) -> None:
     assert abs(motion.period - around) <= 8 * ULP * around
 
 
-# Of the loop: lengths of the lines and of the clothoids, and the radius.
+# The loop has these lengths of lines and clothoids, and this radius.
 LINE, EASE, RADIUS = 2.0, 2.0, 1.5
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The rail of a loop."""
+    """Return the rail of a loop."""
     return built(tmp_path_factory.mktemp("loop"), "loop", LOOP, parameters={"a": 2, "c": 2, "R": "3/2"})
 
 
 def bend_at(s: float) -> float:
-    """Curvature along the loop, as it was declared."""
+    """Return the curvature along the loop, as it was declared."""
     around = RADIUS * 2.0 * math.pi - EASE
     if s < LINE:
         return 0.0
@@ -172,7 +178,7 @@ def bend_at(s: float) -> float:
 
 
 def integrated(speed: float) -> Any:
-    """The motion along the loop as an initial value problem: x, z, angle, s and V, piece by piece."""
+    """Integrate the motion along the loop as an initial value problem: x, z, angle, s and V, piece by piece."""
     ends = np.cumsum([LINE, EASE, RADIUS * 2.0 * math.pi - EASE, EASE, LINE])
     state, t, runs = np.array([0.0, 0.0, 0.0, 0.0, speed]), 0.0, []
     for end in ends:
@@ -195,7 +201,7 @@ def integrated(speed: float) -> Any:
 
 
 def test_force_along_a_loop(loop: ModuleType) -> None:
-    """Time, place, speed and N along it as an integration in time has them; N is least at the top."""
+    """Time, place, speed and N along the loop agree with an integration in time; N is smallest at the top."""
     motion = loop.solve(lam0=0.0, v0=9.3)
     runs = integrated(9.3)
     assert abs(motion.legs[-1].t_end - runs[-1].t[-1]) <= 1e-11
@@ -217,9 +223,9 @@ def test_force_along_a_loop(loop: ModuleType) -> None:
 
 
 def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
-    """Below it a unilateral rail loses the body at the top; where it does, N vanishes as the integration has it."""
+    """A slower body leaves a unilateral rail at the top, where N vanishes according to the integration."""
     with mp.workdps(30):
-        # Height of the top by the Fresnel integrals of the clothoid.
+        # The height of the top follows from the Fresnel integrals of the clothoid.
         size, ease, radius = mp.sqrt(2 * mpf(EASE) * RADIUS), mpf(EASE), mpf(RADIUS)
         turned = ease / (2 * radius)
         rise = size * mp.quad(lambda w: mp.sin(w * w), [0, ease / size])

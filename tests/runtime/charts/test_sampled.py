@@ -1,4 +1,4 @@
-"""Tracks given by points: splines and stitched planes against the curves the points were taken from."""
+"""Tracks given by points, as splines and stitched planes, agree with the curves from which the points were taken."""
 
 import math
 from collections.abc import Iterable
@@ -19,33 +19,33 @@ from gqm_sym.runtime.charts.sampled import Sampled
 
 ULP = 2.0**-52
 G = 9.81
-# Semi-axes of the ellipse that points are taken from.
+# The semi-axes of the ellipse from which points are taken.
 A, B = 2.0, 1.0
 
 
 def ellipse(count: int, phase: float = 0.1) -> np.ndarray:
-    """Points of an ellipse, counter-clockwise."""
+    """Return points of an ellipse, counter-clockwise."""
     theta = phase + 2.0 * np.pi * np.arange(count) / count
     return np.stack([A * np.cos(theta), B * np.sin(theta)], axis=1)
 
 
 def text(points: Iterable[Iterable[float]]) -> str:
-    """Points as a module holds them."""
+    """Return points as a module stores them."""
     return "\n".join(" ".join(repr(float(value)) for value in row) for row in points)
 
 
 def charted(points: np.ndarray, kind: str = "spline", *, closed: bool = False) -> Chart:
-    """The chart of a track."""
+    """Return the chart of a track."""
     return Sampled(text(points), kind, closed).chart(())
 
 
 def built(folder: Path, name: str, points: Iterable[Iterable[float]], **options: object) -> ModuleType:
-    """A module for motion under gravity along a track."""
+    """Return a module for motion under gravity along a track."""
     return gqm.build(gqm.derive(gqm.Curve.sampled(points, **options), gqm.Gravity()), name=name, folder=folder)
 
 
 def test_a_spline_goes_through_its_points() -> None:
-    """At the edges of its pieces are the points, in order; edges, angle, coordinates and curvature belong together."""
+    """The edges of a spline's pieces are the points, in order; angle, coordinates and curvature at the edges agree."""
     points = np.stack([np.linspace(0.0, 6.0, 25), np.sin(np.linspace(0.0, 6.0, 25)) + 5.0], axis=1)
     chart = charted(points)
     found = chart.points(chart.edges)[:2].T
@@ -60,7 +60,7 @@ def test_a_spline_goes_through_its_points() -> None:
 
 
 def test_a_spline_converges_to_the_curve() -> None:
-    """The length at order six, curvature at order four."""
+    """The length converges at order six, and the curvature at order four."""
     with mp.workdps(30):
         length = 4 * A * ellipe(1 - mpf(B) ** 2 / A**2)
     errors = []
@@ -77,7 +77,7 @@ def test_a_spline_converges_to_the_curve() -> None:
 
 
 def test_a_motion_on_a_spline_converges(tmp_path: Path) -> None:
-    """Half period and contact force come to those of the curve at the spline's orders."""
+    """Half period and contact force converge to those of the curve at the spline's orders."""
     curve = gqm.Curve.parametric(x=f"{A}*cos(u)", z=f"{B}*sin(u)", parameter="u", period="2*pi")
     smooth = gqm.build(gqm.derive(curve, gqm.Gravity()), name="smooth", folder=tmp_path).solve(lam0=-0.3)
     start = (A * math.cos(-0.3), B * math.sin(-0.3))
@@ -91,7 +91,7 @@ def test_a_motion_on_a_spline_converges(tmp_path: Path) -> None:
         rate = np.hypot(A * sine, B * cosine)
         force = -G * A * sine / rate + 2.0 * G * (start[1] - found.z) * A * B / rate**3
         errors.append((abs(motion.half_period - smooth.half_period), np.abs(found.normal_force - force).max()))
-        # The jumps of its fifth derivative cost the motion on the spline itself nothing.
+        # The jumps of its fifth derivative do not affect the motion on the spline itself.
         assert motion.error_bound(motion.half_period) <= 1e-13
     errors_of_period, errors_of_force = np.array(errors).T
     assert np.all(errors_of_period[1:] < errors_of_period[:-1] / 2.0**4.5)
@@ -115,7 +115,9 @@ VALLEY = [(-3.0, 4.0), (0.0, 0.0), (2.0, 0.0), (7.0, 12.0)]
 
 @pytest.mark.parametrize(("lam0", "direction"), [(0.0, 1), (2.5, -1)])
 def test_stitched_planes(tmp_path: Path, lam0: float, direction: int) -> None:
-    """Down a slope of 4:3, over a level, up a slope of 12:5: eq. (1), plane by plane; over corners V is kept."""
+    """Down a slope of 4:3, over a level and up a slope of 12:5, eq. (1) holds plane by plane, and V is kept at
+    corners.
+    """
     motion = built(tmp_path, "valley", VALLEY, kind="linear").solve(lam0=lam0, direction=direction)
     height = 4.0 * (1.0 - lam0 / 5.0)
     fast = math.sqrt(2.0 * G * height)
@@ -154,7 +156,9 @@ def test_planes_from_end_to_end(tmp_path: Path) -> None:
 
 
 def test_refined_planes_converge(tmp_path: Path) -> None:
-    """Planes through points of a circle: the half period of the pendulum, at order 1.5 where it turns at points."""
+    """Planes through points of a circle have the half period of the pendulum, at order 1.5 if the body turns at
+    points.
+    """
     with mp.workdps(30):
         half = float(2 * ellipk(mp.sin(mpf("0.5")) ** 2) / mp.sqrt(mpf("9.81")))
     errors = []
@@ -168,7 +172,7 @@ def test_refined_planes_converge(tmp_path: Path) -> None:
 
 
 def test_closed_planes(tmp_path: Path) -> None:
-    """Round a triangle: the first point is a corner too, and the time of a round is the planes'."""
+    """On a triangle the first point is a corner too, and the time of a round is that of its planes."""
     points = [(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)]
     module = built(tmp_path, "triangle", points, kind="linear", closed=True)
     chart = module.CHART.chart(())
@@ -183,7 +187,7 @@ def test_closed_planes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("start", "corners"), [((), [2.0, 4.0, 6.0]), (((0.0, -1.0),), [1.0, 3.0, 5.0, 7.0])])
 def test_a_square_turns_once(start: tuple[tuple[float, float], ...], corners: list[float]) -> None:
-    """At its corners, the first point one or on a side; after each lap its angle is 2 pi larger."""
+    """A closed square turns by 2 pi in each lap, whether its first point is a corner or lies on a side."""
     ring = [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]
     chart = charted(np.array([*start, *ring]), "linear", closed=True)
     assert chart.corners[chart.corners > 0.0].tolist() == corners
@@ -192,8 +196,8 @@ def test_a_square_turns_once(start: tuple[tuple[float, float], ...], corners: li
     assert two - one == pytest.approx(2 * np.pi, rel=4 * ULP)
 
 
-def test_closing_is_seen() -> None:
-    """A first point repeated at the end closes the track, unless it is said not to."""
+def test_a_repeated_point_closes_the_track() -> None:
+    """A first point repeated at the end closes the track, unless the track is declared open."""
     points = ellipse(40)
     ring = np.concatenate([points, points[:1]])
     for given, options, closed, rows in (
@@ -208,7 +212,7 @@ def test_closing_is_seen() -> None:
 
 
 def test_text_travels_as_it_is(tmp_path: Path) -> None:
-    """Decimal text is kept to the letter, in the declaration and in the module; other numbers by their doubles."""
+    """Decimal text is kept unchanged in the declaration and in the module, and other numbers by their doubles."""
     rows = [("0.10", "1"), ("+2.50000000000000000001", "1e-3"), (3, Fraction(1, 3))]
     curve = gqm.Curve.sampled(rows, kind="linear")
     kept = "0.10 1\n+2.50000000000000000001 1e-3\n3 0.333333333333333314829616256247390992939472198486328125"
@@ -265,7 +269,7 @@ YAML = "name: track\ncurve: {{points: {points}}}\nkernel: {{gravity: {{}}}}\n"
 
 
 def spec(folder: Path, points: str, data: bytes | str | None, file: str = "track.csv") -> gqm.Curve:
-    """The curve of a YAML file with a file of points beside it."""
+    """Return the curve of a YAML file with a file of points beside it."""
     if data is not None:
         (folder / file).write_bytes(data if isinstance(data, bytes) else data.encode())
     (folder / "track.yaml").write_text(YAML.format(points=points))
@@ -281,12 +285,12 @@ ROWS = "\n".join(f"{x},{z}" for x, z in TEXTS)
     "data", [ROWS, f"x,z\n{ROWS}\n", f"\ufeffX; Z\r\n{ROWS}\n\n".replace(",", " ; "), ROWS.replace(",", "\t")]
 )
 def test_points_of_a_file(tmp_path: Path, data: str) -> None:
-    """A header may be there; columns are separated by commas, semicolons or blanks."""
+    """A file of points may have a header; columns are separated by commas, semicolons or blanks."""
     assert spec(tmp_path, "track.csv", data).definition == gqm.Curve.sampled(TEXTS).definition
 
 
 def test_options_of_a_file(tmp_path: Path) -> None:
-    """The kind and whether it closes, and a folder inside."""
+    """The kind, whether the track closes, and a file in a subfolder are read from the YAML file."""
     (tmp_path / "data").mkdir()
     track = spec(tmp_path, "{file: data/a.csv, kind: linear, closed: true}", ROWS, "data/a.csv").definition
     assert track == gqm.Curve.sampled(TEXTS, kind="linear", closed=True).definition
@@ -325,13 +329,13 @@ def test_bad_files_are_refused(tmp_path: Path, points: str, data: bytes | str | 
 
 
 def test_long_files_are_read(tmp_path: Path) -> None:
-    """A file of points has limits of its own: reading it takes longer than a YAML file may."""
+    """A file of points has its own limits, because reading it takes longer than a YAML file may."""
     rows = "\n".join(f"{x},{x % 2}" for x in range(120_000))
     assert spec(tmp_path, "{file: track.csv, kind: linear}", rows).definition.points.count("\n") == 119_999
 
 
 def test_links_and_pipes_are_refused(tmp_path: Path) -> None:
-    """A link out of the folder, and a pipe that would never end."""
+    """A link out of the folder and a pipe without end are refused."""
     import os
 
     folder = tmp_path / "here"

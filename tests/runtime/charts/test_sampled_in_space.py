@@ -1,4 +1,4 @@
-"""Tracks through points in space: against curves with formulas, planar tracks, and their own splines in mpmath."""
+"""Tracks through points in space agree with curves with formulas, planar tracks, and their own splines in mpmath."""
 
 from pathlib import Path
 
@@ -20,26 +20,26 @@ START = -1.2
 
 
 def knot(count: int) -> np.ndarray:
-    """Points of the closed curve whose formulas are above, beginning at ``START``."""
+    """Return points of the closed curve whose formulas are above, beginning at ``START``."""
     u = START + 2.0 * np.pi * np.arange(count) / count
     radius = 2.0 + 0.5 * np.cos(3.0 * u)
     return np.stack([radius * np.cos(u), radius * np.sin(u), 0.5 * np.sin(3.0 * u) + np.sin(u)], axis=1)
 
 
 def module(points: object, force: gqm.Kernel | None = None, **options: object) -> object:
-    """A module for motion along a track, under gravity and another force."""
+    """Return a module for motion along a track, under gravity and another force."""
     law = gqm.Gravity() if force is None else gqm.Gravity() + force
     return transient(gqm.derive(gqm.Curve.sampled(points, **options), law))
 
 
 @pytest.fixture(scope="module")
 def smooth() -> object:
-    """The curve of the formulas, under gravity."""
+    """Return the curve of the formulas, under gravity."""
     return transient(gqm.derive(gqm.Curve.space(**KNOT, parameter="u"), gqm.Gravity()))
 
 
 def test_points_converge_to_their_curve(smooth: object) -> None:
-    """The period with the sixth order, and states with it; laps too."""
+    """The period and the states converge at the sixth order, also of laps."""
     true, errors = smooth.solve(START), []
     for count in (100, 200, 400):
         motion = module(knot(count), closed=True).solve(0.0)
@@ -49,7 +49,7 @@ def test_points_converge_to_their_curve(smooth: object) -> None:
     assert errors[2] <= errors[1] / 50
     states = motion.state(0.7), true.state(0.7)
     for names, allowed in ((("x", "y", "z", "v"), 1e-10), (("normal_x", "normal_y", "normal_z"), 2e-6)):
-        for name in names:  # what is left is the distance of the spline, and of its curvature, from the curve
+        for name in names:  # the remaining difference is that of the spline, and of its curvature, from the curve
             found, wanted = (getattr(state, name) for state in states)
             assert found == pytest.approx(wanted, abs=allowed), name
     track = module(knot(400), closed=True)
@@ -76,7 +76,9 @@ def test_losses_along_points_in_space() -> None:
 
 @pytest.mark.parametrize(("cosine", "sine"), [(1.0, 0.0), (0.6, 0.8)])
 def test_points_in_a_vertical_plane(cosine: float, sine: float) -> None:
-    """They give the planar answers: times to roundings of the coordinates, and the contact force as a vector."""
+    """Points in a vertical plane give the planar answers: times to the rounding of coordinates, and the contact force
+    as a vector.
+    """
     flat = module(VALLEY)
     turned = module(np.stack([cosine * VALLEY[:, 0], sine * VALLEY[:, 0], VALLEY[:, 1]], axis=1))
     for place in (2.7, 3.0):
@@ -93,7 +95,7 @@ def test_points_in_a_vertical_plane(cosine: float, sine: float) -> None:
 
 
 def test_a_straight_track() -> None:
-    """On a slope W = 2 g s sin(slope), and the contact force is that of the slope."""
+    """On a slope W is 2 g s sin(slope), and the contact force is that of the slope."""
     points = np.outer(np.arange(8.0), (3.0, 4.0, -12.0))
     state = module(points).solve(0.0).state(2.0)
     fall = 9.81 * 12 / 13
@@ -108,7 +110,7 @@ def test_the_time_along_the_spline_itself() -> None:
     u = np.linspace(-2.0, 2.0, 97)
     points = np.stack([2.0 * np.cos(u), np.sin(2.0 * u), u * u], axis=1)
     chart = Sampled("\n".join(" ".join(map(repr, row)) for row in points.tolist()), in_space=True).chart(())
-    # The arc lengths of the points are their knots, and of so many points to rounding.
+    # The arc lengths of the points are their knots, which for so many points are right to rounding.
     knots = np.array([_arc_length_at(chart, point) for point in points])
     spline = make_interp_spline(knots, points, k=5)
     nodes, weights = np.polynomial.legendre.leggauss(16)
@@ -118,7 +120,7 @@ def test_the_time_along_the_spline_itself() -> None:
             low, high = mpf(knots[k]), mpf(knots[k + 1])
             for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
                 share = (1 + mpf(node)) / 2
-                # Next to a turning point the place is a square, so that the rate is smooth.
+                # Next to a turning point the place is a square, which makes the rate smooth.
                 place, gain = low + (high - low) * share, high - low
                 if k == 24:
                     place, gain = low + (high - low) * share**2, 2 * share * (high - low)
@@ -132,13 +134,13 @@ def test_the_time_along_the_spline_itself() -> None:
 
 
 def _arc_length_at(chart: object, point: np.ndarray) -> float:
-    """The edge of a chart that is at a point."""
+    """Return the edge of a chart that is at a point."""
     rows = chart.coordinates(chart.edges).T
     return float(chart.edges[np.abs(rows - point).max(axis=1).argmin()])
 
 
 def _de_boor(spline: object, k: int, place: mpf) -> tuple[list[mpf], list[mpf]]:
-    """A quintic spline and its derivative between its points k and k+1."""
+    """Return a quintic spline and its derivative between its points k and k+1."""
     t, c, degree = spline.t, spline.c, 5
     j = int(np.clip(np.searchsorted(t, t[degree] + 0.0, side="right") - 1, degree, None))
     while j < len(t) - degree - 2 and mpf(float(t[j + 1])) <= place:
@@ -180,7 +182,7 @@ def test_bad_points_are_refused(points: object, options: dict[str, object], mess
 
 
 def test_a_table_with_a_column_y(tmp_path: Path) -> None:
-    """It is a track in space, as the rows are, in a module too; a launch is by arc length."""
+    """A table with a column y is a track in space, in a module too, and a launch is by arc length."""
     table = dict(zip("xyz", np.array(LINE).T.tolist(), strict=True))
     curve = gqm.Curve.sampled(table)
     assert curve.in_space

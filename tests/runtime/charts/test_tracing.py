@@ -1,4 +1,4 @@
-"""The tracer of implicit curves: against closed forms, elliptic integrals and the corpus of famous curves."""
+"""The tracer of implicit curves agrees with closed forms, elliptic integrals and the corpus of famous curves."""
 
 import json
 import math
@@ -12,14 +12,16 @@ from naive import error, ulps
 from paths import DATA
 from traced import ROUNDING, hold, trace
 
-# Of the largest curvature: as for every sample of the corpus.
+# The tolerance relative to the largest curvature, as for every sample of the corpus.
 SAMPLE = 1e-13
 PERIOD_ULPS = 2.0
 
 
 @pytest.mark.parametrize("tangent", [1, -1])
 def test_circle(tangent: int) -> None:
-    """Round either way: the period to an ulp, alpha and kappa with the sign of the way."""
+    """In both directions round a circle the period is right to an ulp, and alpha and kappa have the sign of the
+    direction.
+    """
     chart = trace("x**2 + z**2 - 4", (2.0, 0.0), tangent=tangent)
     assert ulps(chart.period, 4 * mp.pi) <= 1.0
     assert chart.high - chart.low == chart.period
@@ -36,19 +38,19 @@ def test_circle(tangent: int) -> None:
 
 
 def test_ellipse() -> None:
-    """Arc length is an elliptic integral of the eccentric angle."""
+    """The arc length of an ellipse is an elliptic integral of the eccentric angle."""
     with mp.workdps(40):
         chart = trace("x**2/9 + z**2 - 1", (3.0, 0.0))
         assert ulps(chart.period, 4 * 3 * mp.ellipe(mpf(8) / 9)) <= PERIOD_ULPS
         angles = [2 * mp.pi * k / 29 for k in range(30)]
-        # ds = sqrt(9 - 8 cos(t)**2) dt: from the end of the long axis on.
+        # From the end of the long axis on, ds = sqrt(9 - 8 cos(t)**2) dt.
         quarter = mp.ellipe(mpf(8) / 9)
         places = [3 * (quarter - mp.ellipe(mp.pi / 2 - t, mpf(8) / 9)) for t in angles]
         sizes = [mp.sqrt(9 * mp.sin(t) ** 2 + mp.cos(t) ** 2) for t in angles]
 
         def truth(k: int) -> tuple[Any, ...]:
             t = angles[k]
-            # The place is rounded to a double: what is there is that far along.
+            # The place is rounded to a double, and the curve is sampled there.
             off = mpf(float(places[k])) - places[k]
             along, across = -3 * mp.sin(t) / sizes[k], mp.cos(t) / sizes[k]
             kappa = 3 / sizes[k] ** 3
@@ -58,7 +60,9 @@ def test_ellipse() -> None:
 
 
 def test_superellipse() -> None:
-    """x**4 + z**4 = 1, flat at four points: the period by quadrature, the flat points at its quarters."""
+    """x**4 + z**4 = 1 is flat at four points: the period agrees with quadrature, and the flat points lie at its
+    quarters.
+    """
     chart = trace("x**4 + z**4 - 1", (1.0, 0.0))
     with mp.workdps(30):
         quarter = 2 * mp.quad(
@@ -69,12 +73,12 @@ def test_superellipse() -> None:
     rows = chart.points(float(quarter) * np.arange(4))
     flat = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0], np.pi / 2 * np.arange(1, 5), np.zeros(4)])
     assert np.abs(rows - flat).max() <= 4e-15
-    # Two or three times as many would be resolved as well, at twice the time.
+    # Two or three times as many pieces would resolve it as well, in twice the time.
     assert chart.edges.size <= 60
 
 
 def test_lemniscate_ends_at_its_node() -> None:
-    """(x**2 + z**2)**2 = 2(x**2 - z**2): from the vertex to the node is K(1/2), both ways."""
+    """On (x**2 + z**2)**2 = 2(x**2 - z**2), the length from the vertex to the node is K(1/2) in both directions."""
     chart = trace("(x**2 + z**2)**2 - 2*(x**2 - z**2)", (math.sqrt(2.0), 0.0))
     assert chart.ends == ("singular-point", "singular-point")
     assert chart.period == 0.0
@@ -86,7 +90,7 @@ def test_lemniscate_ends_at_its_node() -> None:
 
 
 def test_node_away_from_the_origin() -> None:
-    """There F is a difference of large terms, and its gradient near the node has half of the digits."""
+    """At a node away from the origin F is a difference of large terms, and its gradient has half of the digits."""
     moved = "((x - 1)**2 + (z - 2)**2)**2 - 2*((x - 1)**2 - (z - 2)**2)"
     chart = trace(moved, (1.0 + math.sqrt(2.0), 2.0))
     assert chart.ends == ("singular-point", "singular-point")
@@ -95,7 +99,7 @@ def test_node_away_from_the_origin() -> None:
 
 
 def test_cusp() -> None:
-    """x**3 = z**2 from (1, 1): (13 sqrt(13) - 8)/27 to the cusp, where curvature is infinite."""
+    """On x**3 = z**2 from (1, 1) the length to the cusp, where curvature is infinite, is (13 sqrt(13) - 8)/27."""
     chart = trace("x**3 - z**2", (1.0, 1.0), domain=(None, 5.0))
     assert chart.ends == ("singular-point", "domain-end")
     with mp.workdps(30):
@@ -103,7 +107,7 @@ def test_cusp() -> None:
         assert error(chart.low, -whole) <= ROUNDING
         assert np.abs(chart.points([chart.low])[:2]).max() <= ROUNDING
         places = [-1.43, -1.3, -0.7, 0.0, 1.1, 4.9]
-        # s = (4 + 9x)**(3/2)/27, from the cusp.
+        # The arc length from the cusp is s = (4 + 9x)**(3/2)/27.
         abscissae = [((27 * (mpf(s) + whole) + 8) ** (mpf(2) / 3) - 4) / 9 for s in places]
 
         def truth(k: int) -> tuple[Any, ...]:
@@ -115,7 +119,9 @@ def test_cusp() -> None:
 
 
 def test_curves_that_touch() -> None:
-    """At a double point without a crossing the tangent is the same on both sides, and yet F does not tell the way."""
+    """At a double point without a crossing both branches have the same tangent, and F does not determine which to
+    follow.
+    """
     chart = trace("z**2 - x**4", (1.0, 1.0), domain=(-1.0, 4.0))
     assert chart.ends == ("domain-end", "singular-point")
     parabola = mp.asinh(2) / 4 + mp.sqrt(5) / 2
@@ -124,7 +130,7 @@ def test_curves_that_touch() -> None:
 
 
 def test_narrow_waist() -> None:
-    """A curve that nearly crosses itself goes on, and closes."""
+    """A curve that nearly crosses itself is followed through, and closes."""
     chart = trace("(x**2 + z**2)**2 - 2*(x**2 - z**2) - 1e-6", (math.sqrt(2.0), 0.0))
     assert chart.period > 0.0
     assert error(chart.points([0.5 * chart.period])[0, 0], -chart.points([0.0])[0, 0]) <= 4 * ROUNDING
@@ -134,7 +140,7 @@ PARABOLA_PLACES = [-2.0, -1.0, -1e-3, 0.0, 1e-9, 0.25, 1.5, 3.0]
 
 
 def test_parabola() -> None:
-    """Of z = x**2 the stretch within its domain, to the ends that were given."""
+    """The parabola z = x**2 is followed within its domain, to the given ends."""
     chart = trace("z - x**2", (0.0, 0.0), tangent=-1, domain=(-2.0, 3.0))
     assert (chart.low, chart.high, chart.period) == (-2.0, 3.0, 0.0)
     assert chart.ends == ("domain-end", "domain-end")
@@ -152,7 +158,9 @@ def test_parabola() -> None:
 
 
 def test_open_curve_is_followed_far() -> None:
-    """Without a domain: many times its own size, both ways, still on the curve."""
+    """Without a domain an open curve is followed for many times its own size, in both directions, and stays on the
+    curve.
+    """
     chart = trace("z - x**2", (0.0, 0.0), tangent=-1)
     assert chart.ends == ("domain-end", "domain-end")
     assert chart.low < -1e6
@@ -167,7 +175,7 @@ def test_open_curve_is_followed_far() -> None:
 
 
 def test_line() -> None:
-    """A straight line has no length of its own, and no noise in its curvature."""
+    """A straight line has no length scale of its own, and no noise in its curvature."""
     chart = trace("x + z - 1", (1.0, 0.0), domain=(-4.0, 1e6))
     rows = chart.points([-4.0, 0.0, 1e6])
     assert np.abs(rows[0] - (1.0 - np.array([-4.0, 0.0, 1e6]) * math.sqrt(0.5))).max() <= ROUNDING * 1e6
@@ -181,7 +189,7 @@ def _corpus() -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("entry", _corpus(), ids=lambda entry: entry["name"])
 def test_corpus(entry: dict[str, Any]) -> None:
-    """Period, places and curvature at all samples."""
+    """Period, places and curvature are right at all samples of the corpus."""
     chart = trace(
         entry["F"],
         (float(entry["start"][0]), float(entry["start"][1])),

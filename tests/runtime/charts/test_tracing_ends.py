@@ -1,4 +1,4 @@
-"""Where the tracer begins, ends and breaks: starts, domains, corners, and how far it goes."""
+"""The tracer begins, ends and breaks at the right places: at starts, domains and corners, and at its limits."""
 
 import math
 
@@ -46,7 +46,7 @@ def test_near_start_is_moved_onto_the_curve() -> None:
     ids=["off the curve", "no curve", "node", "square", "nan"],
 )
 def test_bad_start(text: str, start: tuple[float, float], message: str) -> None:
-    """Refused, with how far it is off and where the curve is."""
+    """A bad start point is refused, and the message says how far off it is and where the curve is."""
     with pytest.raises(LaunchError, match=message):
         trace(text, start)
 
@@ -58,7 +58,7 @@ def test_domain_without_the_start() -> None:
 
 
 def test_corners() -> None:
-    """|x| + |z| = 1: four corners, each to rounding; and the perimeter."""
+    """|x| + |z| = 1 has four corners, each right to rounding, and the right perimeter."""
     chart = other(SQUARE, (0.3, 0.7))
     side = math.sqrt(2.0)
     first = 0.3 * side

@@ -1,4 +1,4 @@
-"""How often Python calls into compiled code: each crossing costs about a microsecond, and more with every array."""
+"""Python calls compiled code rarely, because each call costs about a microsecond, and more with every array."""
 
 import sys
 from collections.abc import Callable
@@ -15,7 +15,7 @@ ModuleOf = Callable[[str], ModuleType]
 
 
 def crossings(work: Callable[[], Any]) -> int:
-    """Calls of entry points during some work."""
+    """Return the calls of entry points during some work."""
     count = 0
 
     def look(frame: FrameType, event: str, _: Any) -> None:
@@ -23,7 +23,7 @@ def crossings(work: Callable[[], Any]) -> int:
         code = frame.f_code
         count += event == "call" and code.co_name == "call" and code.co_filename == jit.__file__
 
-    work()  # compiled by now
+    work()  # compiled before
     sys.setprofile(look)
     try:
         work()
@@ -34,7 +34,7 @@ def crossings(work: Callable[[], Any]) -> int:
 
 @pytest.mark.parametrize("launch", [(1.0, 0.0), (0.5, 2.0), (0.0, 9.0)])
 def test_one_crossing_a_solve_and_a_time(launch: tuple[float, float], module_of: ModuleOf) -> None:
-    """A launch is solved in one crossing, its tables are not made; a place or a state at a time is another."""
+    """A launch is solved in one call, without its tables; a place or a state at a time takes another call."""
     module = module_of("circle")
     assert crossings(lambda: module.solve(*launch, L=1)) == 1
     motion = module.solve(*launch, L=1)
@@ -43,7 +43,7 @@ def test_one_crossing_a_solve_and_a_time(launch: tuple[float, float], module_of:
 
 
 def test_panels_are_laid_when_asked_for(module_of: ModuleOf) -> None:
-    """A solved motion knows its turning points and its time; panels come with the first position."""
+    """A solved motion knows its turning points and its time; panels are computed with the first position."""
     motion = module_of("circle").solve(1.0, 0.5, L=1)
     assert motion._segment.stored_panels is None
     before = motion._segment.duration
@@ -53,14 +53,16 @@ def test_panels_are_laid_when_asked_for(module_of: ModuleOf) -> None:
 
 
 def test_one_crossing_a_leg(generated_folder: Path) -> None:
-    """A dissipative motion crosses once a leg, with its time and its events: the cost of N legs is linear in N."""
+    """A dissipative motion takes one call a leg, with its time and its events, so that the cost of N legs is linear in
+    N.
+    """
     circle = gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
     model = gqm.derive(circle, gqm.Gravity() + gqm.QuadraticDrag(b="c"))
     module = gqm.build(model, name="counted_legs", folder=generated_folder)
     assert crossings(lambda: module.solve(0, 3, c="0.01")) == 1
 
     def motion_to(t: float) -> Any:
-        """A motion followed up to a time."""
+        """Return a motion followed up to a time."""
         motion = module.solve(0, 3, c="0.01")
         while motion._driver.elapsed < t:
             motion._go_on()

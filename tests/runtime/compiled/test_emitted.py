@@ -44,7 +44,7 @@ LAST = 1
 
 
 def _compilations(text: str, file: Path, cache: Path) -> int:
-    """How often the function of a module is compiled, and written to the cache, when the module is imported."""
+    """Return how often the function of a module is compiled, and written to the cache, when the module is imported."""
     file.parent.mkdir(exist_ok=True)
     file.write_text(text, encoding="utf-8")
     before = len(list(cache.rglob("effective_potential.*.nbc")))
@@ -56,7 +56,9 @@ def _compilations(text: str, file: Path, cache: Path) -> int:
 def test_equal_functions_of_modules_are_compiled_once(
     keep: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever else stands in the module, and in whichever folder it lies; also when none of them is in use."""
+    """Equal functions are compiled once, whatever else their modules contain, in any folder, and also if none is in
+    use.
+    """
     cache = tmp_path / "cache"
     monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
     text = MODULE.replace("TERM", "41.0" if keep else "42.0")
@@ -76,7 +78,7 @@ def test_equal_functions_of_modules_are_compiled_once(
 def test_what_a_function_uses_of_its_module_is_noticed(
     term: str, before: str, after: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A module that was written by hand may have constants of its own, which are compiled into its functions."""
+    """A module written by hand may have constants of its own, which are compiled into its functions."""
     cache = tmp_path / "cache"
     monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
     text = MODULE.replace("TERM", term).replace("def plain", "from numba import njit\n\n\n@njit\ndef plain")
@@ -86,7 +88,7 @@ def test_what_a_function_uses_of_its_module_is_noticed(
 
 
 class _Compiler:
-    """Stands for the compiler: it notes what is compiled, and has nothing in its cache."""
+    """A substitute for the compiler, which notes what is compiled and has nothing in its cache."""
 
     def __init__(self, launches: Path) -> None:
         self.compiled: list[str] = []
@@ -112,7 +114,7 @@ class _Compiler:
 
 @pytest.fixture
 def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Compiler:
-    """A compiler whose functions give 7, and that no time in Python calls, however slow the machine is."""
+    """Return a compiler whose functions give 7, and which no time in Python calls, however slow the machine is."""
     compiler = _Compiler(tmp_path / "launches")
     monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", math.inf)
     monkeypatch.setattr(jit, "COMPILER", compiler)
@@ -121,7 +123,7 @@ def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Compiler:
 
 
 def _potential(tmp_path: Path, term: str) -> tuple[Any, Callable[[], list[float]]]:
-    """The function of a module, and what calls it as compiled code does, by what stands at its address."""
+    """Return the function of a module, and a function that calls it as compiled code does, by its address."""
     file = tmp_path / "one.py"
     file.write_text(MODULE.replace("TERM", term), encoding="utf-8")
     function = load(file, file.stem).effective_potential
@@ -138,7 +140,7 @@ def _potential(tmp_path: Path, term: str) -> tuple[Any, Callable[[], list[float]
 
 
 def test_python_runs_a_function_until_it_is_worth_compiling(tmp_path: Path, compiler: _Compiler) -> None:
-    """Who has its address calls the compiled one from then on."""
+    """After a function is compiled, its address leads to the compiled one."""
     function, call = _potential(tmp_path, "3.0")
     assert call() == pytest.approx([math.sin(0.5), math.sin(1.5), 3.0, 3.0], rel=3e-16, abs=0.0)
     assert compiler.compiled == []
@@ -151,7 +153,7 @@ def test_python_runs_a_function_until_it_is_worth_compiling(tmp_path: Path, comp
 def test_a_function_is_compiled_when_python_has_taken_long(
     tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Here in the second call."""
+    """A function is compiled when Python has taken long, here in the second call."""
     monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", 1e-9)
     _, call = _potential(tmp_path, "3.0")
     assert call()[2:] == [3.0, 3.0]
@@ -160,7 +162,7 @@ def test_a_function_is_compiled_when_python_has_taken_long(
 
 
 def test_a_function_is_compiled_in_the_third_launch_that_uses_it(tmp_path: Path, compiler: _Compiler) -> None:
-    """However short the launches are."""
+    """A function is compiled in the third launch that uses it, however short the launches are."""
     _, call = _potential(tmp_path, "3.0")
     for _ in range(MAX_LAUNCHES):
         begin_launch()
@@ -173,7 +175,7 @@ def test_a_function_is_compiled_in_the_third_launch_that_uses_it(tmp_path: Path,
 def test_launches_of_other_processes_count(
     tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A script that launches one body compiles what it uses when it runs the third time."""
+    """A script that launches one body compiles what it uses when it runs for the third time."""
     for _ in range(MAX_LAUNCHES):
         _, call = _potential(tmp_path, "3.0")
         assert call() == call()
@@ -186,7 +188,9 @@ def test_launches_of_other_processes_count(
 
 @pytest.mark.parametrize("term", ["1/(n - 2)", "2.0**places[i]", "places[i]**0.5"])
 def test_what_python_cannot_run_is_compiled(term: str, tmp_path: Path, compiler: _Compiler) -> None:
-    """A quotient of integers by zero, which raises in Python, and powers that the compiler may write otherwise."""
+    """Quotients of integers by zero, which raise in Python, are compiled, and so are powers that the compiler may write
+    otherwise.
+    """
     _, call = _potential(tmp_path, term)
     assert call() == [7.0] * 4
     assert compiler.compiled == ["effective_potential"]
@@ -196,7 +200,7 @@ def test_what_python_cannot_run_is_compiled(term: str, tmp_path: Path, compiler:
 def test_what_is_raised_in_python_passes_through_compiled_code(
     error: type[BaseException], tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is raised when the compiled function that was called from Python returns, once."""
+    """An exception in Python is raised, once, when the compiled function that was called from Python returns."""
     function, call = _potential(tmp_path, "3.0")
 
     def interrupted(*_: Any) -> None:
@@ -212,7 +216,7 @@ def test_what_is_raised_in_python_passes_through_compiled_code(
 
 
 def test_importing_a_module_compiles_nothing(tmp_path: Path, compiler: _Compiler) -> None:
-    """Nor does asking for an address, where Python can run the function."""
+    """Importing a module compiles nothing, nor does asking for an address if Python can run the function."""
     text = (ROOT / "generated" / "pendulum.py").read_text(encoding="utf-8")
     file = tmp_path / "pendulum_of_this_test.py"
     file.write_text(text.replace('"""Bounds of', '"""Other bounds of'), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The contents of the disk cache, and the times at which functions are compiled."""
+"""The disk cache has the right contents, and functions are compiled at the right times."""
 
 import ast
 import math
@@ -59,7 +59,7 @@ def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path) -> N
 
 
 def _imported(name: str) -> set[str]:
-    """The files of the runtime that a file imports anywhere, by Python's own parser."""
+    """Return the files of the runtime that a file imports anywhere, by Python's own parser."""
     path = RUNTIME.joinpath(*name.split("."))
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.with_suffix(".py").read_text(encoding="utf-8"))):
@@ -78,7 +78,9 @@ MODULES = sorted(
 
 
 def test_code_is_compiled_anew_after_an_edit_of_what_it_may_come_from(tmp_path: Path) -> None:
-    """The stamp of each module is made of every module that it imports, directly or through others, and changes so."""
+    """The stamp of each module depends on every module that it imports, directly or through others, and changes with
+    them.
+    """
     reached = {name: _imported(name) | {name} for name in MODULES}
     for _ in MODULES:
         reached = {name: set().union(found, *(reached[each] for each in found)) for name, found in reached.items()}
@@ -111,7 +113,7 @@ def test_an_inner_function_works_from_python() -> None:
 
 @pytest.mark.parametrize(("seconds", "said"), [(0.02, 1), (1e9, 0)])
 def test_long_compilation_is_announced(seconds: float, said: int, capsys: pytest.CaptureFixture[str]) -> None:
-    """Once for an entry point and all that it calls, while it is compiled, and only where it takes long."""
+    """A long compilation is announced once for an entry point and all that it calls, and only if it takes long."""
     announcer = jit.Announcer(seconds)
     announcer.begin(jit.Announcer.begin)
     announcer.begin(jit.Announcer.end)
@@ -124,7 +126,7 @@ def test_long_compilation_is_announced(seconds: float, said: int, capsys: pytest
 
 
 def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
-    """Under its key and stamp; a file that holds another key, or was made of another text, is not read."""
+    """Code is found by its key and stamp; a file with another key, or made from another text, is not read."""
     files = KeyedFiles(str(tmp_path), "name", "stamp")
     assert files.load(("key", 1)) is None
     files.save(("key", 1), "code")
@@ -138,12 +140,12 @@ def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
 
 @jit.Inner
 def cubed(x):  # type: ignore[no-untyped-def]
-    """A function with a power, which Python would round otherwise."""
+    """Return a function with a power, which Python would round otherwise."""
     return x**3
 
 
 def _entry(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Any], signature: Any) -> tuple[Any, list[str]]:
-    """An entry point that is not in the cache, and the list of what is compiled."""
+    """Return an entry point that is not in the cache, and the list of what is compiled."""
     compiled = []
 
     def compile_it(function: Any, *_: Any, **__: Any) -> Any:
@@ -156,7 +158,7 @@ def _entry(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Any], signat
 
 
 def test_python_runs_an_entry_point_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It takes the arguments as compiled code would, divides by zero, and returns Python's own numbers."""
+    """Python takes the arguments as compiled code would, divides by zero, and returns its own numbers."""
 
     def run(pair, values, n):  # type: ignore[no-untyped-def]
         values[0] = cubed(pair[0]) / pair[1]
@@ -201,22 +203,22 @@ def test_python_stops_when_its_time_has_run_out(monkeypatch: pytest.MonkeyPatch)
 
 
 def norm(x):  # type: ignore[no-untyped-def]
-    """NumPy rounds this in another way than compiled code."""
+    """Return a norm, which NumPy rounds in another way than compiled code."""
     return np.linalg.norm(x)
 
 
 def root(x):  # type: ignore[no-untyped-def]
-    """The compiler may take a square root for this power."""
+    """Return a power for which the compiler may take a square root."""
     return x**0.5
 
 
 def exponential(x):  # type: ignore[no-untyped-def]
-    """The compiler may take another function for this power."""
+    """Return an exponential for whose power the compiler may take another function."""
     return 2.0**x
 
 
 def hashed(x):  # type: ignore[no-untyped-def]
-    """Compiled code has hashes of its own."""
+    """Return a hash, for which compiled code has its own function."""
     return hash(x)
 
 
@@ -228,7 +230,7 @@ def test_what_cannot_be_run_to_the_same_bits_is_compiled(run: Callable[..., Any]
 
 
 def test_threads_keep_what_they_write_into_one_array(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One thread writes while another, which has begun before, gives Python up and takes back what that has written."""
+    """If a thread gives Python up and restores the array, what another thread has written meanwhile stays."""
     begun, written = threading.Event(), threading.Event()
 
     def fill(out, begin, end):  # type: ignore[no-untyped-def]
@@ -260,7 +262,7 @@ def test_threads_keep_what_they_write_into_one_array(monkeypatch: pytest.MonkeyP
 
 
 def test_threads_compile_an_entry_point_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that need it meanwhile wait for it."""
+    """One thread compiles an entry point, and those that need it meanwhile wait for it."""
     compiled = []
 
     def compile_slowly(function: Any, *_: Any, **__: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Names that numba does not document may disappear: the results are then the same digits, by its documented ways."""
+"""If names that numba does not document disappear, the results have the same digits by its documented ways."""
 
 import re
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 
-# Every private name that `numba_internals` uses: what it imports, and attributes of that.
+# These are all private names that `numba_internals` uses: those that it imports, and attributes of these.
 IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
 ATTRIBUTES = ("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache")
 LIBRARIES = (
@@ -18,7 +18,8 @@ LIBRARIES = (
 )
 ALL = (*IMPORTED, *ATTRIBUTES, *LIBRARIES)
 
-# While `numba_internals` is imported, the modules that it imports from lack the names; and it finds no such attributes.
+# While `numba_internals` is imported, the modules from which it imports lack the names, and there are no such
+# attributes.
 PROGRAM = """
 import builtins, sys
 from numba.core import caching, ccallback, codegen, compiler, environment, runtime
@@ -109,7 +110,7 @@ def _answers(folder: Path, cache: Path, *hidden: str) -> str:
 
 @pytest.fixture(scope="module")
 def truth(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Give the answers with all of numba's names."""
+    """Return the answers with all of numba's names."""
     return _answers(folder, tmp_path_factory.mktemp("cache"))
 
 
@@ -119,7 +120,7 @@ def truth(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_without_a_private_name_the_digits_are_the_same(
     hidden: tuple[str, ...], folder: Path, truth: str, tmp_path: Path
 ) -> None:
-    """Compiled at first, and then from the cache, by a process that lacks the name."""
+    """A process that lacks a name gives the same digits, when it compiles and from the cache."""
     assert _answers(folder, tmp_path, *hidden) == truth
     stored = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
     assert len(stored) >= 4
@@ -129,7 +130,9 @@ def test_without_a_private_name_the_digits_are_the_same(
 
 
 def test_no_other_file_uses_private_names() -> None:
-    """Modules of numba that its manual does not name are imported in one file; it names `extending` and `cgutils`."""
+    """Modules of numba that its manual does not name are imported in one file only; `extending` and `cgutils` are in
+    the manual.
+    """
     private = re.compile(r"\s*(from|import) numba\.(?!extending|core import cgutils|core\.cgutils)")
     files = (ROOT / "gqm_sym").rglob("*.py")
     assert {
@@ -165,7 +168,9 @@ def repeated(x):
 
 
 def test_a_function_for_compiled_callers_is_compiled_once_and_only_linked(tmp_path: Path) -> None:
-    """Whatever integers its callers pass; Python can call it, and callers are read from the cache without it."""
+    """A function is compiled once, whatever integers its callers pass; Python can call it, and callers are read from
+    the cache without it.
+    """
     (tmp_path / "functions.py").write_text(REPEATED, encoding="utf-8")
     numbers = f"{(36.0).hex()} {(1.0).hex()}"
     versions = "['(float64, int64, bool)', '(float64, int64, omitted(default=True))']"
@@ -213,7 +218,9 @@ print(ours(spare, values.copy()) == theirs(spare, values.copy()) == 5 * 2.0**60 
 
 
 def test_a_function_of_a_user_may_call_what_only_compiled_callers_call(tmp_path: Path) -> None:
-    """A function so long that it is not inlined, which takes other arguments in the machine code of an entry point."""
+    """A user's function may call one that is not inlined and takes other arguments in the machine code of an entry
+    point.
+    """
     lines = "\n".join("        values[k] *= x if spare.size == 3 else np.sin(values[k])" for _ in range(60))
     program = CALLED_BY_USERS.replace("LINES", lines)
     (tmp_path / "functions.py").write_text(program, encoding="utf-8")

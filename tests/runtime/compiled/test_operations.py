@@ -12,15 +12,15 @@ from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.intrinsics import (
     bits,
     choose,
+    floor_of,
     fma,
     from_bits,
     item_at,
     nearest_whole,
     polynomial,
     polynomial_pair,
-    whole_below,
 )
-from gqm_sym.runtime.compiled.registers import copied, on_stack, over_rows, uncounted
+from gqm_sym.runtime.compiled.registers import borrowed, copied, on_stack, over_rows
 from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.strided import element, fill_row, pointers
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
@@ -43,7 +43,7 @@ scratch = on_stack(WIDTH)
 
 def everything(x, y, columns, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with results of all operations."""
-    line = uncounted(x)
+    line = borrowed(x)
     combine(line, 0, WIDTH, 2 * WIDTH, 0.7)
     root(line, WIDTH, 3 * WIDTH)
     times_square(line, 5, out[0], 3)
@@ -54,7 +54,7 @@ def everything(x, y, columns, out):  # type: ignore[no-untyped-def]
     out[3, :WIDTH] = own[:WIDTH]
     sum_group(y[:30], x, 1, out[4], out[5])
     a, b = x[0], y[1]
-    out[6, 0], out[6, 1], out[6, 2] = fma(a, b, -a * b), nearest_whole(3.7 * a), whole_below(5.1 * b)
+    out[6, 0], out[6, 1], out[6, 2] = fma(a, b, -a * b), nearest_whole(3.7 * a), floor_of(5.1 * b)
     out[6, 3], out[6, 4] = from_bits(bits(a) + 1), choose(a > b, a, b)
     out[6, 5], (out[6, 6], out[6, 7]) = polynomial(SERIES, a), polynomial_pair(SERIES, a, b)
     out[6, 8], out[6, 9] = series(SERIES, 0.01 * a, 1e-18 * b, 0.1)
@@ -74,7 +74,7 @@ def _results(run: Any) -> np.ndarray:
 
 
 def test_python_gives_the_bits_of_each_operation() -> None:
-    """Those of vector registers, of tables and of arrays by their address among them."""
+    """Python gives the same bits for operations of vector registers, of tables and of arrays by their address."""
     signature = types.void(VECTOR, VECTOR, types.int64[:, ::1], MATRIX)
     compiled = jit.COMPILER.entry(everything, signature, nogil=False, checked=True)
     plain = PlainEntry(everything, signature.args, Trial(1e9))

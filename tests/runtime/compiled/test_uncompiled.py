@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
-# Together these have sines, powers, roots, exponentials, arc tangents and the law of friction.
+# Together these modules have sines, powers, roots, exponentials, arc tangents and the law of friction.
 MODULES = ("pendulum", "log_spiral", "cubic_coulomb")
 
 MODULE = f"""from numba import carray, types
@@ -42,7 +42,7 @@ def everything(n, first, second, third, out):
 {{lines}}
 """
 
-# What an argument may be besides ordinary numbers.
+# Arguments may be these values in addition to ordinary numbers.
 EXTREME = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e308, -1e-310])
 
 
@@ -65,13 +65,15 @@ def _results(function: Emitted, call: Any, seed: int, count: int) -> np.ndarray:
             given.append(count if kind == types.intp else float(rng.normal()))
     call(*(value.ctypes.data if isinstance(value, np.ndarray) else value for value in given))
     out: np.ndarray = given[-1]
-    out[np.isnan(out)] = np.nan  # which NaN it is, is left open
+    out[np.isnan(out)] = np.nan  # either NaN is right
     return out.view(np.int64)
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_bits_are_those_of_compiled_code(module: str) -> None:
-    """For each function, of arguments over six decades, infinities, NaN and numbers next to overflow."""
+    """The bits agree for each function, for arguments over six decades, infinities, NaN and numbers next to
+    overflow.
+    """
     functions = _functions(module)
     assert len(functions) >= 5
     for function in functions.values():
@@ -103,7 +105,7 @@ def _calls() -> dict[str, tuple[str, ...]]:
 
 
 def test_bits_of_the_arithmetic(tmp_path: Path) -> None:
-    """For each function of one or more numbers or intervals that a generated module can call."""
+    """The bits agree for each function of one or more numbers or intervals that a generated module can call."""
     calls = _calls()
     assert len(calls) > 60
     rows = [row for each in calls.values() for row in each]
@@ -126,7 +128,7 @@ def test_bits_of_the_arithmetic(tmp_path: Path) -> None:
 
 
 def _compiled_functions() -> Iterator[FunctionType]:
-    """Every function of the runtime that numba compiles."""
+    """Return every function of the runtime that numba compiles."""
     for module in walk_packages(runtime.__path__, f"{runtime.__name__}."):
         for value in vars(import_module(module.name)).values():
             is_entry = getattr(getattr(value, "__code__", None), "co_filename", None) == jit.__file__
@@ -136,7 +138,9 @@ def _compiled_functions() -> Iterator[FunctionType]:
 
 
 def test_python_knows_all_of_numpy_that_compiled_functions_use() -> None:
-    """Otherwise the first call compiles them, and what calls them, in silence."""
+    """Python knows every NumPy name in them; otherwise the first call would compile them and their callers without a
+    message.
+    """
     found, unknown = 0, set()
     for function in _compiled_functions():
         steps = list(dis.get_instructions(function))

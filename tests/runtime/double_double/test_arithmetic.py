@@ -1,4 +1,4 @@
-"""Each operation of double-double arithmetic against mpmath, with the bound on its error."""
+"""Each operation of double-double arithmetic agrees with mpmath within the bound on its error."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,11 +12,11 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
 
 DIGITS = 60
-# Registers: two operands, and what becomes of them.
+# The registers: two operands, and the result.
 A, B, OUT, OTHER = range(4)
 
-# Operation, its exact form, the ranges of its operands, and the limit of the error in units of 2**-104 of the result,
-# or of one where the result may be much smaller than its terms.
+# A row has an operation, its exact form, the ranges of its operands, and the limit of the error in units of 2**-104 of
+# the result, or of one if the result may be much smaller than its terms.
 Case = tuple[int, Callable[..., Any], tuple[tuple[float, float], ...], float, bool]
 WIDE, POSITIVE = (-1e6, 1e6), (1e-6, 1e6)
 CASES: dict[str, Case] = {
@@ -48,12 +48,12 @@ def fill(work: np.ndarray, register: int, values: np.ndarray, lows: np.ndarray, 
 
 
 def number(work: np.ndarray, register: int, i: int) -> mpf:
-    """The exact value of a number in a register."""
+    """Return the exact value of a number in a register."""
     return mpf(float(work[ROW * register + i])) + mpf(float(work[ROW * register + LOW + i]))
 
 
 def spread(rng: np.random.Generator, low: float, high: float) -> np.ndarray:
-    """Numbers of all sizes in a range."""
+    """Return numbers of all sizes in a range."""
     if low > 0.0:
         return np.exp(rng.uniform(np.log(low), np.log(high), BLOCK))
     return rng.uniform(low, high, BLOCK) * 10.0 ** rng.uniform(-6.0, 0.0, BLOCK)
@@ -79,7 +79,7 @@ def test_operations_keep_their_digits(name: str) -> None:
 
 
 def test_a_cosine_comes_with_each_sine() -> None:
-    """It is in the register behind, and their squares add up to one."""
+    """The cosine is in the register after the sine, and their squares add up to one."""
     work = np.zeros(4 * ROW)
     fill(work, A, np.linspace(-9.0, 9.0, BLOCK), np.zeros(BLOCK), np.zeros(BLOCK))
     carry_out(interpreter.SINE_COSINE, work)
@@ -91,7 +91,7 @@ def test_a_cosine_comes_with_each_sine() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_errors_of_operands_are_passed_on(name: str) -> None:
-    """With operands wrong by their errors, the exact result differs by no more than the bound."""
+    """If operands have errors, the exact result differs by no more than the bound."""
     operation, exact, ranges, _, _ = CASES[name]
     rng, work = np.random.default_rng(3), np.zeros(4 * ROW)
     for register, ends in enumerate(ranges):
@@ -120,7 +120,7 @@ def test_errors_of_operands_are_passed_on(name: str) -> None:
     ],
 )
 def test_what_has_no_digits_is_not_a_number(operation: int, argument: float) -> None:
-    """A root or a logarithm of a negative number, a quotient by zero, an exponential beyond doubles."""
+    """A root or a logarithm of a negative number, a quotient by zero and an exponential beyond doubles are NaN."""
     work = np.zeros(4 * ROW)
     fill(work, A, np.full(BLOCK, argument), np.zeros(BLOCK), np.zeros(BLOCK))
     carry_out(operation, work)

@@ -1,4 +1,6 @@
-"""Half periods and turning points from double-double arithmetic against closed forms, and what is left to mpmath."""
+"""Half periods and turning points from double-double arithmetic agree with closed forms, and mpmath is used beyond
+them.
+"""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -21,7 +23,7 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 G = number("9.81")
 AMPLITUDES = st.floats(1e-3, 3.1)
-# Modules in which a body swings from a place drawn between these, with a speed up to the third number.
+# In these modules a body swings from a place drawn between the first two numbers, with a speed up to the third.
 SWINGS = {
     "ellipse": (-1.5, 1.5, 2.0),
     "parabola": (0.1, 2.0, 3.0),
@@ -36,7 +38,7 @@ SWINGS = {
 
 @pytest.fixture(scope="module")
 def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead on a circle."""
+    """Return a bead on a circle."""
     return module_of("circle")
 
 
@@ -56,7 +58,7 @@ def is_within(found: Any, wanted: mpf) -> bool:
 @given(amplitude=AMPLITUDES)
 @settings(max_examples=100, deadline=None)
 def test_a_swing_on_a_circle(amplitude: float, circle: ModuleType) -> None:
-    """K(k) sqrt(L/g) 2, correctly rounded and within the bound, at any amplitude."""
+    """A swing's half period is 2 K(k) sqrt(L/g), correctly rounded and within the bound, at any amplitude."""
     motion = circle.solve(lam0=amplitude, L=1)
     with mp.workdps(50):
         wanted = pendulum_half_period(mpf(amplitude), mp.sqrt(G))
@@ -68,7 +70,7 @@ def test_a_swing_on_a_circle(amplitude: float, circle: ModuleType) -> None:
 @given(share=st.floats(1.001, 5.0), lam0=st.floats(-3.0, 3.0), direction=st.sampled_from([1, -1]))
 @settings(max_examples=50, deadline=None)
 def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: ModuleType) -> None:
-    """With the speed v at the bottom, 4 K(4 g L/v**2) L/v."""
+    """A round with the speed v at the bottom takes 4 K(4 g L/v**2) L/v."""
     with mp.workdps(50):
         v0 = float(mp.sqrt(4 * G * share - 2 * G * (1 - mp.cos(mpf(lam0)))))
         square = mpf(v0) ** 2 + 2 * G * (1 - mp.cos(mpf(lam0)))
@@ -108,7 +110,7 @@ def test_the_same_as_with_more_digits(name: str) -> None:
 
 @pytest.mark.parametrize("amplitude", ["1e-6", "1e-9", "3.1415926", "1e-30"])
 def test_what_has_too_few_digits_is_left_to_mpmath(amplitude: str, circle: ModuleType) -> None:
-    """V**2 of a tiny swing, and beside the top, cancels too far: the bound says so, and the answer is right."""
+    """V**2 of a tiny swing, and beside the top, cancels so far that the bound shows it, and the answer is right."""
     motion = circle.solve(lam0=amplitude, L=1)
     found = motion._orbit
     with mp.workdps(60):
@@ -119,7 +121,7 @@ def test_what_has_too_few_digits_is_left_to_mpmath(amplitude: str, circle: Modul
 
 
 def test_times_so_late_that_double_double_is_not_enough(circle: ModuleType) -> None:
-    """The period of a small swing has 24 digits; after 1e12 periods it is computed again, with more."""
+    """The period of a small swing has 24 digits; for times after 1e12 periods it is computed again with more digits."""
     motion = circle.solve(lam0="1e-3", L=1)
     with mp.workdps(60):
         amplitude, frequency = mpf("1e-3"), mp.sqrt(G)
@@ -133,7 +135,9 @@ def test_times_so_late_that_double_double_is_not_enough(circle: ModuleType) -> N
 
 
 def test_tabulated_nodes() -> None:
-    """The squares of sines at equal angles, each level between the nodes of those before, and the angles of a lap."""
+    """The tables have the squares of sines at equal angles, each level between the nodes of the last one, and the
+    angles of a lap.
+    """
     shares, lows, factors, factor_lows = trapezoidal_nodes(LIBRATION)
     laps = trapezoidal_nodes(CIRCULATION)
     with mp.workdps(40):
@@ -147,7 +151,7 @@ def test_tabulated_nodes() -> None:
 
 
 def test_rule_of_panels() -> None:
-    """Sixteen nodes integrate powers up to the 31st exactly, and no more."""
+    """Sixteen nodes integrate powers up to the 31st exactly, and no higher ones."""
     rule = panel_rule()
     with mp.workdps(40):
         nodes = [mpf(a) + mpf(b) for a, b in rule[:2].T.tolist()]

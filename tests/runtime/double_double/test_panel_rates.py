@@ -1,4 +1,4 @@
-"""Time and arc length on panels of phase angles in double-double arithmetic, against mpmath and closed forms."""
+"""Time and arc length on panels of phase angles in double-double arithmetic agree with mpmath and closed forms."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -23,12 +23,12 @@ KINDS = {"between turns": TURN_TURN, "from a turn": FROM_TURN, "without turns": 
 
 @pytest.fixture(scope="module")
 def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead on a circle, whose angle is measured from the bottom."""
+    """Return a bead on a circle, whose angle is measured from the bottom."""
     return module_of("circle")
 
 
 def rates(motion: Any, kind: int, ends: tuple[Any, Any], panel: tuple[Any, Any]) -> Any:
-    """The rows of `panel_rates` on a panel from one phase angle to another."""
+    """Return the rows of `panel_rates` on a panel from one phase angle to another."""
     a, b = ends
     low, high = panel
     pairs = [two_doubles(value) for value in (a, b - a, (low + high) / 2, (high - low) / 2)]
@@ -40,7 +40,7 @@ def rates(motion: Any, kind: int, ends: tuple[Any, Any], panel: tuple[Any, Any])
 @given(amplitude=st.floats(0.01, 3.1), low=st.floats(0.01, 0.98), width=st.floats(1e-6, 1.0))
 @settings(max_examples=40, deadline=None)
 def test_the_last_bit(name: str, amplitude: float, low: float, width: float, circle: ModuleType) -> None:
-    """Each rate is the double next to 2 (cos lam - cos amplitude) g = V**2 and ds = dlam."""
+    """Each rate is the double nearest to that with V**2 = 2 g (cos lam - cos amplitude) and ds = dlam."""
     motion, kind = circle.solve(lam0=amplitude, L=1), KINDS[name]
     with mp.workdps(60):
         a, b = -mpf(amplitude), mpf(amplitude) if kind == TURN_TURN else mpf(amplitude) / 3
@@ -60,7 +60,7 @@ def test_the_last_bit(name: str, amplitude: float, low: float, width: float, cir
 
 
 def test_what_cancels_is_left_alone(circle: ModuleType) -> None:
-    """Where V**2 is negative, or so small that too few digits of it are left, there is no answer."""
+    """If V**2 is negative, or so small that too few of its digits are left, there is no answer."""
     motion = circle.solve(lam0=1, L=1)
     with mp.workdps(60):
         assert rates(motion, REGULAR, (mpf("1.1"), mpf("1.2")), (mpf(0), mpf(1))) is None
@@ -70,7 +70,9 @@ def test_what_cancels_is_left_alone(circle: ModuleType) -> None:
 @given(gap=st.floats(3.0, 11.0), lam0=st.floats(-2.5, 2.5), turns=st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_beside_the_separatrix(gap: float, lam0: float, turns: bool, circle: ModuleType) -> None:
-    """A swing nearly to the top, or a round that all but stops there: the period to the last bit, without mpmath."""
+    """For a swing nearly to the top, or a round that nearly stops there, the period is right to the last bit without
+    mpmath.
+    """
     with mp.workdps(60):
         share = 1 - mpf(10) ** -gap if turns else 1 + mpf(10) ** -gap
         v0 = float(mp.sqrt(4 * G * share - 2 * G * (1 - mp.cos(mpf(lam0)))))

@@ -1,4 +1,4 @@
-"""Tapes of formulas: their values at many places against the formulas themselves in mpmath."""
+"""Tapes of formulas have the values of the formulas themselves in mpmath, at many places."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
 from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape, bind, record
 from gqm_sym.runtime.interface import ExactFormulas
 
-# Every function that a formula may contain, each for places between 1.1 and 1.9.
+# These are all functions that a formula may contain, for places between 1.1 and 1.9.
 FUNCTIONS = {
     "trigonometric": lambda op, u, p: op.sin(u) * op.cos(p[0] * u) + op.tan(u / 2),
     "inverse trigonometric": lambda op, u, p: op.asin(u / 4) + op.acos(p[0] / 3) * op.atan(u),
@@ -28,7 +28,7 @@ PARAMETER = "7/5"
 
 
 def values(tape: BoundTape, places: np.ndarray) -> tuple[list[mpf], np.ndarray]:
-    """The effective potential at places, as the interpreter has it, and the bounds on its errors."""
+    """Return the effective potential at places, by the interpreter, and the bounds on its errors."""
     first, place, potential, *_ = tape.tape.registers
     work = tape.work
     for k, (high, low) in enumerate(tape.parameters.T):
@@ -42,7 +42,7 @@ def values(tape: BoundTape, places: np.ndarray) -> tuple[list[mpf], np.ndarray]:
 
 
 def recorded(formula: Any, parameters: int = 1) -> BoundTape | None:
-    """The tape of one formula, which stands for all."""
+    """Return the tape of one formula, which stands for all."""
     numbers = [read_number(PARAMETER, where="p")] * parameters
     found = record(ExactFormulas(*[formula] * 7), lambda op, p: (None, None, 2 * op.pi), len(numbers))
     return bind(found, numbers)
@@ -72,7 +72,9 @@ def test_what_occurs_twice_is_computed_once() -> None:
 
 
 def test_what_is_constant_is_not_computed_at_each_place() -> None:
-    """Operations on parameters alone come first, and those on rational numbers are done exactly as it is recorded."""
+    """Operations on parameters alone come first, and those on rational numbers are carried out exactly when they are
+    recorded.
+    """
     tape = recorded(lambda op, u, p: u * op.sqrt(p[0] + op.mpf(1) / 3 + op.mpf(2) / 3))
     assert tape is not None
     constant, with_place, everything = tape.tape.parts
@@ -80,7 +82,7 @@ def test_what_is_constant_is_not_computed_at_each_place() -> None:
 
 
 def test_long_formulas_are_left_to_mpmath() -> None:
-    """A tape that would not fit into the caches is none."""
+    """A formula whose tape would not fit into the caches has no tape."""
 
     def long(op: Any, u: Any, p: Any) -> Any:
         return sum(op.sin(k * u) for k in range(1, MAX_REGISTERS))

@@ -11,7 +11,7 @@ from naive import pendulum_half_period
 from problems import number
 
 from gqm_sym.runtime.double_double.nodes import WINDOW, powers
-from gqm_sym.runtime.double_double.orbit_time import Bounded
+from gqm_sym.runtime.double_double.orbit_time import BoundedNumber
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 
@@ -37,7 +37,7 @@ def assert_found(motion: object, wanted: mpf, answer: float) -> None:
     """
     assert isinstance(motion, PeriodicMotion)
     assert motion._orbit is not None
-    found: Bounded = motion._orbit.duration
+    found: BoundedNumber = motion._orbit.duration
     assert abs(mpf(found.high) + mpf(found.low) - wanted) <= found.error
     assert answer == float(wanted)
 

@@ -1,4 +1,4 @@
-"""Derivatives recorded on a tape against mpmath's own, for every function that a formula may contain."""
+"""Derivatives recorded on a tape agree with mpmath's own, for every function that a formula may contain."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.orbit import pairs
 from gqm_sym.runtime.gradients.programs import assemble
 
-# Each for places between 1.1 and 1.9, and a parameter of 1.4.
+# Each formula is tested for places between 1.1 and 1.9, and a parameter of 1.4.
 FUNCTIONS = {
     "trigonometric": lambda op, u, p: op.sin(u) * op.cos(p * u) + op.tan(u / 2) + op.cos(u * u),
     "inverse trigonometric": lambda op, u, p: op.asin(u / 4) + op.acos(p / 3) * op.atan(u),
@@ -30,7 +30,9 @@ PARAMETER = 1.4375
 
 
 def found(formula: Any, order: int) -> np.ndarray:
-    """First derivatives by place and parameter, or second derivatives by the place and either."""
+    """Return first derivatives with respect to place and parameter, or second ones with respect to the place and
+    either.
+    """
     op = Recorder(1)
     result = formula(op, op.place, op.values[0])
     for _ in range(order - 1):

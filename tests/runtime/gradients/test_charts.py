@@ -1,4 +1,4 @@
-"""Gradients along charts: against closed forms, and against differences of half periods in double-double arithmetic."""
+"""Gradients along charts agree with closed forms, and with differences of half periods in double-double arithmetic."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -22,14 +22,14 @@ STEP = Fraction(1, 2**30)
 
 @pytest.fixture(scope="module")
 def ring(generated_folder: Path) -> ModuleType:
-    """A circle as an implicit curve, in arc length from the bottom."""
+    """Return a circle as an implicit curve, in arc length from the bottom."""
     curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_ring", folder=generated_folder)
 
 
 @pytest.fixture(scope="module")
 def rail(generated_folder: Path) -> ModuleType:
-    """A valley of an arc between clothoids and lines, down which a ball rolls."""
+    """Return a valley of an arc between clothoids and lines, in which a ball rolls."""
     pieces = [
         gqm.line(length=3),
         gqm.clothoid(length="q", kappa_start=0, kappa_end="1/r"),
@@ -44,7 +44,7 @@ def rail(generated_folder: Path) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def valley(generated_folder: Path) -> ModuleType:
-    """The spline through nine points, beside a spring."""
+    """Return the spline through nine points, with a spring."""
     x = np.linspace(-2.0, 2.0, 9)
     points = np.stack([x, 0.3 * x**2 + 0.05 * np.sin(3.0 * x)], axis=1)
     force = gqm.Gravity() + gqm.Potential("k*(x**2 + z**2)/2", parameters={"k": "3/2"})
@@ -52,7 +52,7 @@ def valley(generated_folder: Path) -> ModuleType:
 
 
 def durations(module: ModuleType, launch: dict[str, Any], name: str) -> float:
-    """The derivative of a half period, or of the time of a lap, as a difference quotient."""
+    """Return the derivative of a half period, or of the time of a lap, as a difference quotient."""
     sides = []
     for sign in (1, -1):
         moved = Fraction(launch[name]) + sign * STEP
@@ -83,7 +83,7 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "launch"), CASES)
 def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
-    """Durations have derivatives with respect to launch, forces and shape; at rest that with respect to the speed is
+    """Durations have derivatives with respect to launch, forces and shape; at rest the one with respect to speed is
     zero.
     """
     module = request.getfixturevalue(name)
@@ -120,7 +120,7 @@ def test_states_on_a_circle(arc: float, radius: float, v0: float, t: float, ring
     places = dict(zip(wanted.wrt, range(4), strict=False))
 
     def on_circle(rows: Any, name: str) -> Any:
-        """The derivative at a given arc length of launch, from those at a given angle of it."""
+        """Return the derivative at a given arc length of launch, from those at a given angle of launch."""
         if name == "R":
             return rows[places["L"]] - arc / radius**2 * rows[places["lam0"]]
         return rows[places[name]] / (radius if name == "lam0" else 1.0)
@@ -129,7 +129,7 @@ def test_states_on_a_circle(arc: float, radius: float, v0: float, t: float, ring
     for k, name in enumerate(found.wrt[:4]):
         for quantity in ("x", "z", "v", "normal_force"):
             scale = np.abs(getattr(period, quantity)[k]).max()
-            # A contact force has the second derivative of the displacement of the curve.
+            # A contact force depends on the second derivative of the displacement of the curve.
             enough = 1e-10 if (quantity, name) == ("normal_force", "R") else 5e-14
             assert abs(getattr(found, quantity)[k] - on_circle(getattr(wanted, quantity), name)) <= enough * scale
     angle = on_circle(wanted.lam, "R") * radius + float(other.lam(t))
@@ -175,6 +175,6 @@ def test_sweeps_and_fits(ring: ModuleType) -> None:
 
 
 def test_unknown_names(ring: ModuleType) -> None:
-    """They are refused."""
+    """Unknown names are refused."""
     with pytest.raises(gqm.errors.InputError, match="there is no parameter 'L'"):
         ring.solve(lam0=1.0).gradient("period", "L")

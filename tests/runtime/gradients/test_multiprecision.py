@@ -1,4 +1,4 @@
-"""Orbits whose derivatives lose more digits than double-double arithmetic has."""
+"""Derivatives of orbits that lose more digits than double-double arithmetic has are right."""
 
 from types import ModuleType
 
@@ -16,13 +16,13 @@ ULP = 2.0**-52
 
 
 def generated(name: str) -> ModuleType:
-    """A module of the repository."""
+    """Return a module of the repository."""
     return load(str(ROOT / "generated" / f"{name}.py"), name)
 
 
 @pytest.mark.parametrize("amplitude", [1e-3, 1e-9, 1e-30])
 def test_small_swings(amplitude: float) -> None:
-    """dtau/dA in closed form, and d theta/dA = cos(w t) to 2nd order in the amplitude."""
+    """dtau/dA has its closed form, and d theta/dA is cos(w t) to second order in the amplitude."""
     motion = generated("circle").solve(lam0=amplitude, L=1, g="9.81")
     with mp.workdps(120):
         k, rate = mp.sin(mpf(amplitude) / 2), mp.sqrt(mpf("9.81"))
@@ -36,14 +36,14 @@ def test_small_swings(amplitude: float) -> None:
 
 
 def test_launches_from_rest_in_the_middle() -> None:
-    """For circulations from lam0 = 1e-300, dT/dlam0 = dT/dE g sin(lam0)."""
+    """For circulations from lam0 = 1e-300, dT/dlam0 is dT/dE g sin(lam0)."""
     motion = generated("circle").solve(lam0=1e-300, v0=9.0, L=1, g="9.81")
     assert motion.gradient("period", "lam0")["lam0"] == pytest.approx(motion.period_slope * 9.81e-300, rel=4 * ULP)
 
 
 @pytest.mark.parametrize(("name", "v0"), [("ellipse", 1.0), ("ellipse", 9.0), ("parabola_rolling", 0.5)])
 def test_the_same_as_in_double_double(name: str, v0: float) -> None:
-    """Where both arithmetics have enough digits, all means, ends and samples agree."""
+    """If both arithmetics have enough digits, all means, ends and samples agree."""
     motion = generated(name).solve(lam0=0.25 if name == "parabola_rolling" else -1.25, v0=v0)
     direction = motion.direction if motion.kind == "circulation" else 0
     fast, slow = (
@@ -65,7 +65,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
 
 
 def test_a_swing_that_comes_too_near_to_the_top() -> None:
-    """It is refused soon, and a sweep has no gradient there."""
+    """A swing too near to the top is refused soon, and a sweep has no gradient there."""
     module = generated("circle")
     for place in (3.1415926, "pi - 1/10**12"):
         with pytest.raises(SolutionError, match="too near to an equilibrium"):

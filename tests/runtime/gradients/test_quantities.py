@@ -1,4 +1,4 @@
-"""Gradients of periods, turning points, extremes and actions against closed forms and differences in mpmath."""
+"""Gradients of periods, turning points, extremes and actions agree with closed forms and differences in mpmath."""
 
 from functools import partial
 from pathlib import Path
@@ -22,18 +22,18 @@ ULP = 2.0**-52
 
 @pytest.fixture(scope="module")
 def circle() -> ModuleType:
-    """A bead on a circle."""
+    """Return a bead on a circle."""
     return generated("circle")
 
 
 @pytest.fixture(scope="module")
 def cubic(generated_folder: Path) -> ModuleType:
-    """An asymmetric well, z = x**2 + c*x**3."""
+    """Return an asymmetric well, z = x**2 + c*x**3."""
     return gqm.build(gqm.derive(gqm.Curve.graph("x**2 + c*x**3"), gqm.Gravity()), name="well", folder=generated_folder)
 
 
 def generated(name: str) -> ModuleType:
-    """A module of the repository."""
+    """Return a module of the repository."""
     return load(str(ROOT / "generated" / f"{name}.py"), name)
 
 
@@ -45,7 +45,7 @@ def is_near(found: float, wanted: Any, ulps: float = 2.0, size: float = 0.0) -> 
 
 
 def test_reference_numbers(circle: ModuleType, cubic: ModuleType) -> None:
-    """The pendulum of 1.2 rad, and an asymmetric well."""
+    """Gradients agree with published numbers for the pendulum of 1.2 rad and for an asymmetric well."""
     swing = circle.solve(lam0="6/5", L=1, g="9.81")
     found = swing.gradient("half_period")
     assert is_near(found["lam0"], mpf("0.1793769168809972247603535230824"))
@@ -63,7 +63,7 @@ def test_reference_numbers(circle: ModuleType, cubic: ModuleType) -> None:
 @given(amplitude=st.floats(1e-3, 3.1), length=st.floats(0.1, 10.0))
 @settings(max_examples=30)
 def test_a_pendulum(amplitude: float, length: float, circle: ModuleType) -> None:
-    """dtau/dA = sqrt(L/g) cos(A/2) (E/(k (1 - k**2)) - K/k) with k = sin(A/2), and dtau/dL = tau/(2L)."""
+    """With k = sin(A/2), dtau/dA is sqrt(L/g) cos(A/2) (E/(k (1 - k**2)) - K/k), and dtau/dL is tau/(2L)."""
     motion = circle.solve(lam0=amplitude, L=length, g="9.81")
     found = motion.gradient("half_period")
     with mp.workdps(60):
@@ -81,7 +81,9 @@ def test_a_pendulum(amplitude: float, length: float, circle: ModuleType) -> None
 @given(gap=st.floats(1.0, 3.7))
 @settings(max_examples=20)
 def test_a_pendulum_nearly_to_the_top(gap: float, circle: ModuleType) -> None:
-    """Down to 2e-4 rad from the top, where the half period changes by thousands of seconds a radian."""
+    """Gradients are right down to 2e-4 rad from the top, where the half period changes by thousands of seconds per
+    radian.
+    """
     with mp.workdps(60):
         amplitude = float(mp.pi - mpf(10) ** -gap)
         motion, a = circle.solve(lam0=amplitude, L=1, g="9.81"), mpf(amplitude)
@@ -95,7 +97,7 @@ def test_a_pendulum_nearly_to_the_top(gap: float, circle: ModuleType) -> None:
 @given(gap=st.floats(2.0, 8.0), lam0=st.floats(-2.0, 2.0))
 @settings(max_examples=20)
 def test_rounds_that_all_but_stop(gap: float, lam0: float, circle: ModuleType) -> None:
-    """dT/dv0 of rounds whose energy is above that of the top by shares of 1e-2 to 1e-8."""
+    """dT/dv0 is right for rounds whose energy exceeds that of the top by shares of 1e-2 to 1e-8."""
     with mp.workdps(60):
         g = mpf("9.81")
         v0 = float(mp.sqrt(4 * g * (1 + mpf(10) ** -gap) - 2 * g * (1 - mp.cos(mpf(lam0)))))
@@ -111,7 +113,7 @@ def test_rounds_that_all_but_stop(gap: float, lam0: float, circle: ModuleType) -
 @given(share=st.floats(1.01, 5.0), lam0=st.floats(-3.0, 3.0), direction=st.sampled_from([1, -1]))
 @settings(max_examples=20)
 def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: ModuleType) -> None:
-    """T = 4 K(4 g L/v**2) L/v with the speed v at the bottom, and dT/dv0 and dT/dE by it."""
+    """With the speed v at the bottom T is 4 K(4 g L/v**2) L/v, from which dT/dv0 and dT/dE follow."""
     with mp.workdps(50):
         g = mpf("9.81")
         v0 = float(mp.sqrt(4 * g * share - 2 * g * (1 - mp.cos(mpf(lam0)))))
@@ -126,7 +128,9 @@ def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: 
 
 @pytest.mark.parametrize("name", FORMULAS)
 def test_differences(name: str) -> None:
-    """Random launches with random parameters: half period, action, turning points by every number, to rounding."""
+    """For random launches and parameters, derivatives of half period, action and turning points agree with differences,
+    to rounding.
+    """
     module, random = generated(name), np.random.default_rng(7)
     for _ in range(1):
         launch = {key: float(random.uniform(*ends)) for key, ends in FORMULAS[name].ranges.items()}
@@ -134,7 +138,7 @@ def test_differences(name: str) -> None:
         assert motion.kind == "libration"
         ends = tuple(sorted(motion.turning_points))
         found = [motion.gradient(q) for q in ("half_period", "action", "turning_points")]
-        # The rounding of a gradient is a share of the integral of the absolute values of what it is the integral of.
+        # The rounding of a gradient is in proportion to the integral of the absolute value of its integrand.
         means = motion._derivatives._means[0][1:, 3]
         sizes = dict(zip((*module.PARAMETERS, "lam0", "v0"), means * np.pi, strict=False))
         with mp.workdps(42):
@@ -148,7 +152,7 @@ def test_differences(name: str) -> None:
 
 
 def test_a_cycloid_is_isochronous() -> None:
-    """dtau/dA = 0 and dtau/dR = tau/(2 R) at any amplitude."""
+    """At any amplitude dtau/dA is 0, and dtau/dR is tau/(2 R)."""
     module = generated("cycloid_inverted")
     for lam0 in (3.0, 2.0, 0.7):
         motion = module.solve(lam0=lam0)
@@ -159,7 +163,9 @@ def test_a_cycloid_is_isochronous() -> None:
 
 
 def test_extremes(circle: ModuleType, cubic: ModuleType) -> None:
-    """By the envelope theorem: where the place of the extreme does not matter, at turning points, and for a horizon."""
+    """By the envelope theorem extremes have derivatives where their place does not matter, at turning points, and at a
+    horizon.
+    """
     length, g, mass, angle = 1.25, 9.5, 2.0, 1.125
     motion = circle.solve(lam0=angle, L=length, g=g, m=mass)
     sine, cosine = mp.sin(angle), mp.cos(angle)
@@ -184,7 +190,7 @@ def test_extremes(circle: ModuleType, cubic: ModuleType) -> None:
     uneven = cubic.solve(lam0=-0.8, c=0.3, g=9.81, m=1.5)
 
     def force(x: mpf, at: dict[str, mpf]) -> mpf:
-        """N at a place."""
+        """Return N at a place."""
 
         def z(u: mpf) -> mpf:
             return u**2 + at["c"] * u**3
@@ -198,7 +204,7 @@ def test_extremes(circle: ModuleType, cubic: ModuleType) -> None:
     with mp.workdps(60):
 
         def largest(at: dict[str, mpf]) -> list[mpf]:
-            """The largest N, where its slope vanishes."""
+            """Return the largest N, at which its slope vanishes."""
             return [force(mp.findroot(lambda x: mp.diff(lambda u: force(u, at), x), mpf(near)), at)]
 
         for name in launch:
@@ -206,7 +212,7 @@ def test_extremes(circle: ModuleType, cubic: ModuleType) -> None:
 
 
 def test_rotating_bodies_of_constant_speed() -> None:
-    """Without gravity speed and force are the same everywhere: N = m v0**2/L."""
+    """Without gravity speed and force are the same everywhere, with N = m v0**2/L."""
     motion = generated("circle").solve(lam0=0.3, v0=2.0, L=1.5, g=0, m=0.5)
     assert motion.kind == "circulation"
     found = motion.gradient("normal_force_max")
@@ -217,7 +223,7 @@ def test_rotating_bodies_of_constant_speed() -> None:
 
 
 def test_the_choice_of_names(circle: ModuleType) -> None:
-    """All of them by default, in the order in which they are given otherwise."""
+    """By default a gradient has all names; otherwise it has the given ones, in their order."""
     motion = circle.solve(lam0=1.0)
     assert list(motion.gradient("period")) == ["lam0", "v0", "L", "g", "m"]
     assert list(motion.gradient("period", ("g", "lam0"))) == ["g", "lam0"]
@@ -240,7 +246,7 @@ def test_the_choice_of_names(circle: ModuleType) -> None:
 def test_what_has_no_gradient(
     quantity: Any, wrt: Any, launch: dict[str, Any], error: type[Exception], text: str, circle: ModuleType
 ) -> None:
-    """One clear error each."""
+    """Each quantity without a gradient gives one clear error."""
     motion = circle.solve(**{"lam0": 1.0, **launch})
     with pytest.raises(error, match=text):
         motion.gradient(quantity, wrt)
@@ -267,7 +273,9 @@ def test_the_time_at_a_place(place: float, circle: ModuleType) -> None:
 
 
 def test_motions_without_gradients_yet() -> None:
-    """The action of motions with losses, and bodies at rest; of curves without formulas see `test_charts`."""
+    """The action of motions with losses has no gradient yet, nor has a body at rest; for curves without formulas see
+    `test_charts`.
+    """
     damped = generated("circle_drag").solve(lam0=1.0, t_max=3)
     resting = generated("circle_drag").solve(lam0=0.0)
     with pytest.raises(SolutionError, match="kind 'rest'"):

@@ -1,4 +1,4 @@
-"""Second derivatives of periods against those of closed forms in mpmath."""
+"""Second derivatives of periods agree with those of closed forms in mpmath."""
 
 from fractions import Fraction
 from itertools import combinations_with_replacement
@@ -19,23 +19,23 @@ ULP = 2.0**-52
 
 @pytest.fixture(scope="module")
 def circle() -> ModuleType:
-    """A bead on a circle."""
+    """Return a bead on a circle."""
     return load(str(ROOT / "generated" / "circle.py"), "circle")
 
 
 def swing(lam0: Any, v0: Any, L: Any, g: Any) -> Any:
-    """A quarter of the period of a pendulum."""
+    """Return a quarter of the period of a pendulum."""
     return mp.sqrt(L / g) * mp.ellipk(mp.sin(lam0 / 2) ** 2 + v0**2 / (4 * g * L))
 
 
 def lap(lam0: Any, v0: Any, L: Any, g: Any) -> Any:
-    """The time of a lap of a pendulum."""
+    """Return the time of a lap of a pendulum."""
     square = v0**2 + 2 * g * L * (1 - mp.cos(lam0))
     return 4 * L * mp.ellipk(4 * g * L / square) / mp.sqrt(square)
 
 
 def second(function: Any, at: dict[str, Any], one: str, other: str) -> Any:
-    """The second derivative by two of the arguments, by differences of 60 digits."""
+    """Return the second derivative with respect to two of the arguments, by differences of 60 digits."""
     step = mpf(10) ** -15
 
     def value(**moves: Any) -> Any:
@@ -52,7 +52,9 @@ LAUNCHES = [("6/5", "0"), ("1/10", "1/2"), ("-2", "3"), ("1/1000", "0"), ("314/1
 
 @pytest.mark.parametrize("launch", LAUNCHES)
 def test_a_pendulum(launch: tuple[str, str], circle: ModuleType) -> None:
-    """Small and large swings, one from near the top, and rounds; by all pairs of lam0, v0, L and g."""
+    """Second derivatives are right for small and large swings, one near the top, and rounds, for all pairs of lam0, v0,
+    L and g.
+    """
     motion = circle.solve(lam0=launch[0], v0=launch[1], L="5/4", g="9.81")
     found = motion.gradient("period", ("lam0", "v0", "L", "g"), order=2)
     with mp.workdps(60):
@@ -67,7 +69,9 @@ def test_a_pendulum(launch: tuple[str, str], circle: ModuleType) -> None:
 
 
 def test_the_reference_number(circle: ModuleType) -> None:
-    """The pendulum of 1.2 rad; at rest the second derivative by v0 is the first by the energy."""
+    """For the pendulum of 1.2 rad at rest, the second derivative with respect to v0 is the first with respect to the
+    energy.
+    """
     motion = circle.solve(lam0="6/5", L=1, g="9.81")
     found = motion.gradient("half_period", ("lam0", "v0"), order=2)
     wanted = mpf("0.20564724295197262477075024369")
@@ -94,7 +98,7 @@ def test_an_asymmetric_well(generated_folder: Path) -> None:
 
 
 def test_what_is_not_there(circle: ModuleType) -> None:
-    """One clear error each."""
+    """Each second derivative that does not exist gives one clear error."""
     motion = circle.solve(lam0=1.0)
     with pytest.raises(InputError, match="order must be 1 or 2, got 3"):
         motion.gradient("period", order=3)

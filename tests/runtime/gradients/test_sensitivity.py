@@ -1,4 +1,4 @@
-"""Derivatives of states at any time against closed forms in mpmath, and against laws that every motion obeys."""
+"""Derivatives of states at any time agree with closed forms in mpmath, and with laws that every motion obeys."""
 
 from types import ModuleType
 from typing import Any
@@ -12,17 +12,17 @@ from paths import ROOT
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
-# Times from launch, in periods: within the first one, and much later.
+# The times from launch, in periods: within the first one, and much later.
 TIMES = np.array([0.0, 0.03, 0.21, 0.25, 0.4, 0.5, 0.71, 0.98, 1.0, 2.3, -0.6, 1234.56, 1e6 + 0.37, 1e9 + 0.11])
 
 
 def generated(name: str) -> ModuleType:
-    """A module of the repository."""
+    """Return a module of the repository."""
     return load(str(ROOT / "generated" / f"{name}.py"), name)
 
 
 def swing(time: Any, at: dict[str, Any]) -> list[Any]:
-    """Angle and speed of a pendulum released at rest, in Jacobi's functions."""
+    """Return angle and speed of a pendulum released at rest, in Jacobi's functions."""
     k, rate = mp.sin(at["lam0"] / 2), mp.sqrt(at["g"] / at["L"])
     u = rate * time + mp.ellipk(k**2)
     sn, cn = mp.ellipfun("sn", u, k**2), mp.ellipfun("cn", u, k**2)
@@ -31,7 +31,7 @@ def swing(time: Any, at: dict[str, Any]) -> list[Any]:
 
 @pytest.mark.parametrize("amplitude", [1.2, 2.9, 0.05])
 def test_a_pendulum_at_any_time(amplitude: float) -> None:
-    """Up to 1e9 periods, within 1e-14 of the largest derivative in one period then."""
+    """Sensitivities are right up to 1e9 periods, within 1e-14 of the largest derivative in the period then."""
     launch = {"lam0": amplitude, "L": 1.25, "g": 9.81}
     motion = generated("circle").solve(**launch)
     times = motion.period * TIMES
@@ -47,7 +47,7 @@ def test_a_pendulum_at_any_time(amplitude: float) -> None:
 
 
 def test_reference_numbers() -> None:
-    """The pendulum of 1.2 rad after 1000 s."""
+    """Sensitivities of the pendulum of 1.2 rad after 1000 s agree with published numbers."""
     motion = generated("circle").solve(lam0="6/5", L=1, g="9.81")
     assert motion.lam(1000) == pytest.approx(1.02038649414777600971089, rel=4e-16)
     found = motion.sensitivity(1000, ("lam0", "L", "g"))
@@ -60,10 +60,10 @@ CASES = [(name, 0.0) for name in FORMULAS] + [("circle", 9.0), ("ellipse", 9.0),
 
 @pytest.mark.parametrize(("name", "faster"), CASES)
 def test_laws_of_motion(name: str, faster: float) -> None:
-    """Random launches in both directions keep area in phase space, energy, and the scale of time.
+    """For random launches in both directions, area in phase space, energy and the scale of time are conserved.
 
     The map from (s, V) at launch to (s, V) at any time keeps areas. The energy V**2/2 + U depends on the variables as
-    at launch. Where all forces are proportional to g, a motion depends on t sqrt(g) and v0/sqrt(g).
+    at launch. If all forces are proportional to g, a motion depends on t sqrt(g) and v0/sqrt(g).
     """
     module, random = generated(name), np.random.default_rng(11)
     ranges = FORMULAS.get(name, FORMULAS["rolling_circle"]).ranges
@@ -90,7 +90,7 @@ def test_laws_of_motion(name: str, faster: float) -> None:
             at = dict(zip(motion.problem.formulas.parameters, p, strict=True))
 
             def level(lam: mpf, key: str = key, at: dict[str, mpf] = at, f: Any = f) -> float:
-                """The derivative of U by a parameter at a fixed place."""
+                """Return the derivative of U with respect to a parameter at a fixed place."""
                 if key not in at:
                     return 0.0
                 return float(mp.diff(lambda q: f.effective_potential(mp, lam, list({**at, key: q}.values())), at[key]))
@@ -111,7 +111,7 @@ def test_laws_of_motion(name: str, faster: float) -> None:
     "launch", [{"lam0": 0.9}, {"lam0": -0.7, "v0": 1.5, "direction": -1}, {"lam0": 0.2, "v0": 9.0}]
 )
 def test_what_states_consist_of(launch: dict[str, Any]) -> None:
-    """x, z, s, v and N against differences of solved motions."""
+    """Derivatives of x, z, s, v and N agree with differences of solved motions."""
     module, step = generated("ellipse"), 1e-5
     launch = {"a": 1.5, "b": 0.8, "g": 9.5, "m": 1.25, "v0": 0.0, **launch}
     launch["lam0"] -= 1.5
@@ -132,7 +132,7 @@ def test_what_states_consist_of(launch: dict[str, Any]) -> None:
 @pytest.mark.parametrize("lam0", [1.1, -1.1])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_from_rest(lam0: float, direction: int) -> None:
-    """The derivative by v0 is that of a launch in the direction that was asked for, with a little speed."""
+    """The derivative with respect to v0 is that of a launch with small speed in the requested direction."""
     module, speed = generated("circle"), 1e-7
     times = np.linspace(0.0, 3.0, 7)
     rest = module.solve(lam0=lam0, direction=direction)
@@ -144,7 +144,9 @@ def test_from_rest(lam0: float, direction: int) -> None:
 
 @pytest.mark.parametrize("lam0", [1.3, 1e-6])
 def test_a_spring_on_a_line(lam0: float) -> None:
-    """It is isochronous, so that derivatives of G vanish; with ds/dx = 5/4, x = x0 cos(w t) + 4 v0 sin(w t)/(5 w)."""
+    """The motion is isochronous, so that derivatives of G vanish; with ds/dx = 5/4, x = x0 cos(w t) + 4 v0 sin(w t)/(5
+    w).
+    """
     module = generated("line_spring")
     motion = module.solve(lam0=lam0)
     rate, times = np.pi / motion.half_period, np.linspace(0.0, 9.0, 12)
@@ -154,7 +156,7 @@ def test_a_spring_on_a_line(lam0: float) -> None:
 
 
 def test_shapes_and_names() -> None:
-    """One row for each name, of the shape of the times."""
+    """There is one row for each name, of the shape of the times."""
     motion = generated("circle").solve(lam0=1.0)
     assert motion.sensitivity(0.5).lam.shape == (5,)
     assert motion.sensitivity(np.zeros((2, 3)), ("g", "L")).x.shape == (2, 2, 3)
@@ -177,7 +179,7 @@ def test_shapes_and_names() -> None:
     ],
 )
 def test_places_alone(name: str, launch: dict[str, float]) -> None:
-    """The derivatives of places alone, which fits ask for, are those of sensitivities."""
+    """The derivatives of places alone, which fits use, are those of sensitivities."""
     motion, times = generated(name).solve(**launch), np.linspace(0.0, 2.0, 9)
     wanted = motion.sensitivity(times, ("g", "lam0")).lam
     np.testing.assert_allclose(motion.place_changes(times, ("g", "lam0")), wanted, rtol=1e-14, atol=1e-15)

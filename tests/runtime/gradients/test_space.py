@@ -1,4 +1,6 @@
-"""Gradients along space curves: the contact force and y against the textbook's formula, differentiated by SymPy."""
+"""Gradients of the contact force and of y along space curves agree with the textbook's formula, differentiated by
+SymPy.
+"""
 
 from types import ModuleType
 from typing import Any
@@ -16,12 +18,12 @@ HELIX = sp.Matrix([R * sp.cos(u), R * sp.sin(u), c * u])
 
 
 def generated(name: str) -> ModuleType:
-    """A module of the repository."""
+    """Return a module of the repository."""
     return load(str(ROOT / "generated" / f"{name}.py"), name)
 
 
 def contact_force(point: sp.Matrix) -> sp.Expr:
-    """The length of m (V**2 dt/ds + g (the upward direction less its part along t))."""
+    """Return the length of m (V**2 dt/ds + g (the upward direction less its part along t))."""
     rate = point.diff(u)
     ds = sp.sqrt(rate.dot(rate))
     t = rate / ds
@@ -37,7 +39,7 @@ def contact_force(point: sp.Matrix) -> sp.Expr:
     ],
 )
 def test_states(name: str, launch: Any, point: sp.Matrix, parameters: tuple[sp.Symbol, ...]) -> None:
-    """Contact force and y change as their formulas do with the place, the speed and the parameters."""
+    """Contact force and y change with place, speed and parameters as their formulas do."""
     module, names = generated(name), (*(str(p) for p in parameters), "lam0", "v0")
     known = {key: float(value) for key, value in module.PARAMETERS.items()} | launch
     motion, times = module.solve(**launch), np.array([0.1, 0.45, 0.8])
@@ -53,7 +55,7 @@ def test_states(name: str, launch: Any, point: sp.Matrix, parameters: tuple[sp.S
 
 
 def test_extremes() -> None:
-    """They change as the force does at the time at which they are reached."""
+    """Extremes change as the force does at the time at which they are reached."""
     motion, names = generated("viviani").solve(0.7, 1.0, a=1.5), ("a", "g", "m", "lam0", "v0")
     for quantity in ("normal_force_max", "normal_force_min"):
         at = getattr(motion, quantity).t

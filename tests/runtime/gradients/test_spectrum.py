@@ -1,4 +1,4 @@
-"""Fourier coefficients against closed forms, and against the motion itself."""
+"""Fourier coefficients agree with closed forms, and with the motion itself."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from gqm_sym.loading import load
 
 
 def circle(**launch: Any) -> Any:
-    """A motion on a circle."""
+    """Return a motion on a circle."""
     return load(str(ROOT / "generated" / "circle.py"), "circle").solve(L=1, g="9.81", **launch)
 
 
@@ -51,6 +51,6 @@ def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
 def test_what_has_no_coefficients(
     quantity: str, n: Any, launch: dict[str, Any], error: type[Exception], text: str
 ) -> None:
-    """One clear error each."""
+    """Each motion without coefficients gives one clear error."""
     with pytest.raises(error, match=text):
         circle(**{"lam0": 1.0, **launch}).fourier(quantity, n)

@@ -1,4 +1,4 @@
-"""Gradients in sweeps against closed forms, and against those of single motions."""
+"""Gradients in sweeps agree with closed forms, and with those of single motions."""
 
 from types import ModuleType
 
@@ -14,7 +14,7 @@ ULP = 2.0**-52
 
 
 def generated(name: str) -> ModuleType:
-    """A module of the repository."""
+    """Return a module of the repository."""
     return load(str(ROOT / "generated" / f"{name}.py"), name)
 
 
@@ -36,7 +36,9 @@ def test_pendulums() -> None:
 
 @pytest.mark.parametrize("name", ["ellipse", "rolling_circle", "double_well", "circle_spring"])
 def test_as_single_motions(name: str) -> None:
-    """For random launches in both directions, librations and circulations, by all names."""
+    """For random launches in both directions, sweeps and single motions agree on librations and circulations, for all
+    names.
+    """
     module, random = generated(name), np.random.default_rng(5)
     lam0, v0 = random.uniform(0.1, 1.4, 300), random.choice([0.0, 1.0, 3.0, 12.0], 300)
     direction = random.choice([1, -1], 300)
@@ -84,14 +86,14 @@ def test_turning_points_and_extremes_of_pendulums() -> None:
     lap, speed = lam0[~swings], v0[~swings]
     v = np.sqrt(speed**2 - 2 * g * length * (1 + np.cos(lap)))
     np.testing.assert_allclose(slowest[~swings, :2].T, [g * length * np.sin(lap) / v, speed / v], rtol=8 * ULP)
-    # At its turns a swinging body's N is m g cos(angle).
+    # At its turns the N of a swinging body is m g cos(angle).
     at_turn = [-mass * g * np.sin(lam0[swings]), -mass * v0[swings] / length, g * np.cos(angle)]
     np.testing.assert_allclose(lightest[swings].T, at_turn, rtol=8 * ULP)
 
 
 @pytest.mark.parametrize("name", ["ellipse", "double_well", "rolling_circle"])
 def test_extremes_of_random_launches(name: str) -> None:
-    """They are those of single motions, which improve the places of extremes otherwise; none is solved by itself."""
+    """Extremes are those of single motions, which improve their places in another way; none is solved singly."""
     module, random = generated(name), np.random.default_rng(9)
     lam0, v0 = random.uniform(0.1, 1.4, 40), random.choice([0.0, 1.0, 3.0, 12.0], 40)
     names = (*module.PARAMETERS, "lam0", "v0")
@@ -110,7 +112,7 @@ def test_extremes_of_random_launches(name: str) -> None:
 
 
 def test_gradients_where_a_horizon_cuts_the_motion() -> None:
-    """The largest speed up to then is that at the horizon, which compiled code does not have."""
+    """The largest speed before the horizon is that at the horizon, which compiled code does not compute."""
     found = generated("parabola").sweep("v_max", lam0=[1.0], t_max=0.01, gradient=("lam0", "g"))
     motion = generated("parabola").solve(1.0, t_max=0.01)
     wanted = list(motion.gradient("v_max", ("lam0", "g")).values())
@@ -119,7 +121,7 @@ def test_gradients_where_a_horizon_cuts_the_motion() -> None:
 
 
 def test_launches_without_a_value() -> None:
-    """They have no gradient; and without a request there is none."""
+    """Launches without a value have no gradient, and without a request there is none."""
     module = generated("parabola")
     found = module.sweep("half_period", lam0=[1.0, np.nan, 0.0], gradient="a")
     assert found.gradient.shape == (3, 1)
@@ -130,13 +132,13 @@ def test_launches_without_a_value() -> None:
 
 
 def test_what_has_no_gradient() -> None:
-    """One clear error."""
+    """A quantity without a gradient gives one clear error."""
     with pytest.raises(InputError, match="did you mean 'L'"):
         generated("circle").sweep("period", lam0=1.0, gradient="l")
 
 
 def test_quantities_of_solved_motions() -> None:
-    """On a ring times grow as the root of L/g, and change with the drag as b L/m does; each launch is solved."""
+    """On a ring times grow as the root of L/g and change with drag as b L/m does; each launch is solved."""
     amplitudes = np.array([0.3, 1.2, 2.5])
     names = ("L", "g", "b", "m")
     found = generated("circle_drag").sweep("time_at", lam0=amplitudes, lam=-0.1, b=0.2, m=2, gradient=names)
@@ -154,6 +156,6 @@ def test_quantities_of_solved_motions() -> None:
 
 
 def test_a_cluster_is_refused() -> None:
-    """The message says what to leave out."""
+    """A gradient on a cluster is refused, and the message says what to leave out."""
     with pytest.raises(InputError, match="leave one of them out"):
         generated("circle").sweep("period", lam0=1.0, gradient="L", client=object())

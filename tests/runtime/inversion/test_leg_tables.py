@@ -1,4 +1,4 @@
-"""Places and states on motions that lose energy, read by compiled code, against a spring with dry friction."""
+"""Places and states that compiled code reads on motions with losses agree with a spring with dry friction."""
 
 import math
 from pathlib import Path
@@ -21,14 +21,14 @@ START = 0.5
 
 @pytest.fixture(scope="module")
 def spring(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A level line with a spring and friction."""
+    """Return a level line with a spring and friction."""
     force = gqm.Gravity() + gqm.Potential("k*x**2/2") + gqm.CoulombFriction()
     folder: Path = tmp_path_factory.mktemp("legs")
     return gqm.build(gqm.derive(gqm.Curve.graph("0*x"), force), name="read_spring", folder=folder)
 
 
 def swing(time: float) -> tuple[float, float, float]:
-    """Place, velocity and arc length: on leg n a cosine of amplitude START - (2 n + 1) OFFSET about +-OFFSET."""
+    """Return place, velocity and arc length: on leg n a cosine of amplitude START - (2 n + 1) OFFSET about +-OFFSET."""
     with mp.workdps(30):
         rate, offset = mp.sqrt(mpf(K)), mpf(MU) * mpf("9.81") / mpf(K)
         n = int(mpf(time) * rate / mp.pi)
@@ -38,7 +38,9 @@ def swing(time: float) -> tuple[float, float, float]:
 
 
 def test_places_and_states(spring: ModuleType) -> None:
-    """Within rounding, on all legs, and within the bound; one time alone has the same digits."""
+    """Places and states are right within rounding, on all legs, and within the bound; one time alone has the same
+    digits.
+    """
     motion = spring.solve(START, k=K, mu=MU)
     t = np.random.default_rng(3).uniform(0.0, motion.t_end, 900)
     place, velocity, arc = np.array([swing(time) for time in t.tolist()]).T
@@ -73,7 +75,7 @@ def test_as_the_segments_have_it(spring: ModuleType) -> None:
 
 
 def test_legs_one_after_the_other(spring: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Times that grow are answered as if they were asked for at once; the record is made a few times."""
+    """Increasing times one by one give the answers of all at once, and the record is made a few times only."""
     made: list[int] = []
 
     def counted(*args: Any) -> Any:
@@ -97,7 +99,7 @@ def test_legs_one_after_the_other(spring: ModuleType, monkeypatch: pytest.Monkey
 
 
 def test_the_same_bits_on_any_number_of_cores(spring: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each time is answered by itself."""
+    """Each time is answered independently of the others."""
     motion = spring.solve(START, k=K, mu=MU)
     t = np.linspace(0.0, motion.t_end, 1000)
     whole = motion.lam(t), motion.state(t)

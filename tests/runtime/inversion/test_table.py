@@ -18,16 +18,17 @@ from gqm_sym.runtime.quadrature.time_panels import lay_panels, read_off_many
 ModuleOf = Callable[[str], ModuleType]
 
 ULP = 2.0**-52
-# Reading the panels back at the table's phase angle: units in the last place of the whole time, and of the last angle.
-# Worst measured 3 (at a cusp, and on a tiny swing of one segment).
+# The tolerances of the panels' time at the table's phase angle, in units in the last place of the whole time, and of
+# the last angle. Worst measured: 3 (at a cusp, and on a tiny swing of one segment).
 THERE_AND_BACK = 4.0
-# Phase angles against closed forms, in units of the last place of the last phase angle: measured 5.1.
+# The tolerance of phase angles against closed forms, in units in the last place of the last phase angle. Worst
+# measured: 5.1.
 ANOMALY = 6.0
-# What a first-level cache holds of rows of fifteen numbers is 300; at a cusp they shrink to the time's last place.
+# A first-level cache has room for 300 rows of fifteen numbers; at a cusp segments shrink to the time's last place.
 MOST_SEGMENTS = 300
 ROOT = 3e-8
 
-# Track, parameters, kind of stretch, its ends, V**2 at its start, and its last phase angle.
+# A row has the track, parameters, the kind of segment, its ends, V**2 at its start, and its last phase angle.
 STRETCHES: dict[str, tuple[str, dict[str, Any], int, float, float, float, float]] = {
     "pendulum": ("circle", {"L": 1}, TURN_TURN, -1.2, 1.2, 0.0, math.pi),
     "tiny swing": ("circle", {"L": 1}, TURN_TURN, -1e-8, 1e-8, 0.0, math.pi),
@@ -47,7 +48,7 @@ REACHABLE = [name for name in STRETCHES if name != "from rest to a cusp"]
 
 
 class Table:
-    """A stretch with its panels and its table."""
+    """A segment with its panels and its table."""
 
     def __init__(self, name: str, module_of: ModuleOf) -> None:
         track, given, kind, a, b, w, stop = STRETCHES[name]
@@ -60,16 +61,16 @@ class Table:
         self.whole, self.stop = float(self.marks[-1]), stop
 
     def phase_angles(self, t: Any, low: Any = None) -> Any:
-        """The table's phase angles."""
+        """Return the table's phase angles."""
         t = np.asarray(t, dtype=float)
         return phase_angles(*self.table[:6], t, np.zeros_like(t) if low is None else np.asarray(low))
 
     def times(self, phi: Any) -> Any:
-        """The panels' times."""
+        """Return the panels' times."""
         return read_off_many(self.edges, self.marks, self.terms, np.asarray(phi))
 
     def asked(self) -> Any:
-        """Times all over, dense at both ends and on both sides of every edge of panels and segments."""
+        """Return times everywhere, dense at both ends and on both sides of every edge of panels and segments."""
         share = np.concatenate(
             [np.linspace(0, 1, 2001), np.geomspace(1e-14, 0.5, 200), 1 - np.geomspace(1e-14, 0.5, 200)]
         )
@@ -80,7 +81,7 @@ class Table:
 
 @pytest.fixture(scope="module")
 def table_of(module_of: ModuleOf) -> Callable[[str], Table]:
-    """Give the table of a stretch by its name."""
+    """Return the table of a segment by its name."""
     made: dict[str, Table] = {}
 
     def table(name: str) -> Table:
@@ -93,7 +94,9 @@ def table_of(module_of: ModuleOf) -> Callable[[str], Table]:
 
 @pytest.mark.parametrize("name", REACHABLE)
 def test_the_time_at_the_phase_angle_is_the_time_asked_for(name: str, table_of: Callable[[str], Table]) -> None:
-    """There and back costs the rounding of the time and of the phase angle, near a separatrix and at a cusp too."""
+    """The time at the phase angle differs from the given one only by the rounding of both, also near a separatrix and
+    at a cusp.
+    """
     table = table_of(name)
     t = table.asked()
     phi = table.phase_angles(t)
@@ -106,7 +109,9 @@ def test_the_time_at_the_phase_angle_is_the_time_asked_for(name: str, table_of: 
 
 @pytest.mark.parametrize("name", REACHABLE)
 def test_the_phase_angle_grows_with_time(name: str, table_of: Callable[[str], Table]) -> None:
-    """From 0 to the last phase angle, never backwards by more than rounding, and in one piece across segments."""
+    """The phase angle grows from 0 to its last value, never backwards by more than rounding, and without jumps between
+    segments.
+    """
     table = table_of(name)
     phi = table.phase_angles(table.asked())
     rounding = (ROOT if "cusp" in name else ANOMALY * ULP) * table.stop
@@ -127,12 +132,13 @@ def test_a_table_is_small_and_knows_its_error(name: str, table_of: Callable[[str
     slots = table.whole * np.arange(len(index)) / len(index)
     assert (index <= np.searchsorted(ends, slots, side="right")).all()
     assert len(ends) <= MOST_SEGMENTS
-    # At a cusp the phase angle is as the root of the time left: as much is lost there as the time's last place takes.
+    # At a cusp the phase angle is the root of the remaining time, so that it has an error of the root of the time's
+    # last place.
     assert errors.max() <= (ROOT if "cusp" in name else 1e-14) * table.stop
 
 
 def test_the_tautochrone_s_table_against_its_closed_form(table_of: Callable[[str], Table]) -> None:
-    """Arc length oscillates harmonically: sin(u/2) = -sin(A/2) cos(w t) and u = -A cos(phi)."""
+    """Arc length oscillates harmonically, so that sin(u/2) = -sin(A/2) cos(w t) and u = -A cos(phi)."""
     table = table_of("tautochrone")
     t = np.linspace(0.0, table.whole, 101)[1:-1]
     phi = table.phase_angles(t)
@@ -144,7 +150,7 @@ def test_the_tautochrone_s_table_against_its_closed_form(table_of: Callable[[str
 
 
 def test_the_separatrix_s_table_against_its_closed_form(table_of: Callable[[str], Table]) -> None:
-    """Towards the hilltop what is left of the angle is 4 atan(exp(-w t)) = pi exp(-phi)."""
+    """Towards the hilltop the rest of the angle is 4 atan(exp(-w t)) = pi exp(-phi)."""
     table = table_of("to the hilltop")
     t = np.linspace(0.0, table.whole, 101)
     phi = table.phase_angles(t)
@@ -156,7 +162,7 @@ def test_the_separatrix_s_table_against_its_closed_form(table_of: Callable[[str]
 
 
 def test_a_time_of_two_doubles_is_taken_whole(table_of: Callable[[str], Table]) -> None:
-    """The low part moves the phase angle as it should: half a last place of the time twice is one of them."""
+    """The low part of the time moves the phase angle: half a last place of the time, twice, has the effect of one."""
     table = table_of("to the hilltop")
     t = np.linspace(0.1, 0.9, 9) * table.whole
     low = 1e-9 * t

@@ -1,4 +1,4 @@
-"""Equilibria against closed forms: places, stability and frequencies of small oscillations."""
+"""Equilibria agree with closed forms: places, stability and frequencies of small oscillations."""
 
 from math import cos, cosh, inf, isnan, pi, sqrt
 
@@ -8,23 +8,23 @@ import gqm_sym as gqm
 from gqm_sym.derivation import Model
 from gqm_sym.errors import ArgumentError, InputError, ParameterError, SolutionError
 
-# Of places and frequencies; the worst measured is 8e-15.
+# The tolerance of places and frequencies. Worst measured: 8e-15.
 TOLERANCE = 1e-13
 
 
 def model(curve: gqm.Curve, force: gqm.Kernel | None = None) -> Model:
-    """Derive a motion, under gravity if nothing else is said."""
+    """Derive a motion, under gravity unless another force is given."""
     return gqm.derive(curve, gqm.Gravity() if force is None else force)
 
 
 def hoop() -> Model:
-    """A bead on a hoop that turns about its vertical diameter; angle from the bottom."""
+    """Return a bead on a hoop that rotates about its vertical diameter, with the angle from the bottom."""
     curve = gqm.Curve.parametric(x="R*sin(q)", z="-R*cos(q)", parameter="q", period="2*pi", parameters={"R": "1/2"})
     return model(curve, gqm.Gravity() + gqm.RotatingFrame())
 
 
 def test_a_pendulum() -> None:
-    """The bottom is stable with sqrt(g/L), the top is not."""
+    """The bottom is stable with the frequency sqrt(g/L), and the top is not stable."""
     pendulum = model(gqm.families.circle(L=2))
     bottom, top = pendulum.equilibria(g=4)
     assert bottom.lam == 0.0
@@ -37,7 +37,9 @@ def test_a_pendulum() -> None:
 
 @pytest.mark.parametrize("spin", [3.0, 4.0, 5.0, 12.0])
 def test_a_rotating_hoop(spin: float) -> None:
-    """Below the critical speed the bottom is stable; above it two places are, with Omega*sin(q0)."""
+    """Below the critical speed the bottom is stable; above it two other places are, with the frequency
+    Omega*sin(q0).
+    """
     found = hoop().equilibria(Omega=spin, g=8)
     share = 8.0 / (0.5 * spin**2)  # cos(q0)
     stable = [one for one in found if one.stable]
@@ -55,7 +57,7 @@ def test_a_rotating_hoop(spin: float) -> None:
 
 @pytest.mark.parametrize("height", ["x**2", "(x - 3)**2/7", "1000*x**2 + x", "x**2/1000000"])
 def test_a_parabola_on_the_open_line(height: str) -> None:
-    """One equilibrium, wherever it lies, with the square root of g*z''."""
+    """There is one equilibrium, wherever it lies, with the frequency sqrt(g*z'')."""
     (only,) = model(gqm.Curve.graph(height)).equilibria()
     slopes = {"x**2": (0.0, 2.0), "(x - 3)**2/7": (3.0, 2 / 7), "1000*x**2 + x": (-5e-4, 2000.0)}
     place, bend = slopes.get(height, (0.0, 2e-6))
@@ -64,7 +66,7 @@ def test_a_parabola_on_the_open_line(height: str) -> None:
 
 
 def test_a_double_well_and_a_quartic() -> None:
-    """Two wells beside a hill; where the force grows with the third power small oscillations are ever slower."""
+    """Two wells lie beside a hill; with a force of third power, small oscillations become slower without limit."""
     left, hill, right = model(gqm.Curve.graph("x**4 - x**2")).equilibria()
     assert (left.stable, hill.stable, right.stable) == (True, False, True)
     assert (left.lam, right.lam) == pytest.approx((-sqrt(0.5), sqrt(0.5)), rel=TOLERANCE)
@@ -98,13 +100,13 @@ def test_losses_do_not_count() -> None:
 
 
 def test_rolling_slows_down() -> None:
-    """A ball has sqrt(g*z''/(1 + beta))."""
+    """A rolling ball has the frequency sqrt(g*z''/(1 + beta))."""
     (only,) = model(gqm.Curve.graph("x**2/2"), gqm.Gravity() + gqm.Rolling(beta="2/5")).equilibria()
     assert only.frequency == pytest.approx(sqrt(9.81 / 1.4), rel=TOLERANCE)
 
 
 def test_infinitely_many_want_a_range() -> None:
-    """A wave on the open line has too many; between two places they are listed, and the ends are checked."""
+    """A wave on the open line has too many equilibria; between two places they are listed, and the ends are checked."""
     wave = model(gqm.Curve.graph("sin(x)"))
     with pytest.raises(SolutionError, match="between"):
         wave.equilibria()
@@ -118,7 +120,7 @@ def test_infinitely_many_want_a_range() -> None:
 
 
 def test_nothing_rests_on_a_slope_and_anything_on_a_plane() -> None:
-    """An inclined line has no equilibrium, a level one none that could be listed."""
+    """An inclined line has no equilibrium, and a level one none that could be listed."""
     assert model(gqm.Curve.graph("x/2")).equilibria() == ()
     assert model(gqm.Curve.graph("exp(x)")).equilibria() == ()
     with pytest.raises(SolutionError, match="rests anywhere"):
@@ -126,14 +128,14 @@ def test_nothing_rests_on_a_slope_and_anything_on_a_plane() -> None:
 
 
 def test_a_catenary() -> None:
-    """The bottom of z = c*cosh(x/c): g/c, for any c."""
+    """At the bottom of z = c*cosh(x/c) the square of the frequency is g/c, for any c."""
     (only,) = model(gqm.families.catenary(c="1/3")).equilibria()
     assert only.frequency == pytest.approx(sqrt(9.81 * 3), rel=TOLERANCE)
     assert cosh(only.lam) == pytest.approx(1.0)
 
 
 def test_parameters_are_checked() -> None:
-    """An unknown one is refused with the names; one without a value is asked for."""
+    """An unknown parameter is refused with the list of names, and a missing value is asked for."""
     pendulum = model(gqm.Curve.parametric(x="L*cos(u)", z="L*sin(u)", parameter="u"))
     with pytest.raises(ArgumentError, match="did you mean 'L'"):
         pendulum.equilibria(l=1)

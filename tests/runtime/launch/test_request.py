@@ -1,4 +1,4 @@
-"""Refusals of launches, arguments that may be left out, and the types in which arguments may be given."""
+"""Wrong launches are refused, some arguments may be left out, and arguments may be given in several types."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,18 +9,18 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.cli import show
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import GQMError, InputError, SolutionError
 
 
 @pytest.fixture(scope="module")
 def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead on a circle of radius L, which has no default."""
+    """Return a bead on a circle of radius L, which has no default."""
     return module_of("circle")
 
 
 @pytest.fixture(scope="module")
 def arch(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """One arch of a cycloid: places from 0 to 2 pi."""
+    """Return one arch of a cycloid, with places from 0 to 2 pi."""
     return module_of("cycloid_arch")
 
 
@@ -39,19 +39,35 @@ def arch(module_of: Callable[[str], ModuleType]) -> ModuleType:
     ],
 )
 def test_what_a_launch_is_refused_for(given: dict[str, Any], message: str, circle: ModuleType) -> None:
-    """Each with its name, what is wrong, and what would be right."""
+    """Each refusal names the argument, what is wrong, and what would be right."""
     with pytest.raises(InputError, match=f"^{message}"):
         circle.solve(**({"lam0": 1, "L": 1} | given))
 
 
+@pytest.mark.parametrize(
+    ("called", "given", "message"),
+    [
+        ("pass1", {}, "lam0: not given; it is the value of lam to launch from"),
+        ("pass1", {"lam0": 1}, "lam: not given; pass one place or many, as values of lam"),
+        ("solve", {}, "lam0: not given; it is the value of lam to launch from"),
+        ("sweep", {}, "quantity: must be one of half_period, .* got None"),
+        ("sweep", {"quantity": "period"}, r"lam0: has no default and was not given; pass lam0=\.\.\."),
+    ],
+)
+def test_a_call_without_what_it_needs(called: str, given: dict[str, Any], message: str, circle: ModuleType) -> None:
+    """The message says what is missing."""
+    with pytest.raises(GQMError, match=f"^{message}"):
+        getattr(circle, called)(**given, L=1)
+
+
 def test_a_place_beyond_the_domain(arch: ModuleType) -> None:
-    """The message has the domain."""
+    """The message contains the domain."""
     with pytest.raises(InputError, match=r"lam0: must lie in the domain \[0\.0, 6\.28.*\] of lam, got 7"):
         arch.solve(lam0=7, R=1)
 
 
 def test_a_place_without_a_curve(tmp_path: Path) -> None:
-    """Where the coordinates are no numbers nothing can be launched."""
+    """No body can be launched at a place whose coordinates are no numbers."""
     module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
     with pytest.raises(InputError, match=r"lam0: the curve has no point at x = -1\.0 with these"):
         module.solve(lam0=-1)
@@ -67,12 +83,12 @@ def test_a_sweep_is_refused_for_the_same(circle: ModuleType) -> None:
 
 @pytest.mark.parametrize("digits", [0, 2.5, "ten", 10**9])
 def test_digits_that_cannot_be_had(digits: Any, circle: ModuleType) -> None:
-    """They are counted, and there is a last one."""
+    """There is a largest number of digits, and a request for more names it."""
     with pytest.raises(InputError, match="period_to: digits must be a whole number from 1 to"):
         circle.solve(lam0=1, L=1).period_to(digits)
 
 
-# What is said of a motion
+# Printed motions
 
 
 def said(motion: Any) -> str:
@@ -81,7 +97,9 @@ def said(motion: Any) -> str:
 
 
 def test_what_is_said_of_each_kind(circle: ModuleType, arch: ModuleType) -> None:
-    """Only what the motion has: a round no turning points, a body at rest no legs, a way out an end."""
+    """The commands print only what the motion has: no turning points of a round, no legs of a body at rest, the end of
+    an open motion.
+    """
     swing = said(circle.solve(lam0=1, L=1))
     assert "half period     " in swing
     assert "turning points  lam = " in swing

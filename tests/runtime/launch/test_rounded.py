@@ -1,4 +1,4 @@
-"""Curves that are not smooth are known by doubles only: what is decided next to an equilibrium, to rounding."""
+"""Curves that are not smooth are known in doubles only, and decisions next to an equilibrium are right to rounding."""
 
 from math import asinh, sqrt
 from pathlib import Path
@@ -9,34 +9,35 @@ import pytest
 
 import gqm_sym as gqm
 
-# z = -3 x**2/4 right of the hilltop and -x**2/4 left of it: the curvature jumps at the equilibrium. Launched from 0.8.
+# The curve is z = -3 x**2/4 right of the hilltop and -x**2/4 left of it, so that the curvature jumps at the
+# equilibrium; the launch is at 0.8.
 X0, Z0, G = 0.8, -0.48, 9.81
-# What rounding of the speed leaves of a place and a time near the top.
+# The accuracy of a place and a time near the top that the rounding of the speed allows.
 PLACE = 2e-8
 
 
 @pytest.fixture(scope="module")
 def hill(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The broken hill under gravity."""
+    """Return the hill with a break, under gravity."""
     track = gqm.Curve.implicit("z + x**2/2 + x*abs(x)/4", start=("4/5", "-12/25"))
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="broken_hill", folder=tmp_path_factory.mktemp("broken"))
 
 
 def way(x: float) -> float:
-    """Arc length from x to the top: of a parabola, in closed form."""
+    """Return the arc length from x to the top of a parabola, in closed form."""
     u = 1.5 * x
     return (u * sqrt(1 + u * u) + asinh(u)) / 3.0
 
 
 def time_to(x: float) -> float:
-    """The time from 0.8 to x with V**2 = 3 g x**2/2: in closed form."""
+    """Return the time from 0.8 to x with V**2 = 3 g x**2/2, in closed form."""
     one, two = (sqrt(1 + u * u) - asinh(1 / u) for u in (1.5 * X0, 1.5 * x))
     return (one - two) / sqrt(1.5 * G)
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-15, -1e-15])
 def test_the_speed_that_just_reaches_the_top(hill: ModuleType, off: float) -> None:
-    """It gets there, to rounding, after any time; where it is so late, doubles cannot tell."""
+    """With the speed that just reaches the top, the body comes as near as doubles can resolve, after any time."""
     motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 + off))
     assert motion.kind == "asymptotic"
     assert motion.t_end == np.inf
@@ -48,7 +49,7 @@ def test_the_speed_that_just_reaches_the_top(hill: ModuleType, off: float) -> No
 
 @pytest.mark.parametrize("short", [1e-4, 1e-6, 1e-9, 1e-12])
 def test_a_little_slower_it_turns(hill: ModuleType, short: float) -> None:
-    """Where the height is spent: V0**2 = 2 g (z - z0) on the parabola."""
+    """A slightly slower body turns at the height of its energy, V0**2 = 2 g (z - z0) on the parabola."""
     motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 - short))
     assert motion.kind == "transit"
     x = sqrt(-Z0 * short * (2 - short) / 0.75)
@@ -58,7 +59,7 @@ def test_a_little_slower_it_turns(hill: ModuleType, short: float) -> None:
 
 @pytest.mark.parametrize("more", [1e-4, 1e-6, 1e-9])
 def test_a_little_faster_it_passes(hill: ModuleType, more: float) -> None:
-    """Over the top, down the other side."""
+    """A slightly faster body passes the top and goes down the other side."""
     motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 + more))
     assert motion.kind == "transit"
     assert motion.turning_points == ()
@@ -70,7 +71,7 @@ def test_a_little_faster_it_passes(hill: ModuleType, more: float) -> None:
 
 
 def test_released_on_top_it_rests(hill: ModuleType) -> None:
-    """Where it is level to rounding; beside it, it falls, to the side that it is on."""
+    """A body released on top stays if it is level to rounding there; beside the top it falls to its own side."""
     assert hill.solve(way(X0)).kind == "rest"
     for side in (1, -1):
         motion = hill.solve(way(X0) - side * 1e-3)
@@ -80,7 +81,7 @@ def test_released_on_top_it_rests(hill: ModuleType) -> None:
 
 @pytest.mark.parametrize("size", [1.0, 1e-8, 1e8])
 def test_a_break_is_seen_at_any_size(size: float, tmp_path: Path) -> None:
-    """The curvature jumps once, at the top, whether the hill is measured in its own length or not."""
+    """The curvature jumps once, at the top, whatever the size of the hill."""
     start = tuple(f"{c}*{size:.0e}" for c in ("4/5", "-12/25"))
     track = gqm.Curve.implicit(f"z + (x**2/2 + x*abs(x)/4)/{size:.0e}", start=start)
     module = gqm.build(gqm.derive(track, gqm.Gravity()), name="hill_of_a_size", folder=tmp_path)

@@ -1,4 +1,4 @@
-"""Load maps over arrays: digits where heights cancel, memory that is used again, and places cut into parts."""
+"""Load maps over arrays keep their digits where heights cancel, reuse memory, and divide places into parts."""
 
 from collections.abc import Callable
 from functools import partial
@@ -20,16 +20,16 @@ from gqm_sym.runtime.launch.speed import BLOCK
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Roundings (2**-53) of the larger of V**2 at launch and its change: worst measured 14.1 (circle).
-# By divided differences alone it is the same.
+# The tolerance in roundings (2**-53) of the larger of V**2 at launch and its change. Worst measured: 14.1 (circle),
+# also by divided differences alone.
 ROUNDINGS = 15
 LEGION = LARGE // 8
-# Roundings (2**-53) of the rows of a spiral: worst measured 2.43 (curvature).
+# The tolerance in roundings (2**-53) of the rows of a spiral. Worst measured: 2.43 (curvature).
 SPIRAL = 3
 
 
 def drops(name: str, a: mpf, x: mpf) -> mpf:
-    """Give how far V**2 falls from a to x, g = 9.81, by the closed form of the difference of heights."""
+    """Return the decrease of V**2 from a to x, with g = 9.81, by the closed form of the difference of heights."""
     g = mpf("9.81")
     if name != "parabola":
         return 4 * g * mp.sin((x - a) / 2) * mp.sin((x + a) / 2)
@@ -41,14 +41,16 @@ TRACKS: dict[str, dict[str, Any]] = {"circle": {"L": 1}, "cycloid_plus": {"R": 1
 
 @pytest.fixture(scope="module")
 def circle(module_of: ModuleOf) -> Callable[..., Any]:
-    """Give the load map of a circle."""
+    """Return the load map of a circle."""
     return partial(module_of("circle").pass1, L=1)
 
 
 @pytest.mark.parametrize("v0", [0.0, 1e-4, 0.3, 5.0])
 @pytest.mark.parametrize("track", TRACKS)
 def test_v2_keeps_its_digits(track: str, v0: float, module_of: ModuleOf) -> None:
-    """Next to the launch place, on the other side of the well, and far from both: from rest, slowly and fast."""
+    """V**2 keeps its digits next to the launch, on the other side of the well, and far from both: from rest, slowly and
+    fast.
+    """
     module, random = module_of(track), np.random.default_rng(3)
     for lam0 in (0.0, 1e-3, 0.5, 1.4, 2.9):
         gaps = 10.0 ** random.uniform(-14, 0, 40) * random.choice([-1, 1], 40)
@@ -62,14 +64,14 @@ def test_v2_keeps_its_digits(track: str, v0: float, module_of: ModuleOf) -> None
 
 
 def test_at_launch_v2_is_that_of_the_launch(circle: Callable[..., Any]) -> None:
-    """To the last bit, whatever the height."""
+    """At launch V**2 is that of the launch to the last bit, whatever the height."""
     for lam0 in (0.1, 1.2, 2.7):
         for v0 in (0.0, 0.7, 30.0):
             assert (circle(np.full(3, lam0), lam0, v0).v2 == v0**2).all()
 
 
 def test_a_place_is_what_it_is_alone(circle: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither its neighbours, nor threads, nor the way into memory change a bit of it; from a list neither."""
+    """A place has the same bits whatever its neighbours, the threads and the way into memory, and from a list too."""
     lam = np.linspace(-3.0, 3.0, LEGION + 3)
     whole = circle(lam, 1.2, 0.4)
     for part in (slice(5, 5 + 3 * BLOCK), slice(LEGION - 40, LEGION + 3), slice(77, 78)):
@@ -84,7 +86,7 @@ def test_a_place_is_what_it_is_alone(circle: Callable[..., Any], monkeypatch: py
 @pytest.mark.parametrize("size", [1, BLOCK + 1, LEGION + 5])
 @pytest.mark.parametrize("offset", range(0, LINE, 3))
 def test_arrays_are_filled_again(size: int, offset: int, circle: Callable[..., Any]) -> None:
-    """Wherever they lie in memory, to their ends and no further."""
+    """Arrays are filled from end to end and not beyond, wherever they lie in memory."""
     lam = np.linspace(-3.0, 3.0, size)
     want = circle(lam, 0.5, 1.0)
     memory = np.full((6, size + 2 * LINE), 7.0)
@@ -97,7 +99,9 @@ def test_arrays_are_filled_again(size: int, offset: int, circle: Callable[..., A
 
 
 def test_nothing_waits_between_streamed_rows() -> None:
-    """The loop streams by itself: arrays are counted before it, as that locks, and what locks waits for the memory."""
+    """The loop streams without interruption; arrays are counted before it, because that locks and would wait for the
+    memory.
+    """
 
     @njit(error_model="numpy")
     def three(to: np.ndarray, given: np.ndarray) -> None:
@@ -115,7 +119,7 @@ def test_nothing_waits_between_streamed_rows() -> None:
 
 
 def test_a_result_is_filled_again(circle: Callable[..., Any]) -> None:
-    """Of any shape, of a dissipative model too; what was there is gone."""
+    """A result of any shape is filled again, of a dissipative model too, and its earlier contents are gone."""
     lam = np.linspace(-3.0, 3.0, 24).reshape(2, 3, 4)
     field = circle(lam, 0.5, 1.0)
     again = circle(lam.T.copy().T, 1.5, 0.0, out=field)
@@ -127,7 +131,7 @@ def test_a_result_is_filled_again(circle: Callable[..., Any]) -> None:
 
 
 def test_a_dissipative_result_is_filled_again(generated_folder: Any) -> None:
-    """With what a new one would hold."""
+    """A dissipative result has the contents of a new one."""
     track = gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u")
     module = gqm.build(
         gqm.derive(track, gqm.Gravity() + gqm.QuadraticDrag()), name="loads_drag", folder=generated_folder
@@ -141,7 +145,7 @@ def test_a_dissipative_result_is_filled_again(generated_folder: Any) -> None:
 
 
 def bad(which: int, array: Any) -> list[Any]:
-    """Give six arrays of five places, one of them another."""
+    """Return six arrays of five places, one of them wrong."""
     return [array if k == which else np.empty(5) for k in range(6)]
 
 
@@ -166,14 +170,14 @@ LAM = np.linspace(0.0, 1.0, 5)
     ],
 )
 def test_arrays_that_will_not_do_are_refused(out: Any, said: str, circle: Callable[..., Any]) -> None:
-    """By name, with what would be right, before anything is written."""
+    """Wrong arrays are refused by name, with what would be right, before anything is written."""
     with pytest.raises(InputError, match=said):
         circle(LAM, 0.5, 1.0, out=out)
     assert (np.linspace(0.0, 1.0, 5) == LAM).all()
 
 
 def test_a_spiral_over_its_sizes(generated_folder: Any) -> None:
-    """All rows to some roundings, where the radius is 1e-130, and where it is 1e130 and the curvature so small."""
+    """All rows of a spiral are right to some roundings, for radii from 1e-130 to 1e130."""
     module = gqm.build(
         gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="loads_spiral", folder=generated_folder
     )
@@ -209,7 +213,9 @@ U, A = sp.symbols("u a", real=True)
     ],
 )
 def test_sizes_of_what_is_rounded(form: sp.Expr, size: sp.Expr | None) -> None:
-    """Sums by their parts, waves by the rounding of their argument too; nothing is said of other functions."""
+    """Sizes of sums are those of their parts; for waves the rounding of their argument counts too, and other functions
+    have none.
+    """
     found = rounded_size(form, U)
     if size is None:
         assert found is None
@@ -220,7 +226,9 @@ def test_sizes_of_what_is_rounded(form: sp.Expr, size: sp.Expr | None) -> None:
 
 
 def test_a_potential_of_unknown_roundings(generated_folder: Any) -> None:
-    """It is told by divided differences alone: V**2 = 2 g log1p((x - a)/a) here, to its last digits."""
+    """If roundings are unknown, V**2 comes from divided differences alone: here V**2 = 2 g log1p((x - a)/a), to its
+    last digits.
+    """
     model = gqm.derive(gqm.Curve.graph("-log(x)", parameter="x", domain=("1/100", None)), gqm.Gravity())
     module = gqm.build(model, name="loads_log", folder=generated_folder)
     assert module.MODEL.load_map is None

@@ -1,4 +1,4 @@
-"""The first turning point each way is found, however narrow the barrier; what ends a walk is named."""
+"""The search finds the first turning point in each direction, however narrow the barrier, and names what ends it."""
 
 import math
 from collections.abc import Callable
@@ -22,9 +22,9 @@ from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, STEPS_SPENT, TURN
 ModuleOf = Callable[[str], ModuleType]
 
 G = 9.81
-# A turning point on a slope of order one: its last places, and those of V**2 over its slope.
+# The tolerance of a turning point on a slope of order one: its last places, and those of V**2 over its slope.
 TURN_PLACE = 1e-13
-# Sampled truth: places closer to zero than this share of v0**2 are left to the exact tests.
+# Sampled values closer to zero than this share of v0**2 are left to the exact tests.
 CLEAR = 1e-6
 
 FIELDS = {
@@ -36,7 +36,7 @@ FIELDS = {
 
 @pytest.fixture(scope="session")
 def field(generated_folder: Any) -> Callable[[str], ModuleType]:
-    """Give the module of a landscape z(x) by its name."""
+    """Return the module of a landscape z(x) by its name."""
     built: dict[str, ModuleType] = {}
 
     def module(name: str) -> ModuleType:
@@ -49,7 +49,7 @@ def field(generated_folder: Any) -> Callable[[str], ModuleType]:
 
 
 def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: float, **given: float) -> Any:
-    """Return the result of a walk from a launch: its end, and the places before and beyond."""
+    """Return the result of a search from a launch: its end, and the places before and beyond."""
     formulas = module.MODEL
     numbers = formulas.numbers(tuple((formulas.parameters | given).values()))
     functions = bind(formulas, numbers, read_launch(formulas, numbers, LaunchRequest(lam0, v0, direction)))
@@ -64,10 +64,11 @@ def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: floa
 def test_no_narrow_barrier_is_jumped(
     width: float, centre: float, above: float, field: Callable[[str], ModuleType]
 ) -> None:
-    """A bump a thousandth to a millionth wide stops the body if its top is just above the energy, not if just below.
+    """A bump a thousandth to a millionth wide stops the body if its top is just above the energy, and not if it is just
+    below.
 
-    On the floor z = 0 a bump of height h is passed if v0**2 > 2 g h, and else turns the body where
-    h exp(-((x - c)/w)**2) = v0**2/(2 g).
+    On the floor z = 0 a bump of height h is passed if v0**2 > 2 g h, and else turns the body where h exp(-((x -
+    c)/w)**2) = v0**2/(2 g).
     """
     start, height, side = -4.0 * math.copysign(1.0, centre), 1.0, int(math.copysign(1.0, centre))
     bump = {"a": 0.0, "h": height, "c": centre, "w": width}
@@ -79,7 +80,7 @@ def test_no_narrow_barrier_is_jumped(
         level = mpf(v0) ** 2 / (2 * mpf("9.81"))
         away = mp.sqrt(-mp.log(level))
         truth = mpf(centre) - side * mpf(width) * away
-        # Rounding of the energy over the slope there, and of the place.
+        # The tolerance is the rounding of the energy over the slope there, and that of the place.
         allowed = 2.0**-52 * (8 + width / float(away))
         assert what == TURN
         assert abs(mpf(place) - truth) <= allowed
@@ -87,7 +88,9 @@ def test_no_narrow_barrier_is_jumped(
 
 @pytest.mark.parametrize("width", [1e-3, 1e-6])
 def test_a_motion_is_held_by_a_narrow_barrier(width: float, field: Callable[[str], ModuleType]) -> None:
-    """In a wide bowl with a needle in it, the swing ends at the needle or goes on to the far side, as energy says."""
+    """In a wide bowl with a narrow spike the swing ends at the spike or goes on to the far side, as the energy
+    determines.
+    """
     bump = {"a": 1, "h": 3, "c": 1, "w": width}
     held = field("bump").solve(lam0=-2, v0=math.sqrt(2 * G * 1.499), direction=1, **bump)
     free = field("bump").solve(lam0=-2, v0=math.sqrt(2 * G * 1.501), direction=1, **bump)
@@ -98,9 +101,9 @@ def test_a_motion_is_held_by_a_narrow_barrier(width: float, field: Callable[[str
 
 
 def first_turn(height: Callable[[Any], Any], start: float, v0: float, direction: int, reach: float) -> float | None:
-    """The first place where a dense sample of V**2 is below zero, narrowed down; infinite if none.
+    """Return the first place where a dense sample of V**2 is below zero, narrowed down; infinite if there is none.
 
-    None where V**2 comes so close to zero without crossing that a sample proves nothing.
+    The result is None if V**2 comes so close to zero without crossing that a sample proves nothing.
     """
     x = start + direction * np.linspace(0.0, reach, 400_001)
     w = v0**2 - 2 * G * (height(x) - height(start))
@@ -143,7 +146,7 @@ def test_random_landscapes(
     v0: float,
     direction: int,
 ) -> None:
-    """On random waves and polynomials the walk ends where a dense sample of V**2 first goes below zero."""
+    """On random waves and polynomials the search ends where a dense sample of V**2 first goes below zero."""
     a, b, c, d, f = abcdf
     heights = {
         "waves": lambda x: a * np.cos(x) + b * np.cos(2 * x + c) + d * np.cos(5 * x + f),
@@ -153,7 +156,7 @@ def test_random_landscapes(
     truth = first_turn(heights[name], start, v0, direction, reach)
     given_ = {"a": a, "b": b, "c": c, "d": d, "f": f}
     what, place, _ = walk(field(name), start, v0, direction, reach, **given_)
-    assume(truth is not None)  # else the sample cannot tell
+    assume(truth is not None)  # otherwise the sample cannot decide
     if math.isinf(truth):
         assert what == LIMIT
     else:
@@ -165,7 +168,7 @@ def test_random_landscapes(
 
 @pytest.mark.parametrize("gap", ["1e-6", "1e-10", "1e-14", "1e-20", "1e-40"])
 def test_tops_that_all_but_touch_the_energy(gap: str, module_of: ModuleOf) -> None:
-    """A pendulum with v0**2 = 4 g L (1 -+ gap) turns short of the top or goes round; without a gap, neither."""
+    """A pendulum with v0**2 = 4 g L (1 -+ gap) turns before the top or goes round; without a gap, it does neither."""
     circle = module_of("circle")
     short = circle.solve(lam0=0, v0=f"2*sqrt(9.81*(1 - {gap}))", L=1)
     round_ = circle.solve(lam0=0, v0=f"2*sqrt(9.81*(1 + {gap}))", L=1)
@@ -178,7 +181,7 @@ def test_tops_that_all_but_touch_the_energy(gap: str, module_of: ModuleOf) -> No
 
 @pytest.mark.parametrize("far", [1e2, 1e5, 1e8])
 def test_a_walk_without_end_goes_on(far: float, module_of: ModuleOf) -> None:
-    """Up a gentle line the turn is found wherever it is; down the line the walk is spent with V**2 > 0."""
+    """Up a gentle line the turn is found wherever it is; down the line the search exhausts its steps with V**2 > 0."""
     line = module_of("line")
     v0 = 10.0
     slope = v0**2 / (2 * G * far)
@@ -190,7 +193,7 @@ def test_a_walk_without_end_goes_on(far: float, module_of: ModuleOf) -> None:
 
 
 def test_the_end_of_the_domain_is_the_limit(module_of: ModuleOf) -> None:
-    """A walk that meets nothing ends exactly at the reach it was given."""
+    """A search that finds nothing ends exactly at the given length."""
     well = module_of("frequency")
     assert walk(well, -1.0, 9.0, 1, 6.0, a=1.0) == (LIMIT, 5.0, 5.0)
     assert walk(well, -1.0, 9.0, -1, 4.0, a=1.0) == (LIMIT, -5.0, -5.0)
@@ -198,7 +201,7 @@ def test_the_end_of_the_domain_is_the_limit(module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize(("start", "cusp", "direction"), [(2.0, 0.0, -1), (4.0, 2 * math.pi, 1), (6.2831853, 0.0, -1)])
 def test_a_cusp_stops_the_walk(start: float, cusp: float, direction: int, module_of: ModuleOf) -> None:
-    """On a cycloid the walk ends at the cusp where the arches meet, from either side, though V**2 goes on."""
+    """On a cycloid the search ends at the cusp where the arches meet, from either side, though V**2 continues."""
     what, near, far = walk(module_of("cycloid_arch"), start, 20.0, direction, 7.0, R=1.0)
     assert what == CUSP
     assert (near - cusp) * direction <= 4e-15
@@ -206,7 +209,7 @@ def test_a_cusp_stops_the_walk(start: float, cusp: float, direction: int, module
 
 
 def test_a_curve_that_is_not_there(generated_folder: Path) -> None:
-    """Parameters that make a coordinate the root of something negative: an error that says so, from rest and moving."""
+    """If a parameter makes a coordinate the root of a negative number, an error says so, from rest and moving."""
     ellipse = gqm.Curve.parametric(
         x="cos(E) - ecc", z="sqrt(1 - ecc**2)*sin(E)", parameter="E", period="2*pi", parameters={"ecc": "3/5"}
     )
@@ -218,7 +221,7 @@ def test_a_curve_that_is_not_there(generated_folder: Path) -> None:
 
 @pytest.mark.parametrize("middle", [-2, 2])
 def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -> None:
-    """First steps are shares of the domain's length, wherever it lies."""
+    """The first steps are shares of the domain's length, wherever it lies."""
     curve = gqm.Curve.graph(f"(x - {middle})**2", parameter="x", domain=(middle - 1, middle + 1))
     valley = gqm.build(gqm.derive(curve, gqm.Gravity()), name="valley_aside", folder=tmp_path)
     motion = valley.solve(middle + 0.5, 0.0)

@@ -1,4 +1,6 @@
-"""Where motions that lose energy end, and how far they are followed: falls, singular points, tops, rest."""
+"""Motions that lose energy end at the right places and are followed far enough: falls, singular points, tops and
+rest.
+"""
 
 import math
 from collections.abc import Callable
@@ -22,7 +24,7 @@ Build = Callable[..., ModuleType]
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build a module once."""
+    """Return a module, built once."""
     folder, built = tmp_path_factory.mktemp("ends"), {}
 
     def module(name: str, curve: Any, force: Any) -> ModuleType:
@@ -35,13 +37,15 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 @pytest.fixture(scope="module")
 def slope(build: Build) -> ModuleType:
-    """A line that falls by 45 degrees, with friction."""
+    """Return a line that falls by 45 degrees, with friction."""
     return build("slope", gqm.Curve.graph("-x"), gqm.CoulombFriction(mu="mu"))
 
 
 @pytest.mark.parametrize("t", [1.0, 1e3, 1e8, 1e20])
 def test_a_fall_with_friction(t: float, slope: ModuleType) -> None:
-    """There x = g (1 - mu) t**2/4 for as long as anyone asks: fast is not at rest, however slowly the speed grows."""
+    """On the slope x is g (1 - mu) t**2/4 for any time, and a fast body whose speed grows slowly is not taken for one
+    at rest.
+    """
     motion = slope.solve(lam0=0, mu=0.1)
     with mp.workdps(30):
         exact = mpf("9.81") * (1 - mpf("0.1")) * mpf(t) ** 2 / 4
@@ -51,7 +55,7 @@ def test_a_fall_with_friction(t: float, slope: ModuleType) -> None:
 
 
 def test_a_fall_leaves_the_range_of_doubles(slope: ModuleType) -> None:
-    """With room to spare; a place above is never met on the way."""
+    """A fall ends well before its numbers leave the range of doubles; a place above the launch is never reached."""
     motion = slope.solve(lam0=0, mu=0.1)
     for question in (lambda: motion.lam(1e60), lambda: motion.time_at(-1.0)):
         with pytest.raises(SolutionError, match="the motion leaves the range of doubles at x = "):
@@ -59,7 +63,9 @@ def test_a_fall_leaves_the_range_of_doubles(slope: ModuleType) -> None:
 
 
 def test_rest_and_what_comes_after(slope: ModuleType) -> None:
-    """Uphill v0/(g (1 + mu) sin 45) long; with mu > 1 the body stays there, and no later time is part of the motion."""
+    """Uphill the body moves for v0/(g (1 + mu) sin 45); with mu > 1 it stays there, and no later time is part of the
+    motion.
+    """
     motion = slope.solve(lam0=0, v0=1, direction=-1, mu=2)
     end = math.sqrt(2.0) / (3.0 * G)
     assert motion.t_end == pytest.approx(end, rel=1e-14)
@@ -73,7 +79,7 @@ def test_rest_and_what_comes_after(slope: ModuleType) -> None:
 
 @pytest.mark.parametrize("v0", ["1e-140", "1e-20", "1e-9", "1e-7", "1e-5", "1e-3", "1"])
 def test_however_slow_a_launch_uphill(v0: str, slope: ModuleType) -> None:
-    """Way and time to the turn are elementary, and have their digits where the turn is the launch's own double too."""
+    """Distance and time to the turn have all digits, also if the turn is the same double as the launch."""
     for mu, end in (("2", "rest"), ("0.5", "turn")):
         motion = slope.solve(lam0="0.0124357887", v0=v0, direction=-1, mu=mu, t_max=10)
         leg = motion.legs[0]
@@ -89,7 +95,7 @@ def test_however_slow_a_launch_uphill(v0: str, slope: ModuleType) -> None:
 
 
 def test_a_stop_within_the_last_places_of_the_launch() -> None:
-    """A bend is straight over 1e-18 m: the way there is v0**2/(2 a), and the time v0/a."""
+    """A bend is straight over 1e-18 m, so that the distance is v0**2/(2 a) and the time v0/a."""
     from generated import cubic_coulomb
 
     x, v0, mu, g = 0.012435788765528737, 1.284446461162977e-09, 0.11597631838334235, 6.389439513099816
@@ -106,13 +112,15 @@ def test_a_stop_within_the_last_places_of_the_launch() -> None:
 
 
 def test_a_horizon_ends_it(slope: ModuleType) -> None:
-    """Later times are no part of the motion."""
+    """Times after the horizon are no part of the motion."""
     with pytest.raises(InputError, match=r"the motion ends at 1\.0 s \(the horizon t_max\), got 2\.0"):
         slope.solve(lam0=0, mu=0.1, t_max=1).lam(2.0)
 
 
 def test_what_a_sweep_has_no_number_for(slope: ModuleType) -> None:
-    """The largest speed of a fall without an end, turning points of what only falls, a launch that leaves at once."""
+    """The largest speed of an endless fall, turning points of a fall, and a launch that leaves at once have no
+    number.
+    """
     for quantity in ("v_max", "turning_points"):
         swept = slope.sweep(quantity, lam0=[0.0, 1.0], mu=0.1)
         assert np.isnan(swept.values).all()
@@ -120,14 +128,14 @@ def test_what_a_sweep_has_no_number_for(slope: ModuleType) -> None:
 
 
 def test_pass1_of_a_body_at_rest(slope: ModuleType) -> None:
-    """It has a speed where it is, and is nowhere else."""
+    """A body at rest has a speed at its place and is nowhere else."""
     v2 = slope.pass1(np.array([-1.0, 0.0, 1.0]), lam0=0, v0=0, mu=2).v2
     assert np.isnan(v2).tolist() == [True, False, True]
     assert v2[1] == 0.0
 
 
 def test_out_of_the_domain_at_once(build: Build) -> None:
-    """A launch at the end of the domain, outwards."""
+    """A launch outwards at the end of the domain ends at once."""
     module = build("bounded", gqm.Curve.graph("x**2", domain=(0, 1)), gqm.QuadraticDrag(b="1"))
     with pytest.raises(LaunchError, match=r"1\.0 is the end of the domain itself, .* launch with direction=-1"):
         module.solve(lam0=1, v0=1)
@@ -136,12 +144,12 @@ def test_out_of_the_domain_at_once(build: Build) -> None:
 
 @pytest.fixture(scope="module")
 def root(build: Build) -> ModuleType:
-    """The graph of x**(3/2): at 0 the curvature is infinite, and beyond there is nothing."""
+    """Return the graph of x**(3/2), whose curvature is infinite at 0, where the curve ends."""
     return build("root", gqm.Curve.graph("x*sqrt(x)"), gqm.QuadraticDrag(b="0.1"))
 
 
 def test_a_singular_point_is_reached(root: ModuleType) -> None:
-    """From rest at 1: W = 2 g times the integral of z' exp(-2 b (s(u) - s(x))), and the time is that of ds/sqrt(W)."""
+    """From rest at 1, W is 2 g times the integral of z' exp(-2 b (s(u) - s(x))), and the time is that of ds/sqrt(W)."""
     (event,) = root.solve(lam0=1).events
     assert event.kind == "singular-point"
     assert abs(event.lam) <= 1e-14
@@ -151,7 +159,7 @@ def test_a_singular_point_is_reached(root: ModuleType) -> None:
         def length(x: mpf) -> mpf:
             return 8 * ((1 + mpf("2.25") * x) ** mpf("1.5") - 1) / 27
 
-        def w_over_way(y: mpf) -> mpf:  # the way is y**2
+        def w_over_way(y: mpf) -> mpf:  # the distance is y**2
             x = 1 - y * y
             place = lambda v: x + y * y * v  # noqa: E731
             return (
@@ -163,7 +171,7 @@ def test_a_singular_point_is_reached(root: ModuleType) -> None:
 
 
 def test_a_launch_at_a_singular_point(root: ModuleType) -> None:
-    """There no panel of V**2 can be laid; the message asks for what is not smooth."""
+    """No panel of V**2 can begin at a singular point; the message asks for the place that is not smooth."""
     with pytest.raises(
         SolutionError, match=r"V\*\*2 beyond x = 0\.0 could not be followed; are the curve and the force"
     ):
@@ -171,7 +179,9 @@ def test_a_launch_at_a_singular_point(root: ModuleType) -> None:
 
 
 def test_an_approach_has_a_last_digit(build: Build) -> None:
-    """Towards the top of a circle with drag: known after a minute, and no number any more after an hour."""
+    """A body that approaches the top of a circle with drag has a place after a minute, and no more digits of it after
+    an hour.
+    """
     module = build("drop", gqm.families.circle(L=1), gqm.QuadraticDrag(b="0.1"))
     with mp.workdps(40):
         k, g = mpf("0.2"), mpf("9.81")
@@ -179,7 +189,7 @@ def test_an_approach_has_a_last_digit(build: Build) -> None:
         v0 = mp.sqrt(2 * g / (1 + k**2) * (loss(mp.pi) - loss(0)))
     motion = module.solve(lam0=0, v0=float(v0))
     assert motion.lam(60.0) == pytest.approx(math.pi, abs=4e-15)
-    # On the way the speed is that of the closed form, which near the top is a small difference.
+    # The speed on the way is that of the closed form, which near the top is a small difference.
     state = motion.state(np.array([0.5, 1.0, 2.0]))
     with mp.workdps(40):
         for place, v in zip(state.lam, state.v, strict=True):
@@ -194,7 +204,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
 
     def lost(*arguments: Any) -> int:
         arguments[-1][:], arguments[-1][:, leg_record.END] = 0.0, 0.5
-        return ends.SPENT
+        return ends.END_TOO_MANY_PANELS
 
     motion = slope.solve(lam0=0, mu=0.1)
     monkeypatch.setattr(answers, "drive", lost)
@@ -203,7 +213,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
 
 
 def test_over_a_joint_and_back(build: Build) -> None:
-    """Along a level line and up an arc until it turns, down again and to rest: each by its closed form.
+    """Along a level line, up an arc to its turn, down again and to rest, each part agrees with its closed form.
 
     On the arc W' + 2 mu W = -2 g R (sin + mu cos) upwards, with -mu downwards; on the line W' = -2 mu g.
     """
@@ -226,7 +236,7 @@ def test_over_a_joint_and_back(build: Build) -> None:
         below = mp.sqrt(down(mpf(0)))
         there = [flat + top, flat - below**2 / (2 * mu * g)]
         joined = mp.sqrt(16 - 2 * mu * g * flat)
-        # Gauss: W is a small difference near the turn.
+        # Gauss-Legendre nodes do not come too near to the turn, where W is a small difference.
         rise, fall = (
             mp.quad(lambda y, w=w: 2 * y / mp.sqrt(w(top - y * y)), [0, mp.sqrt(top)], method="gauss-legendre")
             for w in (up, down)
@@ -239,7 +249,8 @@ def test_over_a_joint_and_back(build: Build) -> None:
 
 
 def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
-    """On a parabola of free fall N is zero at the launch, and the track carries what drag has slowed.
+    """On a parabola of free fall N is zero at the launch, and the track then carries the body that drag has slowed
+    down.
 
     W = exp(-2 b s) (g + 2 g times the integral of x exp(2 b s)).
     """
@@ -266,16 +277,18 @@ def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
 @pytest.mark.parametrize(
     ("lam0", "v0"),
     [
-        # Time is counted back from the turn to where N changes sign, and no farther.
+        # Time is counted back from the turn to the place where N changes its sign, and no farther.
         (0.7483964034543935, 5.818989927693156),
         (0.5492047797152688, 6.863503323397249),
         (1.4219101233586642, 4.690743520201464),
-        # Back from the turn past that place: the distance to it is a rounding longer than what was run.
+        # On the way back from the turn, the distance to that place is a rounding longer than the distance run.
         (0.9646260788927759, 6.440001136948692),
     ],
 )
 def test_where_the_contact_force_changes_sign_on_a_ring(lam0: float, v0: float) -> None:
-    """A rough ring up to where N = 0: W' + 2 mu W = -2 g (sin + mu cos), a closed form, and its time by quadrature."""
+    """On a rough ring up to N = 0, W' + 2 mu W = -2 g (sin + mu cos) has a closed form, and the time agrees with
+    quadrature.
+    """
     motion = generated.circle_coulomb.solve(lam0, v0, t_max=3.0)
     with mp.workdps(30):
         mu, g, start = mpf("0.15"), mpf("9.81"), mpf(lam0)
@@ -304,7 +317,7 @@ def test_where_the_contact_force_changes_sign_on_a_ring(lam0: float, v0: float) 
     ],
 )
 def test_each_change_of_contact_is_an_event(lam0: float, v0: float, direction: int, given: dict[str, float]) -> None:
-    """On many rounds of a droplet some changes were lost that are within a rounding of where a run of panels ends."""
+    """Each change of contact is reported, also within a rounding of the end of a run of panels (some were lost)."""
     motion = generated.circle_droplet.solve(lam0, v0, direction, **given)
     end = min(motion.t_end, 16.0)
     times = np.array([0.0, *(event.t for event in motion.events_between(0, end) if event.kind == "contact-sign")])

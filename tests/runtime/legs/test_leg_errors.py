@@ -1,4 +1,4 @@
-"""Bounds of motions that lose energy: at turns and between, over many legs, at any amplitude, by closed forms."""
+"""Bounds of motions with losses agree with closed forms: at turns and between, over many legs, at any amplitude."""
 
 import math
 from collections.abc import Callable
@@ -16,17 +16,17 @@ from gqm_sym.errors import SolutionError
 Build = Callable[..., ModuleType]
 G = mpf("9.81")
 
-# A bound that is larger than the error by more than this is of no use.
+# A bound that is larger than the error by more than this factor is useless.
 USELESS = 1e5
 
 
 def spring(build: Build, name: str, loss: Any) -> ModuleType:
-    """A level line with a spring, on which each leg has a closed form."""
+    """Return a level line with a spring, on which each leg has a closed form."""
     return build(name, gqm.Curve.graph("0*x"), gqm.Potential("k*x**2/2") + loss)
 
 
 def assert_bounded(motion: Any, times: Any, truth: Callable[[float], Any], scale: Any) -> None:
-    """Places are within their bounds, and these are small against the amplitude."""
+    """Check that places are within their bounds, and that these are small against the amplitude."""
     for t, place, error in zip(times, motion.lam(times), motion.error_bound(times), strict=True):
         with mp.workdps(60):
             assert abs(mpf(float(place)) - truth(float(t))) <= error
@@ -34,7 +34,7 @@ def assert_bounded(motion: Any, times: Any, truth: Callable[[float], Any], scale
 
 
 def test_a_spring_with_weak_friction(build: Build) -> None:
-    """Half swings about +-mu g/k, each the same time long; 470 turns inherit the errors of all before."""
+    """Half swings about +-mu g/k take equal times; 470 turns inherit the errors of all before."""
     module = spring(build, "weak_friction", gqm.CoulombFriction())
     motion = module.solve("1/2", mu="1/10000", k="40", t_max=250)
     with mp.workdps(60):
@@ -54,7 +54,9 @@ def test_a_spring_with_weak_friction(build: Build) -> None:
 @pytest.mark.parametrize("size", [1.0, 1e2, 1e4, 1e6])
 @pytest.mark.parametrize(("lam0", "centre"), [(2.7, -0.38), (-1.3, 1.1)])
 def test_terms_of_the_force_that_cancel(size: float, lam0: float, centre: float, build: Build) -> None:
-    """Two potentials whose sum is a weak spring, with friction: places lay up to 150 bounds away."""
+    """Bounds include the rounding of two potentials that add up to a weak spring, with friction (places were up to 150
+    bounds off).
+    """
     force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + gqm.CoulombFriction()
     k2 = 0.83 * size
     k1, c1 = k2 + 0.71, 1.86
@@ -78,7 +80,9 @@ def test_terms_of_the_force_that_cancel(size: float, lam0: float, centre: float,
 
 @pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
 def test_terms_that_cancel_beside_a_viscous_law(size: float, build: Build) -> None:
-    """Their rounding was taken for structure: panels stayed as narrow as they were, or no panel was narrow enough."""
+    """The rounding of terms that cancel is not taken for structure (panels stayed narrow, or none was narrow
+    enough).
+    """
     viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "3/2"})
     force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + viscous
     k2 = 0.8 * size
@@ -98,7 +102,9 @@ def test_terms_that_cancel_beside_a_viscous_law(size: float, build: Build) -> No
 
 @pytest.mark.parametrize("size", [1e6, 3e6, 1e7, 1e8, 1e10])
 def test_terms_that_cancel_too_far(size: float, build: Build) -> None:
-    """No motion ends where they do: it was told to end at a singular point, which this curve has none of."""
+    """No motion ends where terms cancel too far (it was said to end at a singular point, which this curve does not
+    have).
+    """
     viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "3/2"})
     force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + viscous
     k2 = 0.8 * size
@@ -113,7 +119,7 @@ def test_terms_that_cancel_too_far(size: float, build: Build) -> None:
 
 
 def slow_launches() -> list[tuple[float, float, int, float, float]]:
-    """Place, speed, direction, stiffness and damping: launched slowly from where a spring pulls hard.
+    """Draw place, speed, direction, stiffness and damping of slow launches far from the centre of a strong spring.
 
     The first two were found by random launches, 260 and 11 bounds off.
     """
@@ -131,8 +137,8 @@ def slow_launches() -> list[tuple[float, float, int, float, float]]:
 
 
 def test_a_turn_next_to_the_launch_under_a_viscous_law(build: Build) -> None:
-    """The turn was wrong by up to 1e-8 of the short way to it, which no error bound showed; all later times inherited
-    that.
+    """The turn is right (it had an error of 1e-8 of the short distance, which no bound showed and all later times
+    inherited).
     """
     viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
     module = spring(build, "slowly_launched", viscous)
@@ -148,7 +154,7 @@ def test_a_turn_next_to_the_launch_under_a_viscous_law(build: Build) -> None:
 
 
 def dragged_swing(amplitude: mpf, k: mpf, b: mpf, digits: int) -> tuple[mpf, mpf]:
-    """The next amplitude of a spring with quadratic drag, and the time to it."""
+    """Return the next amplitude of a spring with quadratic drag, and the time to it."""
     with mp.workdps(digits):
         c = k / (2 * b * b)
 
@@ -169,7 +175,7 @@ def dragged_swing(amplitude: mpf, k: mpf, b: mpf, digits: int) -> tuple[mpf, mpf
 
 @pytest.mark.parametrize("amplitude", ["1", "1e-3", "1e-10", "2e-13", "1e-30", "1e-100"])
 def test_any_amplitude_with_drag(amplitude: str, build: Build) -> None:
-    """The steps of a leg are as long as the leg itself, so that turns and their times have all their digits."""
+    """The steps of a leg are in proportion to the leg, so that turns and their times have all their digits."""
     motion = spring(build, "dragged_spring", gqm.QuadraticDrag(b="b")).solve(amplitude, b="1/10", k="40", t_max=3)
     digits = 60 - 3 * int(mp.log10(mpf(amplitude)))
     place, time, sign = mpf(amplitude), mpf(0), 1
@@ -185,7 +191,7 @@ def test_any_amplitude_with_drag(amplitude: str, build: Build) -> None:
 
 @pytest.mark.parametrize("amplitude", ["1e-10", "1e-60"])
 def test_small_swings_in_a_valley(amplitude: str, build: Build) -> None:
-    """At the bottom of z = x**2 the swing is a cosine, less what drag takes of so small a motion."""
+    """At the bottom of z = x**2 the swing is a cosine, with the small loss due to drag."""
     module = build("valley", gqm.Curve.graph("x**2"), gqm.QuadraticDrag(b="b"))
     state = module.solve(amplitude, b="1/10").state(3.0)
     with mp.workdps(40):
@@ -196,7 +202,7 @@ def test_small_swings_in_a_valley(amplitude: str, build: Build) -> None:
 
 @pytest.mark.parametrize("start", ["1e-10", "1e-20", "1e-100"])
 def test_from_beside_a_hilltop(start: str, build: Build) -> None:
-    """So near to the top of z = -x**2/2 the body is at x0 cosh(sqrt(g) t), drag or not."""
+    """So near to the top of z = -x**2/2 the place is x0 cosh(sqrt(g) t), with or without drag."""
     module = build("hilltop", gqm.Curve.graph("-x**2/2"), gqm.QuadraticDrag(b="b"))
     for factor in (mpf(3), mpf("1e-15") / mpf(start)) if mpf(start) < mpf("1e-16") else (mpf(2),):
         with mp.workdps(40):
@@ -211,7 +217,7 @@ def test_from_beside_a_hilltop(start: str, build: Build) -> None:
 @pytest.mark.parametrize("v0", [1e-8, 1e-12, 1e-18])
 @pytest.mark.parametrize("lam0", [0.9, 0.999, 0.999999])
 def test_a_slow_launch_towards_a_hilltop(lam0: float, v0: float, build: Build) -> None:
-    """The turn is close by and held as two doubles: of one double, what follows would have a bound of up to 0.04."""
+    """The turn is close by and stored as two doubles; with one double, later bounds would be up to 0.04."""
     force = gqm.Potential("-(x - 1)**2/2") + gqm.QuadraticDrag(b="b")
     state = build("level_hill", gqm.Curve.graph("0*x"), force).solve(lam0, v0, 1, b=0.125).state(6.0)
     with mp.workdps(100):
@@ -240,7 +246,7 @@ def test_a_slow_launch_towards_a_hilltop(lam0: float, v0: float, build: Build) -
 
 
 def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
-    """Resistance c V on a ring: small swings last for ever, each damped by exp(-c/2 half)."""
+    """With a resistance c V on a ring, small swings never stop; each is damped by exp(-c/2 half)."""
     module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
     motion = module.solve(0.1, c=1, t_max=60)
     legs = motion.legs
@@ -252,7 +258,7 @@ def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
 
 @pytest.mark.parametrize("t", [0.01, 1.0, 5.0, 70.0, 400.0])
 def test_a_creeping_spring(t: float, build: Build) -> None:
-    """Far beyond critical damping the body creeps for ever: x = exp(-c t/2) (cosh d t + c/(2 d) sinh d t)."""
+    """Far beyond critical damping the body creeps for ever, with x = exp(-c t/2) (cosh d t + c/(2 d) sinh d t)."""
     motion = spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1", c="20", k="10")
     with mp.workdps(40):
         d = mp.sqrt(90)
@@ -263,7 +269,9 @@ def test_a_creeping_spring(t: float, build: Build) -> None:
 
 
 def test_creeping_to_the_bottom_of_a_valley(build: Build) -> None:
-    """Next to the bottom the body creeps by x - 3 = A exp(-r t), until it is closer than doubles can tell ("lost")."""
+    """Next to the bottom the body creeps by x - 3 = A exp(-r t), until it is closer than doubles can resolve
+    ("lost").
+    """
     valley = gqm.Curve.graph("x**2/2 - 3*x")
     module = build("viscous_valley", valley, gqm.Kernel.law("-c*direction*sqrt(W)"))
     motion = module.solve("1", c=30)
@@ -280,13 +288,13 @@ def test_creeping_to_the_bottom_of_a_valley(build: Build) -> None:
 
 
 def test_from_where_v2_is_beyond_doubles(build: Build) -> None:
-    """The words say so (asked whether the curve was smooth)."""
+    """If V**2 is beyond doubles, the message says so (it asked whether the curve was smooth)."""
     with pytest.raises(SolutionError, match="range of doubles"):
         spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1e-155", c="1/10", k="10")
 
 
 def test_creeping_on_a_ring_has_no_end(build: Build) -> None:
-    """An end is looked for only as long as steps are no millionth of the curve (took over a minute)."""
+    """An end is searched for only as long as steps exceed a millionth of the curve (this took over a minute)."""
     module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
     motion = module.solve(1.0, c=100)
     assert motion.t_end == math.inf
@@ -295,7 +303,7 @@ def test_creeping_on_a_ring_has_no_end(build: Build) -> None:
 
 @pytest.mark.parametrize("t", [1.0, 1e3, 1e100])
 def test_drag_alone(t: float, build: Build) -> None:
-    """On a level line x = log(1 + b v0 t)/b: time grows exponentially with the place, and its error with it."""
+    """On a level line x is log(1 + b v0 t)/b, so that time and its error grow exponentially with the place."""
     module = build("level", gqm.Curve.graph("0*x"), gqm.QuadraticDrag(b="b"))
     state = module.solve(0, 2, b="1/10").state(t)
     with mp.workdps(130):
@@ -304,9 +312,10 @@ def test_drag_alone(t: float, build: Build) -> None:
 
 
 def test_charts_charge_their_own_rounding(build: Build) -> None:
-    """Swings on a ring without formulas, against the circle with formulas.
+    """Swings on a ring without formulas agree within their bounds with the circle with formulas.
 
-    The chart's angle is off by a rounding of 2 pi, which moves the lowest point: places lay up to 658 bounds away.
+    The chart's angle has the error of a rounding of 2 pi, which moves the lowest point (places were up to 658 bounds
+    off).
     """
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
     ring = build("ring_with_friction", curve, gqm.CoulombFriction(mu="mu"))
@@ -319,7 +328,9 @@ def test_charts_charge_their_own_rounding(build: Build) -> None:
 
 
 def test_many_laps_of_a_chart_before_the_turn(build: Build) -> None:
-    """Each lap is followed once, when its places are asked for: eight were followed for one, and some told twice."""
+    """Each lap is followed once, when its places are asked for (eight were followed for one, and some reported
+    twice).
+    """
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
     ring = build("ring_with_friction", curve, gqm.CoulombFriction(mu="mu"))
     for lam0, v0, mu, t_max in ((-0.4, 10.0, "1/100", 20.0), (1.0, 25.0, "1/20", 15.0)):

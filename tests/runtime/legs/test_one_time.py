@@ -1,4 +1,4 @@
-"""One time asked of a motion with losses: the same state as one of many times, for the price of one piece."""
+"""The state of a motion with losses at one time is that of many times, and costs one segment only."""
 
 from typing import Any
 
@@ -11,7 +11,9 @@ from gqm_sym.runtime.legs import dissipative, inherited
 
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7, 4.9])
 def test_the_state_at_one_time_tabulates_one_piece(t: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the last bit it is that of a motion which was asked for many times; another piece is tabulated with all."""
+    """The state agrees to the last bit with that of a motion which was asked for many times; another segment is
+    tabulated with all.
+    """
     known = generated.circle_drag.solve(1.0, 0)
     known.lam(np.linspace(0.0, 5.0, 50))
     made: list[Any] = []
@@ -29,7 +31,9 @@ def test_the_state_at_one_time_tabulates_one_piece(t: float, monkeypatch: pytest
 
 
 def test_a_place_needs_no_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Errors are carried from leg to leg when a state is asked for, and are those of a motion that was asked first."""
+    """Errors are computed when a state is asked for, and agree with those of a motion that was asked for a state
+    first.
+    """
     known = generated.circle_drag.solve(1.0, 0).state(3.0)
     motion, count = generated.circle_drag.solve(1.0, 0), 0
     real = inherited.carry

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import gqm_sym as gqm
 
-# A swing that rests, two that go on for ever, one that dies away, and an approach without a swing.
+# The motions are a swing that rests, two that go on for ever, one that dies away, and an approach without a swing.
 KERNELS = {
     "friction": gqm.CoulombFriction(),
     "drag": gqm.QuadraticDrag(),
@@ -30,7 +30,7 @@ LATEST = 30.0
 
 @pytest.fixture(scope="module")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
-    """A parabola z = x**2/2 with each force."""
+    """Return a parabola z = x**2/2 with each force."""
     folder: Path = tmp_path_factory.mktemp("order")
     curve = gqm.Curve.graph("x**2/2", parameter="x")
     return {
@@ -62,7 +62,7 @@ def asked(motion: Any, end: float) -> dict[str, Callable[[], Any]]:
 @settings(max_examples=12)
 @given(order=st.permutations(range(12)), launch=st.sampled_from([("1/2", 0), ("-1/3", 1), ("1/4", "7/3")]))
 def test_any_order(name: str, modules: dict[str, ModuleType], order: list[int], launch: tuple[Any, Any]) -> None:
-    """Each question alone, of a motion that was asked nothing else, has the same digits."""
+    """Each question alone, of a motion that was asked nothing else, gives the same digits."""
     module, parameters = modules[LAUNCHES[name][0]], LAUNCHES[name][1]
 
     def solved() -> Any:
@@ -76,7 +76,9 @@ def test_any_order(name: str, modules: dict[str, ModuleType], order: list[int], 
 
 
 def test_times_that_grow(modules: dict[str, ModuleType]) -> None:
-    """Each time has the digits that it has among many, before and behind what has been followed."""
+    """Each of several increasing times has the digits that it has among many, before and after the part that was
+    followed.
+    """
     for name, (kernel, parameters) in LAUNCHES.items():
         times = np.linspace(0.0, 20.0, 201)
         motion, other = (modules[kernel].solve("1/2", "1/3", 1, **parameters) for _ in range(2))

@@ -13,7 +13,7 @@ from generated import catenary, double_well, superellipse
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Thrown so slowly, 2e-24 m from where it turns, that doubles took the time to the turn for negative.
+# The launch is so slow, 2e-24 m from the turn, that doubles took the time to the turn for negative.
 BESIDE_TURN = {
     "lam0": 5.672834743747337,
     "v0": 1.4288970094889906e-11,
@@ -21,7 +21,8 @@ BESIDE_TURN = {
     "g": 4.0791236336312915,
 }
 
-# Track and launch: an orbit for each tier of arithmetic, formulas and a chart, and an approach to an equilibrium.
+# A row has a track and a launch: an orbit for each tier of arithmetic, formulas and a chart, and an approach to an
+# equilibrium.
 MOTIONS: dict[str, tuple[ModuleType | str, dict[str, Any]]] = {
     "swing": ("circle", {"lam0": "6/5", "v0": "1/2", "L": 1}),
     "once round": ("circle", {"lam0": 0.3, "v0": 9.0, "direction": -1, "L": 1}),
@@ -59,7 +60,7 @@ def asked(motion: Any) -> dict[str, Callable[[], Any]]:
 
 @pytest.mark.parametrize("name", [name for name in MOTIONS if name != "down a chain"])
 def test_any_order(name: str, module_of: ModuleOf) -> None:
-    """Each question alone, of a motion that was asked nothing else, has the same digits, and so has a copy's answer."""
+    """Each question alone, of a motion that was asked nothing else, gives the same digits, and so does a copy."""
     track, launch = MOTIONS[name]
     module = module_of(track) if isinstance(track, str) else track
     names = list(asked(module.solve(**launch)))
@@ -76,7 +77,7 @@ def test_any_order(name: str, module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("name", [name for name in MOTIONS if name != "towards the top"])
 def test_legs_follow_one_another(name: str, module_of: ModuleOf) -> None:
-    """From the launch to the end of the period, none before the other, from the very first question on."""
+    """Legs follow each other from the launch to the end of the period, in order, from the first question on."""
     track, launch = MOTIONS[name]
     motion = (module_of(track) if isinstance(track, str) else track).solve(**launch)
     legs = motion.legs

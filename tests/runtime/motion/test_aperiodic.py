@@ -1,4 +1,4 @@
-"""Motions that do not repeat: transits, open ends, one turning point, and the approach to an equilibrium."""
+"""Motions that do not repeat are right: transits, open ends, one turning point, and the approach to an equilibrium."""
 
 import math
 from collections.abc import Callable
@@ -17,10 +17,11 @@ from gqm_sym.errors import InputError
 ModuleOf = Callable[[str], ModuleType]
 
 G = mpf("9.81")
-# Of the largest place, speed or time of the motion up to then: quadrature, the table and the place's own rounding.
+# The tolerance relative to the largest place, speed or time of the motion so far: quadrature, the table and the place's
+# own rounding.
 POSITION = 1e-14
 TIME = 1e-14
-# A time and the place it belongs to give each other back to rounding of both.
+# A time and its place determine each other to the rounding of both.
 INVERSE = 1e-14
 
 WELL_SPEED = "sqrt(2*9.81*({0}**2 - {0}**4))"  # to the barrier of the double well, by energy
@@ -42,7 +43,7 @@ LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
 
 @pytest.fixture(scope="session")
 def passage(generated_folder: Any, module_of: ModuleOf) -> Callable[..., Any]:
-    """Give a motion of the table by its name, with further arguments."""
+    """Return a motion of the table by its name, with further arguments."""
     curve = gqm.Curve.parametric(x="s*cos(angle)", z="s*sin(angle)", parameter="s")
     slope = gqm.build(gqm.derive(curve, gqm.Gravity()), name="slope", folder=generated_folder)
 
@@ -54,13 +55,13 @@ def passage(generated_folder: Any, module_of: ModuleOf) -> Callable[..., Any]:
 
 
 def off(actual: Any, truth: Any) -> float:
-    """The absolute difference, formed at the working precision of the truth."""
+    """Return the absolute difference, formed at the working precision of the truth."""
     return float(abs(mpf(float(actual)) - truth))
 
 
 @pytest.mark.parametrize("t", [0.0, 0.125, 1.0, 17.0, 1e3, 1e6])
 def test_free_fall_on_a_line(t: float, passage: Callable[..., Any]) -> None:
-    """Thrown up a slope or released on it: s = s0 + v0 t - g sin t**2/2 and v = v0 - g sin t, for ever."""
+    """Thrown up a slope or released on it, a body has s = s0 + v0 t - g sin t**2/2 and v = v0 - g sin t for ever."""
     with mp.workdps(40):
         pull = G * mp.sin(mpf("0.5"))
         for name, v0 in (("falling", 0), ("thrown up", 8)):
@@ -75,7 +76,7 @@ def test_free_fall_on_a_line(t: float, passage: Callable[..., Any]) -> None:
 
 
 def test_a_throw_turns_where_and_when_the_textbook_says(passage: Callable[..., Any]) -> None:
-    """It turns after v0/(g sin) at v0**2/(2 g sin), and is back at the launch with its speed reversed."""
+    """The body turns after v0/(g sin) at v0**2/(2 g sin), and returns to the launch with its speed reversed."""
     motion = passage("thrown up")
     with mp.workdps(40):
         pull = G * mp.sin(mpf("0.5"))
@@ -89,11 +90,13 @@ def test_a_throw_turns_where_and_when_the_textbook_says(passage: Callable[..., A
 
 @pytest.mark.parametrize("place", ["-1.001", "-1.5", "-4", "-100"])
 def test_down_a_cubic(place: str, passage: Callable[..., Any]) -> None:
-    """The time to a place is the integral of ds/V, with or without a turn before, and the body is there then."""
+    """The time to a place is the integral of ds/V, with or without a turn before, and the body is there at that
+    time.
+    """
     with mp.workdps(30):
 
         def time(start: mpf, stop: mpf, w0: mpf) -> mpf:
-            def rate(u: mpf) -> mpf:  # the root's substitution, which is right from a turn and does no harm elsewhere
+            def rate(u: mpf) -> mpf:  # the substitution for the root is right from a turn, and harmless elsewhere
                 x = start + (stop - start) * u**2
                 return mp.sqrt((1 + 9 * x**4) / abs(w0 + 2 * G * (-1 - x**3))) * 2 * abs(stop - start) * u
 
@@ -116,10 +119,11 @@ def test_down_a_cubic(place: str, passage: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("t", [0.0, 0.25, 1.0, 4.0, 11.0, 40.0, 200.0])
 def test_the_separatrix_of_the_pendulum(t: float, passage: Callable[..., Any]) -> None:
-    """Launched to the hilltop: angle pi - 4 atan(exp(-w t)), speed 2 w L/cosh(w t), as long as doubles hold it.
+    """Launched to the hilltop, the body has the angle pi - 4 atan(exp(-w t)) and the speed 2 w L/cosh(w t), as long as
+    doubles hold it.
 
-    The speed keeps its relative accuracy when the angle has long been pi to rounding; what limits it is the time's
-    own last place, w t times over.
+    The speed keeps its relative accuracy when the angle has long been pi to rounding; its limit is w t times the last
+    place of the time.
     """
     motion = passage("to the hilltop")
     state = motion.state(t)
@@ -137,7 +141,7 @@ def test_the_separatrix_of_the_pendulum(t: float, passage: Callable[..., Any]) -
 def test_from_one_hilltop_to_the_other(gap: str, module_of: ModuleOf) -> None:
     """Launched ever closer to the hilltop behind, at the speed of the separatrix, the motion keeps its digits.
 
-    Seen from the hilltop ahead, V**2 is there the small difference of large numbers: positions were once off by 1e-4.
+    Relative to the hilltop ahead, V**2 is a small difference of large numbers there: positions were once off by 1e-4.
     """
     motion = module_of("circle").solve(lam0=f"-pi + {gap}", v0=f"2*sqrt(9.81)*sin({gap}/2)", L=1)
     assert motion.kind == "asymptotic"
@@ -168,7 +172,7 @@ def test_back_to_the_barrier_by_a_turn(start: str, module_of: ModuleOf) -> None:
         assert motion.kind == "asymptotic"
         assert [leg.end for leg in motion.legs] == ["turn", "asymptote"]
         assert off(motion.turning_points[0], mpf(1)) <= 2.0**-52
-        # A passage starts at the double nearest to the launch place, which close to the turn takes time.
+        # A passage starts at the double nearest to the launch place; close to the turn the difference takes time.
         slowest = mp.sqrt(2 * G * (mpf(start) ** 2 - mpf(start) ** 4))
         rounding = float(mp.sqrt(5) / slowest) * math.ulp(float(start))
         assert off(motion.legs[0].t_end, out) <= TIME * float(out) + rounding
@@ -178,7 +182,7 @@ def test_back_to_the_barrier_by_a_turn(start: str, module_of: ModuleOf) -> None:
 
 
 def test_closer_to_an_equilibrium_than_doubles_can_tell(passage: Callable[..., Any]) -> None:
-    """Beyond what doubles can hold, the answer is an error that says so, and earlier times are still answered."""
+    """When the distance leaves the range of doubles, an error says so, and earlier times are still answered."""
     motion = passage("to the hilltop")
     with pytest.raises(gqm.GQMError, match="closer to the equilibrium"):
         motion.lam(1000.0)
@@ -186,8 +190,10 @@ def test_closer_to_an_equilibrium_than_doubles_can_tell(passage: Callable[..., A
 
 
 @pytest.mark.parametrize("name", LAUNCHES)
-def test_the_story_is_of_one_piece(name: str, passage: Callable[..., Any]) -> None:
-    """Legs follow each other in time and place from the launch on, and each is where its ends say; events in order."""
+def test_legs_are_joined(name: str, passage: Callable[..., Any]) -> None:
+    """Legs follow each other in time and place from the launch on, each has the place of its ends, and events are in
+    order.
+    """
     motion = passage(name, t_max="2.5")
     legs, events = motion.legs, motion.events
     assert (legs[0].t_start, legs[0].lam_start) == (0.0, motion.lam(0))
@@ -220,14 +226,14 @@ def test_velocity_and_arc_length_follow_the_legs(name: str, passage: Callable[..
         assert (np.sign(state.v) == leg.direction).all()
         assert (np.diff(state.lam) * leg.direction > 0).all()
         assert (np.diff(state.s) * leg.direction > 0).all()
-        # Simpson's rule for the speed: its own error is of fourth order in the share of a leg.
+        # Simpson's rule for the speed has an error of fourth order in the share of a leg.
         rule = (t[2] - t[0]) / 6 * (state.v[:-2:2] + 4 * state.v[1:-1:2] + state.v[2::2])
         assert np.diff(state.s[::2]) == pytest.approx(rule, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", LAUNCHES)
 def test_places_and_times_invert_each_other(name: str, passage: Callable[..., Any]) -> None:
-    """The body is first at a place when it first comes there, as long as it was not there before."""
+    """The body is first at a place at the time for it, if it was not there before."""
     motion = passage(name, t_max="2.5")
     leg = motion.legs[0]
     for t in np.linspace(leg.t_start, leg.t_end, 13)[1:-1]:
@@ -239,7 +245,7 @@ def test_places_and_times_invert_each_other(name: str, passage: Callable[..., An
 
 @pytest.mark.parametrize("name", LAUNCHES)
 def test_questions_out_of_time_are_refused(name: str, passage: Callable[..., Any]) -> None:
-    """Before the launch, after the end and at no time at all there is no answer; at the end itself there is."""
+    """Times before the launch and after the end, and NaN, are refused; the end itself has an answer."""
     motion = passage(name, t_max="2.5")
     assert math.isfinite(motion.lam(motion.t_end))
     for t in (-1e-9, [0.5, -1.0], math.nextafter(motion.t_end, math.inf), [0.0, 3.0], math.nan):
@@ -252,14 +258,16 @@ def test_questions_out_of_time_are_refused(name: str, passage: Callable[..., Any
 
 
 def test_a_place_never_reached_has_no_time(passage: Callable[..., Any]) -> None:
-    """Above the turn, behind the launch and beyond the horizon: an error that says where the motion goes."""
+    """A place above the turn, behind the launch or beyond the horizon gives an error that says where the motion
+    goes.
+    """
     for name, place in (("thrown up", 20), ("falling", 4), ("to the hilltop", 4), ("cubic from rest", 1)):
         with pytest.raises(gqm.GQMError, match="never at"):
             passage(name, t_max=2).time_at(place)
 
 
 def test_the_horizon_ends_a_motion_and_changes_nothing_before(passage: Callable[..., Any]) -> None:
-    """With t_max positions up to it are those without it, and the last leg and event say "horizon"."""
+    """With t_max, positions before it are those without it, and the last leg and event say "horizon"."""
     for name in ("falling", "cubic turning", "to the hilltop"):
         free, bound = passage(name), passage(name, t_max="3/2")
         t = np.linspace(0.0, 1.5, 31)
@@ -270,7 +278,7 @@ def test_the_horizon_ends_a_motion_and_changes_nothing_before(passage: Callable[
 
 
 def test_the_end_of_the_domain_ends_a_motion(passage: Callable[..., Any]) -> None:
-    """It ends at the last place of the curve, at the time when energy says that it gets there."""
+    """The motion ends at the last place of the curve, at the time that follows from its energy."""
 
     def rate(x: mpf) -> mpf:
         depth, start = (mp.sqrt(2 * mp.pi) * mp.exp(-(mpf(u) ** 2) / 2) for u in (x, -1))
@@ -288,13 +296,13 @@ def test_the_end_of_the_domain_ends_a_motion(passage: Callable[..., Any]) -> Non
 
 @pytest.fixture(scope="module")
 def brink(generated_folder: Any) -> ModuleType:
-    """A fall without end at x = 0, a hilltop at 1, a well at 2, and a slope that rises for ever."""
+    """Return a curve with an endless fall at x = 0, a hilltop at 1, a well at 2, and an endless rise."""
     curve = gqm.Curve.graph("log(x) - 3*x/2 + x**2/4", domain=(0, None))
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="brink", folder=generated_folder)
 
 
 def test_released_a_hair_beside_a_hilltop(brink: ModuleType) -> None:
-    """It turns at the height of the hilltop, which exact numbers had to tell it to leave, and not farther."""
+    """The body turns at the height of the hilltop, which it leaves because of its exact place, and not farther away."""
     with mp.workdps(40):
         level = mp.findroot(lambda x: mp.log(x) - 3 * x / 2 + x**2 / 4 + mpf("1.25"), 3)
         motion = brink.solve("1 + 1e-14")
@@ -304,7 +312,7 @@ def test_released_a_hair_beside_a_hilltop(brink: ModuleType) -> None:
 
 
 def test_a_fall_towards_a_pole(brink: ModuleType) -> None:
-    """Released at 1/2, where the pole is nearer than a step: the time to a place is the integral of ds/V."""
+    """From 1/2, where the pole is nearer than a step, the time to a place is the integral of ds/V."""
     with mp.workdps(30):
 
         def height(x: mpf) -> mpf:
@@ -323,7 +331,7 @@ def test_a_fall_towards_a_pole(brink: ModuleType) -> None:
 
 
 def test_the_launch_is_the_number_given_and_not_its_double(passage: Callable[..., Any]) -> None:
-    """Beside 1/10, which no double is, places are reached when they are that far from it."""
+    """Beside 1/10, which is not a double, places are reached at the times of the exact launch."""
     motion = passage("level", lam0="1/10", v0=4, direction=1)
     for steps in (1, 3, 1000):
         place = 0.1 + steps * 2.0**-54
@@ -332,7 +340,7 @@ def test_the_launch_is_the_number_given_and_not_its_double(passage: Callable[...
 
 @pytest.mark.parametrize("v0", [1e-2, 1e-3, 1e-5, 1e-7, 1e-8, 1.76e-12])
 def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> None:
-    """It turns next to the launch, and its width in doubles says little of how long: found by ``make soak``.
+    """The body turns next to the launch, so near that doubles do not give the time; ``make soak`` found this.
 
     From the top of a cycloid's arch the arc length obeys sigma'' = k**2 sigma with k**2 = g/(4R).
     """
@@ -351,7 +359,9 @@ def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> 
 
 
 def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
-    """It winds for ever on a finite way: the motion ends, and says when. Found by ``make soak``: it took for ever."""
+    """A spiral winds for ever over a finite length; the motion ends, and says when (``make soak`` found that it took
+    for ever).
+    """
     spiral = gqm.derive(gqm.families.log_spiral(), gqm.CentralForce())
     drawn = gqm.build(spiral, name="drawn_in", folder=generated_folder)
     motion = drawn.solve(0, 1, -1, r0=1, b="3/20", k=2)
@@ -366,7 +376,7 @@ def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
 
 
 def test_contact_lost_at_launch_ends_a_fall(generated_folder: Any) -> None:
-    """A body under the arm of a spiral is let go and falls off at once, though the spiral would lead to its centre."""
+    """A body under the arm of a spiral loses contact at once, though the spiral would lead to its centre."""
     drawn = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.CentralForce()), name="let_go", folder=generated_folder)
     for contact in ("above", "below"):
         motion = drawn.solve(2, 0, -1, r0=1, b="1/5", k=1, contact=contact)
@@ -376,7 +386,7 @@ def test_contact_lost_at_launch_ends_a_fall(generated_folder: Any) -> None:
 
 
 def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
-    """Its last turns take less than two doubles hold of the time. Found by ``make soak``: panels without end."""
+    """The last turns take less time than two doubles resolve (``make soak`` found panels without end)."""
     spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound_up", folder=generated_folder)
     launch = {"lam0": 1.3490766955876934, "v0": 3.2020412377682295, "r0": 0.23362934079070044}
     launch |= {"b": 0.16404457011909193, "g": 12.030635764538687}
@@ -421,7 +431,7 @@ def answers(motion: Any) -> list[Any]:
 def test_no_answer_depends_on_what_was_asked_before(
     track: str, launch: dict[str, Any], contact: str, open_tracks: dict[str, ModuleType]
 ) -> None:
-    """A motion tells the same of itself before and after it was followed far, and the same as one followed at once."""
+    """A motion gives the same answers before and after it was followed far, and the same as one followed at once."""
     asked, fresh = (open_tracks[track].solve(**launch, contact=contact) for _ in range(2))
     before = answers(asked)
     end = min(asked.t_end, 80.0)
@@ -445,7 +455,7 @@ def test_no_answer_depends_on_what_was_asked_before(
 
 @pytest.fixture(scope="module")
 def open_tracks(generated_folder: Any, module_of: ModuleOf) -> dict[str, ModuleType]:
-    """Tracks without ends: waves, a cubic, and a line through the centre of an attraction."""
+    """Return tracks without ends: waves, a cubic, and a line through the centre of an attraction."""
     waves = gqm.derive(gqm.Curve.graph("sin(x)", parameter="x"), gqm.Gravity())
     fall = gqm.derive(gqm.Curve.graph("0*x", parameter="x"), gqm.CentralForce(k=1))
     return {
@@ -456,7 +466,7 @@ def open_tracks(generated_folder: Any, module_of: ModuleOf) -> dict[str, ModuleT
 
 
 def test_contact_lost_on_waves(open_tracks: dict[str, ModuleType]) -> None:
-    """Thrown along z = sin(x) at 8 m/s a body leaves where N = 0, before anything is asked of it."""
+    """Thrown along z = sin(x) at 8 m/s a body leaves at N = 0, before it is asked for anything."""
     motion = open_tracks["waves"].solve("0", 8, -1, contact="above")
     with mp.workdps(40):
         n = lambda x: (64 - 2 * G * mp.sin(x)) * -mp.sin(x) + G * (1 + mp.cos(x) ** 2)  # noqa: E731
@@ -471,7 +481,7 @@ def test_contact_lost_on_waves(open_tracks: dict[str, ModuleType]) -> None:
 
 
 def test_a_fall_into_a_centre_ends(open_tracks: dict[str, ModuleType]) -> None:
-    """From rest at distance 1 it takes pi/2**(3/2), which is known without the body being followed first."""
+    """From rest at distance 1 the fall takes pi/2**(3/2), which is known without following the body first."""
     for launch in ({}, {"t_max": 10}):
         motion = open_tracks["fall"].solve(1, **launch)
         assert off(motion.t_end, mp.pi / mp.sqrt(8)) <= TIME * 2
@@ -480,7 +490,7 @@ def test_a_fall_into_a_centre_ends(open_tracks: dict[str, ModuleType]) -> None:
 
 @pytest.mark.parametrize(("place", "side"), [("pi/2", "below"), ("3*pi/2", "below"), ("-pi/2", "below")])
 def test_rest_on_the_wrong_side(place: str, side: str, open_tracks: dict[str, ModuleType]) -> None:
-    """A body released at an equilibrium under a track that cannot hold it falls off at once, as beside it."""
+    """A body released at an equilibrium under a track that cannot hold it falls off at once, as it does beside it."""
     for lam0 in (place, f"{place} + 1/1000"):
         motion = open_tracks["waves"].solve(lam0, contact=side)
         assert (motion.kind, motion.t_end, motion.state(0).v) == ("transit", 0.0, 0.0)
@@ -502,7 +512,9 @@ def test_rest_with_friction_on_the_wrong_side() -> None:
 
 @pytest.mark.parametrize("lam0", ["-1", "1", -1.0])
 def test_a_ridge_as_high_as_the_launch(lam0: Any, generated_folder: Any) -> None:
-    """It is reached never, from either side; one unit from the launch the potential is that of the launch."""
+    """A ridge as high as the launch is never reached, from either side; one unit away the potential is that of the
+    launch.
+    """
     module = gqm.build(gqm.derive(gqm.Curve.graph("x**4 - x**2"), gqm.Gravity()), name="ridge", folder=generated_folder)
     motion = module.solve(lam0)
     assert (motion.kind, motion.t_end, motion.turning_points) == ("asymptotic", math.inf, (float(lam0),))

@@ -1,4 +1,6 @@
-"""Corners of stitched planes: contact is lost where the track bends away, and ridges are left as launched."""
+"""At corners of stitched planes contact is lost where the track bends away, and ridges are left in the direction of
+launch.
+"""
 
 import math
 from collections.abc import Callable
@@ -12,7 +14,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 
 G = 9.81
-# Two valleys with a ridge between, lower than the sides.
+# The track has two valleys with a ridge between them, lower than the sides.
 POINTS = [(0, 2), (1, 0), (2, 1), (3, 0), (4, 2)]
 LENGTHS = [math.dist(a, b) for a, b in pairwise(POINTS)]
 EDGES = [sum(LENGTHS[:k]) for k in range(5)]
@@ -24,7 +26,7 @@ Build = Callable[[str, bool], ModuleType]
 
 @pytest.fixture(scope="module")
 def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Build the track with a force, from its first point or from its last."""
+    """Return the track with a force, from its first point or from its last."""
     forces = {"free": gqm.Gravity(), "rough": gqm.Gravity() + gqm.CoulombFriction(mu="1/100")}
 
     @cache
@@ -37,7 +39,9 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
 
 def slid(force: str, lam: float, v: float, stops: list[float]) -> float:
-    """The time in s that a body moving right from ``lam`` with the speed ``v`` takes along planes, stop after stop."""
+    """Return the time in s that a body moving right from ``lam`` with the speed ``v`` takes along planes, stop after
+    stop.
+    """
     mu, spent = FRICTION if force == "rough" else 0.0, 0.0
     for stop in stops:
         k = max(k for k in range(4) if EDGES[k] <= min(lam, stop) + 1e-9)
@@ -60,7 +64,7 @@ def slid(force: str, lam: float, v: float, stops: list[float]) -> float:
 def test_a_body_leaves_the_track_at_a_ridge(
     force: str, is_reversed: bool, lam0: float, v0: float, stops: list[float], build: Build
 ) -> None:
-    """It runs through the valley, where the track bends towards it, and flies off where the track bends away."""
+    """A body passes the valley, where the track bends towards it, and flies off where the track bends away."""
     module = build(force, is_reversed)
     contact, direction = ("below", -1) if is_reversed else ("above", 1)
     launch = {"lam0": END - lam0 if is_reversed else lam0, "v0": v0, "direction": direction, "contact": contact}
@@ -79,7 +83,7 @@ def test_a_body_leaves_the_track_at_a_ridge(
 
 @pytest.mark.parametrize("force", ["free", "rough"])
 def test_a_body_launched_on_a_ridge_leaves_it_when_it_comes_back(force: str, build: Build) -> None:
-    """The launch is along the plane ahead, without flight; and from the valleys' bottoms no body flies off."""
+    """The launch is along the plane ahead, without flight; bodies launched at the valleys' bottoms do not fly off."""
     module = build(force, False)
     motion = module.solve(RIDGE, 1.0, -1, contact="above")
     assert [event.kind for event in motion.events] == ["corner", "turn", "corner", "liftoff"]
@@ -95,7 +99,7 @@ def test_a_body_launched_on_a_ridge_leaves_it_when_it_comes_back(force: str, bui
 def test_from_rest_on_a_ridge_a_body_slides_in_the_direction_of_launch(
     force: str, direction: int, at: dict[str, object], build: Build
 ) -> None:
-    """Down either side, and on for many periods, without contact being lost on the ridge, which it leaves slowly."""
+    """A body slides down either side, for many periods; contact is not lost on the ridge, which it leaves slowly."""
     module = build(force, False)
     motion = module.solve(**at, v0=0, direction=direction, contact="above", t_max=60)
     place = RIDGE + 0.5 * direction
@@ -109,7 +113,7 @@ def test_from_rest_on_a_ridge_a_body_slides_in_the_direction_of_launch(
 
 @pytest.mark.parametrize("lam0", [0.25, 1.0])
 def test_a_turning_body_has_no_speed(lam0: float, build: Build) -> None:
-    """v_min of a libration is 0, solved and swept, and no other zero."""
+    """v_min of a libration is 0, solved and swept, and never -0."""
     for force, horizon in (("free", None), ("rough", 5.0)):
         module = build(force, False)
         for v0, direction in ((0.5, 1), (0.5, -1), (0.0, 1)):
@@ -121,7 +125,9 @@ def test_a_turning_body_has_no_speed(lam0: float, build: Build) -> None:
 
 @pytest.mark.parametrize("launch", ["sqrt(5)/2", math.sqrt(5.0) / 2.0])
 def test_a_body_that_comes_to_rest_on_a_ridge_is_refused(launch: str | float, build: Build) -> None:
-    """It could slide off either way (all but its kind raised "not analytic"); a little higher or lower it does not."""
+    """The body could slide off either way (all but its kind raised "not analytic"); a little higher or lower it moves
+    on.
+    """
     module = build("free", False)
     with pytest.raises(SolutionError, match="comes to rest on the corner"):
         module.solve(launch)

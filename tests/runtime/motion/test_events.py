@@ -1,4 +1,6 @@
-"""A track that can only push: where bodies leave it, by the textbook; and where the force of one that holds turns."""
+"""Bodies leave a track that can only push at the places of textbooks, and the force of one that holds changes its
+sign.
+"""
 
 import math
 from collections.abc import Callable
@@ -14,20 +16,22 @@ import gqm_sym as gqm
 ModuleOf = Callable[[str], ModuleType]
 
 G = mpf("9.81")
-# Of the angle: the zero of N is found in N's own rounding, about 1e-15 of m g.
+# The tolerance of the angle: the zero of N is found within N's own rounding, about 1e-15 of m g.
 ANGLE = 4e-15
-# Of the time.
+# The tolerance of the time.
 TIME = 1e-14
 
 
 @pytest.fixture
 def circle(module_of: ModuleOf) -> ModuleType:
-    """A circle of radius L run counter-clockwise, its angle from the horizontal; the normal points inwards."""
+    """Return a circle of radius L, counter-clockwise with its angle from the horizontal; the normal points inwards."""
     return module_of("pendulum")
 
 
 def left_at(motion: Any) -> float:
-    """Where the motion leaves the track; the leg, the event and the end of the motion all agree."""
+    """Return the place at which the motion leaves the track; the leg, the event and the end of the motion must
+    agree.
+    """
     leg, event = motion.legs[-1], motion.events[-1]
     assert leg.end == event.kind == "liftoff"
     assert motion.kind == "transit"
@@ -41,13 +45,13 @@ def left_at(motion: Any) -> float:
 @pytest.mark.parametrize("v0", ["0.01", "1", "2", "3"])
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_body_slides_off_a_cylinder(v0: str, direction: int, circle: ModuleType) -> None:
-    """Sliding down from the top it leaves where the height is 2/3 of the radius and v0**2/(3 g) more."""
+    """Sliding down from the top a body leaves at 2/3 of the radius plus v0**2/(3 g) in height."""
     motion = circle.solve(lam0="pi/2", v0=v0, direction=direction, contact="below", L=1)
     place = left_at(motion)
     with mp.workdps(40):
         height = mpf(2) / 3 + mpf(v0) ** 2 / (3 * G)
         truth = mp.pi / 2 + direction * mp.acos(height)
-        # Flat as N is near the top, its rounding is a larger angle.
+        # N is flat near the top, so that its rounding is a larger angle.
         assert abs(mpf(place) - truth) <= ANGLE * float(truth) / float(mp.sqrt(1 - height**2))
         rate = lambda a: 1 / mp.sqrt(mpf(v0) ** 2 + 2 * G * (1 - mp.cos(a)))  # noqa: E731
         time = mp.quad(rate, [0, 0.001, 0.01, 0.1, 0.3, mp.acos(height)] if v0 == "0.01" else [0, mp.acos(height)])
@@ -78,7 +82,7 @@ def test_a_slow_loop_the_loop_falls_off(share: str, circle: ModuleType) -> None:
 
 @pytest.mark.parametrize(("share", "kind"), [("0.5", "libration"), ("1.999", "libration"), ("5.001", "circulation")])
 def test_a_loop_the_loop_that_never_falls_off(share: str, kind: str, circle: ModuleType) -> None:
-    """Too slow to pass the height of the centre, or fast enough for the top, contact is never lost."""
+    """If a body is too slow to pass the height of the centre, or fast enough for the top, contact is never lost."""
     launch = {"lam0": "-pi/2", "v0": f"sqrt({share}*9.81*2)", "L": 2}
     motion, held = circle.solve(**launch, contact="above"), circle.solve(**launch)
     assert motion.kind == held.kind == kind
@@ -88,7 +92,7 @@ def test_a_loop_the_loop_that_never_falls_off(share: str, kind: str, circle: Mod
 
 
 def test_just_fast_enough_for_the_top(circle: ModuleType) -> None:
-    """At v0**2 = 5 g L exactly the force touches zero at the top and contact lasts."""
+    """At exactly v0**2 = 5 g L the force touches zero at the top, and contact holds."""
     motion = circle.solve(lam0="-pi/2", v0="sqrt(5*9.81)", contact="above", L=1)
     assert motion.kind == "circulation"
 
@@ -96,14 +100,14 @@ def test_just_fast_enough_for_the_top(circle: ModuleType) -> None:
 @pytest.mark.parametrize(
     ("lam0", "v0", "direction", "contact"),
     [
-        ("pi/2", "1", 1, "above"),  # on the outside of a track that is only there from inside
+        ("pi/2", "1", 1, "above"),  # on the outside of a track that exists on the inside only
         ("-pi/2", "1", 1, "below"),  # under the ball
         ("pi/2", "4", -1, "below"),  # over the crest faster than sqrt(g L)
         ("pi/4", "0", 1, "above"),  # at rest on the ceiling
     ],
 )
 def test_launched_out_of_contact(lam0: str, v0: str, direction: int, contact: str, circle: ModuleType) -> None:
-    """Where the track would have to pull at once, the motion ends at once, where it was launched."""
+    """If the track would have to pull at once, the motion ends at the launch."""
     motion = circle.solve(lam0=lam0, v0=v0, direction=direction, contact=contact, L=1)
     assert left_at(motion) == motion.problem.lam0
     assert motion.t_end == 0.0
@@ -111,7 +115,7 @@ def test_launched_out_of_contact(lam0: str, v0: str, direction: int, contact: st
 
 
 def test_launched_without_force(circle: ModuleType) -> None:
-    """Where N is zero at launch what follows decides: inside a loop, upwards it leaves, downwards it stays.
+    """If N is zero at launch, the motion decides: inside a loop the body leaves upwards and stays downwards.
 
     N = m (v**2/L - g sin(angle)), and both terms are exact here.
     """
@@ -126,7 +130,7 @@ def test_launched_without_force(circle: ModuleType) -> None:
 
 
 def test_launched_without_force_on_a_slope_of_the_loop(circle: ModuleType) -> None:
-    """Half-way up, at v**2 = g L sin(angle): upwards the body leaves at once, downwards it keeps to the track."""
+    """Half-way up, at v**2 = g L sin(angle), the body leaves at once upwards, and keeps to the track downwards."""
     launch = {"lam0": "pi/6", "v0": "sqrt(9.81/2)", "L": 1, "contact": "above"}
     upwards, downwards = (circle.solve(direction=d, **launch) for d in (1, -1))
     assert left_at(upwards) == pytest.approx(math.pi / 6, rel=0, abs=ANGLE)
@@ -137,7 +141,7 @@ def test_launched_without_force_on_a_slope_of_the_loop(circle: ModuleType) -> No
 
 
 def test_a_held_body_never_leaves(circle: ModuleType) -> None:
-    """A bead on a wire has a force that changes sign twice on the way up and twice down, and goes on for ever."""
+    """The force on a bead on a wire changes its sign twice on the way up and twice down, and the motion has no end."""
     motion = circle.solve(lam0="-pi/2", v0="sqrt(3*9.81*2)", L=2)
     changes = sorted(event.lam for event in motion.events if event.kind == "contact-sign")
     with mp.workdps(40):
@@ -155,7 +159,7 @@ def test_a_held_body_never_leaves(circle: ModuleType) -> None:
 
 
 def test_a_free_flight_parabola_carries_nothing(module_of: ModuleOf) -> None:
-    """Over z = -a x**2 the force has one sign for good: below v0**2 = g/(2 a) at the crest contact lasts, above not."""
+    """Over z = -a x**2 the force has one sign: contact holds for v0**2 below g/(2 a) at the crest, and not above."""
     parabola = module_of("parabola")
     slow = parabola.solve(lam0="1e-3", v0="2.2", a=-1, contact="above", t_max=3)
     fast = parabola.solve(lam0="1e-3", v0="2.3", a=-1, contact="above", t_max=3)
@@ -166,7 +170,9 @@ def test_a_free_flight_parabola_carries_nothing(module_of: ModuleOf) -> None:
 
 
 def test_a_jump_off_a_hill_on_a_passage(module_of: ModuleOf) -> None:
-    """Down a cubic the body leaves where g + z'' V**2/(1 + z'**2) = 0; contact from the other side begins lost."""
+    """On a cubic the body leaves where g + z'' V**2/(1 + z'**2) = 0; on the other side there is no contact at
+    launch.
+    """
     cubic = module_of("cubic")
     motion = cubic.solve(lam0="-1/2", v0="1/2", direction=-1, contact="above")
     with mp.workdps(40):

@@ -1,4 +1,4 @@
-"""Extremes of speed and of the contact force with their times and places, against closed forms and dense samples."""
+"""Extremes of speed and of the contact force, their times and places agree with closed forms and dense samples."""
 
 from math import cos, pi, sqrt
 from pathlib import Path
@@ -17,14 +17,16 @@ NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
 
 @pytest.fixture(scope="module")
 def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum of one metre."""
+    """Return a pendulum of one metre."""
     return gqm.build(
         gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="swing", folder=tmp_path_factory.mktemp("a")
     )
 
 
 def test_a_pendulum(swing: ModuleType) -> None:
-    """Fastest and heaviest at the bottom after a quarter of the period; at rest and lightest at launch."""
+    """A pendulum has its largest speed and load at the bottom after a quarter of the period, and its smallest at
+    launch.
+    """
     motion = swing.solve(1)
     top, quarter = 2 * 9.81 * (1 - cos(1)), motion.period / 4
     assert motion.v_max.value == pytest.approx(sqrt(top), rel=1e-15)
@@ -37,7 +39,7 @@ def test_a_pendulum(swing: ModuleType) -> None:
 
 
 def test_a_circulation(swing: ModuleType) -> None:
-    """Slowest at the top; laps count in the place."""
+    """A circulation is slowest at the top, and its places count laps."""
     motion = swing.solve(0, 8)
     assert motion.v_min.value == pytest.approx(sqrt(64 - 4 * 9.81), rel=1e-14)
     assert motion.v_min.t == pytest.approx(motion.period / 2, rel=1e-12)
@@ -46,14 +48,14 @@ def test_a_circulation(swing: ModuleType) -> None:
 
 
 def test_near_the_separatrix_the_peak_is_short(swing: ModuleType) -> None:
-    """The fast part is a thousandth of the period, and found."""
+    """The fast part of the motion, a thousandth of the period, is found."""
     motion = swing.solve("pi - 1/1000000000000")
     assert motion.v_max.value == pytest.approx(sqrt(4 * 9.81), rel=1e-14)
     assert motion.v_max.lam == pytest.approx(0.0, abs=1e-9)
 
 
 def sampled(motion: Motion, name: str) -> float:
-    """The extreme among very many states."""
+    """Return the extreme among very many states."""
     end = min(motion.t_end, motion.period) if motion.kind in ("libration", "circulation") else motion.t_end
     state = motion.state(np.linspace(0.0, end, 20001))
     values = np.abs(state.v) if name.startswith("v_") else state.normal_force
@@ -62,7 +64,7 @@ def sampled(motion: Motion, name: str) -> float:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> None:
-    """No state is beyond an extreme, some are close, and the state at its time and place has that value."""
+    """No state exceeds an extreme, some are close to it, and the state at its time and place has its value."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu="1/5")
     rough = gqm.build(gqm.derive(gqm.families.ellipse(a=2, b=1), force), name="rough", folder=tmp_path)
     motions = [
@@ -81,13 +83,16 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
         assert sign * (found.value - sampled(motion, name)) <= 2e-3 * size  # at a turning point speeds are steep
         state = motion.state(found.t)
         there = abs(state.v) if name.startswith("v_") else state.normal_force
-        # At a turning point the speed is as steep as the acceleration: a rounding of the time is one of the speed.
+        # At a turning point the slope of the speed is the acceleration, so that a rounding of the time is one of the
+        # speed.
         assert there == pytest.approx(found.value, rel=1e-12, abs=1e-12)
         assert state.lam == pytest.approx(found.lam, rel=1e-9, abs=1e-9)
 
 
 def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
-    """At the rounded edge of a valley, N by its formula; sweeps told a 300th of it, from a grid that is too coarse."""
+    """At the rounded edge of a valley N agrees with its formula (sweeps returned a 300th of it, from a grid too
+    coarse).
+    """
     module = transient(gqm.derive(gqm.Curve.graph("sqrt(x**2 + 1/1000000) + x/3", parameter="x"), gqm.Gravity()))
     x = np.linspace(-2e-3, 2e-3, 1_000_001)
     radius = np.hypot(x, 1e-3)
@@ -105,7 +110,7 @@ def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
 
 
 def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None:
-    """A body at rest has its weight; a motion to infinity wants a horizon."""
+    """A body at rest has its weight, and a motion to infinity needs a horizon."""
     still = swing.solve(0)
     assert still.v_max == (0.0, 0.0, 0.0)
     assert still.normal_force_max.value == pytest.approx(9.81)
@@ -116,7 +121,7 @@ def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None
 
 
 def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
-    """The body ends where arc length and time stand still; it was fastest where the spiral was lowest before."""
+    """The body ends where arc length and time converge; it was fastest at the lowest place of the spiral before."""
     spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound", folder=tmp_path)
     motion = spiral.solve(1.6664575248551055, 0.7925274260475293, r0=1, b="3/20")
     assert motion.events[-1].kind == "cusp"
@@ -126,7 +131,9 @@ def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
 
 
 def test_a_load_that_jumps_at_a_joint(tmp_path: Path) -> None:
-    """Down a wall and round a quarter of a circle to the floor: N is largest where the circle ends, on its side."""
+    """Down a wall and through a quarter of a circle to the floor, N is largest at the end of the circle, on its
+    side.
+    """
     pieces = [gqm.line(length=1), gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4)]
     curve = gqm.Curve.piecewise(pieces, start=(0, 0), heading="-pi/2")
     motion = gqm.build(gqm.derive(curve, gqm.Gravity()), name="wall_peak", folder=tmp_path).solve("0.2")

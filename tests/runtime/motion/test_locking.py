@@ -1,4 +1,4 @@
-"""Motions that many threads read at once give each of them what one thread alone is given."""
+"""Motions that many threads read at once answer each of them as they answer one thread alone."""
 
 import copy
 import pickle
@@ -22,8 +22,8 @@ ModuleOf = Callable[[str], ModuleType]
 THREADS = 6
 TIMES = np.linspace(0.0, 40.0, 23)[1:]
 
-# A transit to infinity, an approach to a hilltop, a libration whose panels extended precision lays, a circulation, a
-# launch place that is no double, and a motion with friction.
+# The motions are a transit to infinity, an approach to a hilltop, a libration whose panels extended precision lays, a
+# circulation, a launch place that is no double, and a motion with friction.
 LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
     "open": ("waves", {"lam0": 0, "v0": 8, "direction": -1}),
     "approach": ("pendulum", {"lam0": "-pi/2", "v0": "2*sqrt(981/100)", "L": 1}),
@@ -36,7 +36,7 @@ LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
 
 @pytest.fixture(scope="module")
 def module_named(generated_folder: Path) -> ModuleOf:
-    """Give a committed module, or that of the waves z = sin(x)."""
+    """Return a committed module, or that of the waves z = sin(x)."""
     waves = gqm.Curve.graph("sin(x)", parameter="x")
     sine = gqm.build(gqm.derive(waves, gqm.Gravity()), name="waves", folder=generated_folder)
     return lambda name: sine if name == "waves" else import_module(f"generated.{name}")
@@ -44,7 +44,7 @@ def module_named(generated_folder: Path) -> ModuleOf:
 
 @pytest.fixture(autouse=True)
 def eager_switches() -> Iterator[None]:
-    """Let threads take turns as often as the interpreter can."""
+    """Let threads alternate as often as the interpreter can."""
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-6)
     yield
@@ -66,8 +66,8 @@ def answers(motion: Any) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", LAUNCHES)
-def test_six_threads_are_told_what_one_is(name: str, module_named: ModuleOf) -> None:
-    """Each of them begins at another question, and all begin at once."""
+def test_six_threads_get_the_answers_of_one(name: str, module_named: ModuleOf) -> None:
+    """Six threads begin at the same time, each with another question, and get the same answers."""
     track, launch = LAUNCHES[name]
     module = module_named(track)
     expected = answers(module.solve(**launch))

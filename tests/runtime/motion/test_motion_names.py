@@ -1,4 +1,4 @@
-"""The words of motions: documented fields and kinds, and names that were changed."""
+"""Fields and kinds of motions are documented, and names that were changed say so."""
 
 import typing
 from dataclasses import fields
@@ -22,7 +22,7 @@ from gqm_sym.runtime.sweep.result import DESCRIBED
 
 
 def test_a_renamed_attribute_says_its_new_name() -> None:
-    """As an attribute of an object and of a module; any other missing name is refused as usual."""
+    """An old attribute of an object or module says its new name; any other missing name is refused as usual."""
     motion: Any = object.__new__(MotionAtRest)
     with pytest.raises(
         AttributeError, match="a motion has no attribute 'conditioning'; it is called 'condition_number'"
@@ -49,7 +49,7 @@ def test_a_renamed_attribute_says_its_new_name() -> None:
     ],
 )
 def test_wrong_arguments_of_a_method_are_explained(call: Any, message: str) -> None:
-    """In the words of the package, and not with the names of its classes."""
+    """Wrong arguments are explained in the words of the package, and not with the names of its classes."""
     with pytest.raises(ArgumentError, match=f"^{message}"):
         call(pendulum.solve(-0.37))
 
@@ -69,14 +69,14 @@ def test_other_type_errors_pass_unchanged() -> None:
 
 @pytest.mark.parametrize("record", [State, Pass1, Event, Leg])
 def test_every_field_of_a_result_is_documented(record: Any) -> None:
-    """With its unit or meaning, under "Attributes"."""
+    """Every field of a result is documented with its unit or meaning, under "Attributes"."""
     names = getattr(record, "_fields", None) or [field.name for field in fields(record)]
     described = [line.split(":")[0] for line in record.__doc__.splitlines() if " : " in line and line[4:5] != " "]
     assert {name.strip() for line in described for name in line.split(",")} == set(names)
 
 
 def test_every_kind_and_end_is_documented() -> None:
-    """Where a user looks: in `Motion`, `Event` and `Leg`."""
+    """Every kind and end is documented in `Motion`, `Event` and `Leg`, where a user looks."""
     for kind in typing.get_args(kinds.MotionKind):
         assert f'"{kind}"' in str(Motion.__doc__)
     for kind in kinds.EVENT_KINDS:
@@ -87,7 +87,9 @@ def test_every_kind_and_end_is_documented() -> None:
 
 
 def test_sweeps_and_gradients_ask_what_a_motion_has() -> None:
-    """One list of quantities: each is an attribute of a motion, is described, and stands on the page of sweeps."""
+    """Sweeps and gradients have one list of quantities; each is an attribute of a motion, is described, and is on the
+    page of sweeps.
+    """
     page = (ROOT / "docs" / "howto" / "sweeps.md").read_text(encoding="utf-8")
     assert set(quantities.QUANTITIES) == {*kinds.QUANTITIES, *kinds.LOAD_EXTREMES}
     for name in quantities.QUANTITIES:
@@ -99,7 +101,7 @@ def test_sweeps_and_gradients_ask_what_a_motion_has() -> None:
 
 
 def test_ever_finer_grids_find_a_peak() -> None:
-    """Inside the range to a step of the last grid, and at an end of it exactly."""
+    """A peak inside the range is found to a step of the last grid, and one at an end exactly."""
     *_, inside = grid_peaks(lambda x: -abs(x - 0.3), 0.0, 1.0)
     assert abs(inside.place - 0.3) <= 2**-49
     *_, at_end = grid_peaks(lambda x: x, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Sampling periodic motions at many times: against closed forms, and against the reading of one exact time."""
+"""Periodic motions at many times agree with closed forms, and with the reading of one exact time."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -18,16 +18,17 @@ from gqm_sym.runtime.motion.motion import Motion
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Of the scale (MATHS, section 7): measured 3.7e-16.
+# The tolerance relative to the scale (MATHS, section 7). Worst measured: 3.7e-16.
 PLACE = 5e-16
-# Of the swing, next to the separatrix, where the panels' own noise grows: measured 1.6e-15.
+# The tolerance relative to the swing next to the separatrix, where the panels' own noise grows. Worst measured:
+# 1.6e-15.
 STEEP = 2.5e-15
-# Coefficients, of the swing or the lap: rounding of the nodes.
+# The tolerance of coefficients, relative to the swing or the lap, is the rounding of the nodes.
 SERIES = 4e-16
 # The compiled loop and the reading of exact times differ by the rounding of both.
 AGREE = 1.5e-15
 
-# Track and launch of motions of every sort: short series, long ones, and none.
+# A row has the track and launch of a motion; together they have short series, long ones, and none.
 MOTIONS: dict[str, tuple[str, dict[str, Any]]] = {
     "swing": ("circle", {"lam0": "6/5", "L": 1}),
     "swing on the way down": ("circle", {"lam0": 0.3, "v0": 2.0, "direction": -1, "L": 1}),
@@ -42,14 +43,14 @@ MOTIONS: dict[str, tuple[str, dict[str, Any]]] = {
 
 @pytest.fixture(params=MOTIONS, scope="module")
 def motion(request: pytest.FixtureRequest, module_of: ModuleOf) -> Any:
-    """Each motion in turn."""
+    """Return each motion in turn."""
     track, launch = MOTIONS[request.param]
     return module_of(track).solve(**launch)
 
 
 @pytest.mark.parametrize(("amplitude", "allowed"), [("6/5", PLACE), (1e-3, PLACE), (2.0, PLACE), (3.0, STEEP)])
 def test_a_pendulum_at_random_times(amplitude: Any, allowed: float, module_of: ModuleOf) -> None:
-    """The angle is 2 asin(k cd(w t)), hundreds of periods out too."""
+    """The angle is 2 asin(k cd(w t)), also after hundreds of periods."""
     motion = module_of("circle").solve(amplitude, L=1)
     t = np.random.default_rng(5).uniform(-1000.0, 1000.0, 60)
     places = motion.lam(t)
@@ -89,7 +90,9 @@ def test_a_whirling_pendulum_at_random_times(direction: int, module_of: ModuleOf
 
 
 def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:
-    """All columns of the state, within the first period and hundreds of periods out, either way in time."""
+    """All columns of the state agree, within the first period and hundreds of periods away, in both directions of
+    time.
+    """
     period = motion.period
     for reach in (0.99 * period, 300.0 * period):
         t = np.append(np.linspace(-reach, reach, 501), [0.0, 0.5 * period])
@@ -97,7 +100,7 @@ def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:
         assert (motion.lam(t) == state.lam).all()
         width = abs(motion._segment.b - motion._segment.a)
         for name, got, old in zip(state._fields, state, plain, strict=True):
-            if name == "error":  # an estimate: of one size either way
+            if name == "error":  # an estimate, which is of the same size in both directions
                 assert np.all((got <= 2.0 * old) & (old <= 2.0 * got))
                 continue
             scale = max(np.abs(old).max(), width) if name == "lam" else np.abs(old).max()
@@ -105,7 +108,7 @@ def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:
 
 
 def test_at_launch_it_is_at_the_launch_place(motion: Any) -> None:
-    """Exactly, not within rounding."""
+    """At launch the place is exactly that of the launch, not within rounding."""
     state = motion.state(np.zeros(3))
     assert (state.lam == motion.problem.lam0).all()
     assert (state.s == 0.0).all()
@@ -113,7 +116,7 @@ def test_at_launch_it_is_at_the_launch_place(motion: Any) -> None:
 
 
 def test_one_time_or_many_give_the_same(motion: Any) -> None:
-    """Floats, ints and arrays of any shape and stride; threads change nothing."""
+    """Floats, ints and arrays of any shape and stride give the same results, whatever the number of threads."""
     t = np.linspace(0.0, 37.0, 24)
     places, state = motion.lam(t), motion.state(t)
     assert [motion.lam(float(time)) for time in t] == list(places)
@@ -129,7 +132,7 @@ def test_one_time_or_many_give_the_same(motion: Any) -> None:
 
 
 def test_threads_change_nothing(module_of: ModuleOf, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Large arrays are cut into parts; each part is what it would have been."""
+    """Large arrays are cut into parts, each of which has the same results."""
     motion = module_of("circle").solve(1.0, L=1)
     t = np.linspace(0.0, 1e4, 2**17 + 77)
     alone = motion.lam(t)
@@ -138,7 +141,7 @@ def test_threads_change_nothing(module_of: ModuleOf, monkeypatch: pytest.MonkeyP
 
 
 def test_times_that_cannot_be_are_refused_as_before(module_of: ModuleOf) -> None:
-    """NaN, and times beyond the horizon."""
+    """NaN and times beyond the horizon are refused as before."""
     motion = module_of("circle").solve(1.0, L=1, t_max=5)
     with pytest.raises(InputError, match="NaN"):
         motion.lam(np.array([0.0, np.nan]))
@@ -148,14 +151,14 @@ def test_times_that_cannot_be_are_refused_as_before(module_of: ModuleOf) -> None
 
 @pytest.mark.parametrize("launch", [{"lam0": 1.0}, {"lam0": 0.3, "v0": 9.0}, {"lam0": 0.3, "v0": 9.0, "direction": -1}])
 def test_arc_length_on_a_circle(launch: dict[str, Any], module_of: ModuleOf) -> None:
-    """From the launch on, radius times angle; backwards in time too."""
+    """From the launch on, arc length is radius times angle, also backwards in time."""
     motion = module_of("circle").solve(**launch, L=2)
     state = motion.state(np.array([-3.3, -0.1, 0.0, 0.2, 1.0, 7.7, 100.3]))
     assert state.s == pytest.approx(2.0 * (state.lam - launch["lam0"]), rel=1e-14, abs=1e-14)
 
 
 def test_events_of_later_periods(module_of: ModuleOf) -> None:
-    """A swing turns each half period, a lap is at the lowest point once; between late times as between early ones."""
+    """A swing turns each half period and a lap passes the lowest point once, also between late times."""
     swing = module_of("circle").solve(1.0, L=2)
     half = swing.half_period
     for first in (-7, 1, 40):
@@ -167,14 +170,14 @@ def test_events_of_later_periods(module_of: ModuleOf) -> None:
 
 
 def series(motion: Any, there_and_back: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The coefficients of a motion's series."""
+    """Return the coefficients of a motion's series."""
     segment = motion._segment
     return fit_wave(segment.edges, *segment.edge_times, segment.panels[3], there_and_back)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 1.2, 2.9])
 def test_the_series_of_a_swing(amplitude: float, module_of: ModuleOf) -> None:
-    """Fourier's of 2 asin(k sn u), by the nome (DLMF 22.11)."""
+    """The series of a swing is that of 2 asin(k sn u), by the nome (DLMF 22.11)."""
     cosines, sines = series(module_of("circle").solve(amplitude, L=1), True)
     assert sines.size == 0
     k, n = mp.sin(mpf(amplitude) / 2), np.arange(cosines.size)
@@ -186,7 +189,7 @@ def test_the_series_of_a_swing(amplitude: float, module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("v0", [7.0, 12.0])
 def test_the_series_of_a_lap(v0: float, module_of: ModuleOf) -> None:
-    """Fourier's of the amplitude function, less its mean pace."""
+    """The series of a lap is that of the amplitude function, less its mean rate."""
     cosines, sines = series(module_of("circle").solve(0.0, v0, L=1), False)
     q, n = float(mp.qfrom(k=2 * mp.sqrt(mpf("9.81")) / mpf(v0))), np.arange(cosines.size)
     assert np.abs(cosines).max() <= SERIES
@@ -198,7 +201,7 @@ def test_the_series_of_a_lap(v0: float, module_of: ModuleOf) -> None:
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 9, 40])
 @pytest.mark.parametrize("places", [1, 7, GROUP, GROUP + 1])
 def test_sums_of_waves(count: int, places: int) -> None:
-    """Of cosines as numpy has it; of sines, each over sin(phi), as the product of both says."""
+    """Sums of cosines agree with numpy, and sums of sines, each over sin(phi), with the product of both."""
     c = np.random.default_rng(count).normal(size=count)
     phi = np.linspace(0.1, np.pi - 0.1, places)
     x, out, work = np.zeros(2 * GROUP), np.empty(2 * GROUP), np.empty(2 * GROUP)
@@ -211,7 +214,7 @@ def test_sums_of_waves(count: int, places: int) -> None:
 
 
 def test_series_are_as_long_as_they_must_be(module_of: ModuleOf) -> None:
-    """The tautochrone's is one cosine, a swing takes a few, and next to the separatrix there is none."""
+    """The tautochrone's series is one cosine, a swing's has a few terms, and next to the separatrix there is none."""
 
     def terms(lam0: float) -> int:
         return len(series(module_of("circle").solve(lam0, L=1), True)[0])

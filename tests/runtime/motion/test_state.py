@@ -1,4 +1,4 @@
-"""Uses of a motion: print and copy it, tables of its states, its energy."""
+"""Motions can be printed and copied, and give tables of states and energies."""
 
 import copy
 import pickle
@@ -18,7 +18,7 @@ from gqm_sym.runtime import Energy, State
 
 @pytest.fixture(scope="module")
 def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum of one metre."""
+    """Return a pendulum of one metre."""
     return gqm.build(
         gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="swing", folder=tmp_path_factory.mktemp("a")
     )
@@ -26,7 +26,7 @@ def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def dragged(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The same with drag."""
+    """Return the same pendulum with drag."""
     force = gqm.Gravity() + gqm.QuadraticDrag(b="1/10")
     return gqm.build(gqm.derive(gqm.families.circle(L=1), force), name="dragged", folder=tmp_path_factory.mktemp("b"))
 
@@ -36,7 +36,7 @@ TIMES = np.linspace(0.0, 2.0, 9)
 
 @pytest.mark.parametrize("launch", [{"lam0": 1}, {"lam0": "1/3", "v0": 20}, {"lam0": 1, "t_max": 3}, {"lam0": 0}])
 def test_copies_answer_the_same_bits(swing: ModuleType, dragged: ModuleType, launch: dict[str, object]) -> None:
-    """Copied and pickled, with exact numbers and parameters; the copy is a motion of its own."""
+    """Copied and pickled motions with exact numbers and parameters give the same bits, and are motions of their own."""
     for module in (swing, dragged):
         motion = module.solve(**launch, L="11/10")
         for twin in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
@@ -47,14 +47,16 @@ def test_copies_answer_the_same_bits(swing: ModuleType, dragged: ModuleType, lau
 
 
 def test_a_copy_after_its_period_was_asked_for(swing: ModuleType) -> None:
-    """The period is then known as two doubles, on which last digits depend."""
+    """The period of a motion is then known as two doubles, on which last digits depend; a copy has them too."""
     motion = swing.solve(1)
     _ = motion.period
     assert np.array_equal(copy.deepcopy(motion).lam(TIMES), motion.lam(TIMES))
 
 
 def test_a_motion_goes_to_another_process(swing: ModuleType, tmp_path: Path) -> None:
-    """By the text of its module, also where the file is gone; the answers are the same to the last bit."""
+    """A motion is sent by the text of its module, also if the file is gone; the answers are the same to the last
+    bit.
+    """
     motion = swing.solve("5/2", 1)
     file = tmp_path / "motion.pickle"
     file.write_bytes(pickle.dumps(motion))
@@ -64,15 +66,17 @@ def test_a_motion_goes_to_another_process(swing: ModuleType, tmp_path: Path) -> 
 
 
 def test_a_launch_by_a_point_is_copied(tmp_path: Path) -> None:
-    """The copy is launched by the point again."""
+    """The copy is launched by the point as well."""
     ring = gqm.Curve.implicit("x**2 + z**2 - 1", start=(1, 0))
     module = gqm.build(gqm.derive(ring, gqm.Gravity()), name="ring", folder=tmp_path)
     motion = module.solve(point=("3/5", "-4/5"), v0=1)
     assert np.array_equal(copy.deepcopy(motion).lam(TIMES), motion.lam(TIMES))
 
 
-def test_a_motion_is_told(swing: ModuleType) -> None:
-    """Kind, launch as it was written, times with units, parameters; one line where there is no room."""
+def test_a_motion_prints_itself(swing: ModuleType) -> None:
+    """A motion prints its kind, the launch as written, times with units and parameters; or one line if there is no
+    room.
+    """
     motion = swing.solve("5/2")
     text = str(motion)
     for part in ("Motion of swing", "libration", "5/2", "period (s)", "9.81"):
@@ -80,8 +84,8 @@ def test_a_motion_is_told(swing: ModuleType) -> None:
     assert repr(motion) == "<libration of swing: lam0 = 5/2, v0 = 0.0>"
 
 
-def test_a_state_is_told(swing: ModuleType) -> None:
-    """One under the other for one time, a table for some, the first of many; with units."""
+def test_a_state_prints_itself(swing: ModuleType) -> None:
+    """A state prints one line for each field at one time, a table at some times, and the first of many, with units."""
     motion = swing.solve(1)
     assert "v (m/s)" in str(motion.state(0.5))
     lines = str(motion.state(TIMES)).splitlines()
@@ -92,7 +96,7 @@ def test_a_state_is_told(swing: ModuleType) -> None:
 
 
 def test_states_as_a_table(swing: ModuleType) -> None:
-    """A column for each field and a row for each time; one time is one row."""
+    """There is a column for each field and a row for each time; one time is one row."""
     state = swing.solve(1).state(TIMES)
     table = state.to_pandas()
     assert isinstance(table, pd.DataFrame)
@@ -106,7 +110,7 @@ def test_states_as_a_table(swing: ModuleType) -> None:
 def test_one_time_is_a_float_and_one_element_an_array(
     swing: ModuleType, dragged: ModuleType, launch: tuple[object, ...]
 ) -> None:
-    """Whatever the kind of motion, and whatever holds the number."""
+    """One time gives a float, and one element an array, whatever the kind of motion and the type of the number."""
     for motion in (swing.solve(*launch), dragged.solve(*launch)):
         for t in (0.1, np.float64(0.1), np.array(0.1), "1/10"):
             for answer in (motion.lam(t), *motion.state(t), motion.error_bound(t), *motion.energy(t)):
@@ -118,7 +122,7 @@ def test_one_time_is_a_float_and_one_element_an_array(
 
 
 def test_energy_is_kept(swing: ModuleType) -> None:
-    """m*V**2/2 and m*g*z; nothing is lost."""
+    """The energies are m*V**2/2 and m*g*z, and nothing is lost."""
     motion = swing.solve(1, 2, m=3, g=5)
     energy, state = motion.energy(TIMES), motion.state(TIMES)
     assert isinstance(energy, Energy)
@@ -129,7 +133,7 @@ def test_energy_is_kept(swing: ModuleType) -> None:
 
 
 def test_a_rolling_body_turns_too(tmp_path: Path) -> None:
-    """The kinetic energy has the factor 1 + beta, the potential energy has not."""
+    """The kinetic energy has the factor 1 + beta, and the potential energy does not."""
     force = gqm.Gravity() + gqm.Rolling(beta="2/5")
     module = gqm.build(gqm.derive(gqm.Curve.graph("x**2"), force), name="ball", folder=tmp_path)
     motion = module.solve(1, m=2)
@@ -139,7 +143,7 @@ def test_a_rolling_body_turns_too(tmp_path: Path) -> None:
 
 
 def test_what_drag_takes(dragged: ModuleType) -> None:
-    """The work of b*V**2 along the path, by Gauss-Legendre quadrature of the power b*|V|**3."""
+    """The energy lost is the work of b*V**2 along the path, by Gauss-Legendre quadrature of the power b*|V|**3."""
     motion = dragged.solve(1, m=2)
     nodes, weights = np.polynomial.legendre.leggauss(60)
     stops = [0.0, *(event.t for event in motion.events_between(0, 2) if event.kind == "turn" and 0 < event.t < 2), 2.0]
@@ -152,7 +156,7 @@ def test_what_drag_takes(dragged: ModuleType) -> None:
 
 
 def test_what_friction_takes(tmp_path: Path) -> None:
-    """On a slope the work of friction is mu*N times the path, until the body rests."""
+    """On a slope the work of friction is mu*N times the length of the path, until the body rests."""
     slope = gqm.Curve.graph("x/2")
     force = gqm.Gravity() + gqm.CoulombFriction(mu="9/10")
     module = gqm.build(gqm.derive(slope, force), name="slope", folder=tmp_path)
@@ -163,7 +167,7 @@ def test_what_friction_takes(tmp_path: Path) -> None:
 
 
 def test_a_state_is_read_by_name_by_position_and_as_a_table(swing: ModuleType, dragged: ModuleType) -> None:
-    """Fields are columns for pandas; taken apart, copied and pickled it is the same."""
+    """Fields are columns for pandas; when unpacked, copied and pickled they are the same."""
     for module in (swing, dragged):
         motion = module.solve(1)
         state = motion.state(TIMES)
@@ -188,7 +192,7 @@ def test_a_state_is_read_by_name_by_position_and_as_a_table(swing: ModuleType, d
 
 
 def test_states_are_compared_and_cannot_be_changed(swing: ModuleType) -> None:
-    """As named tuples."""
+    """States compare like named tuples and cannot be changed."""
     state = swing.solve(1).state(0.5)
     twin = swing.solve(1).state(0.5)
     assert state == twin == tuple(state)
@@ -207,7 +211,7 @@ def test_states_are_compared_and_cannot_be_changed(swing: ModuleType) -> None:
 
 
 def test_one_number_gives_numbers_and_one_element_an_array(swing: ModuleType, dragged: ModuleType) -> None:
-    """Whatever holds them, for every kind of motion."""
+    """One number gives numbers and one element an array, whatever their type, for every kind of motion."""
     for motion in (swing.solve(1), swing.solve(0), swing.solve(0, 20), dragged.solve(1)):
         asked = (motion.lam, motion.error_bound, lambda t, m=motion: m.state(t).v, lambda t, m=motion: m.energy(t).lost)
         for ask in asked:
@@ -220,7 +224,9 @@ def test_one_number_gives_numbers_and_one_element_an_array(swing: ModuleType, dr
 
 
 def test_any_array_of_numbers_is_taken(swing: ModuleType, dragged: ModuleType) -> None:
-    """Arrays that cannot be written, as pandas and broadcasting give them; strided, turned, of other types."""
+    """Arrays that cannot be written, as pandas and broadcasting give them, are accepted; also strided, reversed and of
+    other types.
+    """
     plain = np.linspace(0.125, 1.0, 8)
     frozen = plain.copy()
     frozen.setflags(write=False)

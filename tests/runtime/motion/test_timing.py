@@ -1,4 +1,4 @@
-"""At the edge of what a motion has: places never met, times beyond the last digit, launches as slow as can be."""
+"""Places that are never reached, times beyond the last digit, and very slow launches are answered or refused."""
 
 import math
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from naive import ulps
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
 
-# Twice the root of g L: from the lowest place exactly to the highest.
+# Twice the root of g L is the speed that leads from the lowest place exactly to the highest.
 TO_THE_TOP = "2*sqrt(9.81)"
 
 
 @pytest.fixture(scope="module")
 def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead on a circle; L = 1 in all launches here."""
+    """Return a bead on a circle; L is 1 in all launches here."""
     return module_of("circle")
 
 
 def test_a_round_has_no_half(circle: ModuleType) -> None:
-    """Nor is it ever at a place behind its launch: places count the rounds."""
+    """A round has no half period, and is never at a place behind its launch, because places count the rounds."""
     motion = circle.solve(lam0=0, v0=10, L=1)
     assert motion.kind == "circulation"
     with pytest.raises(SolutionError, match="only a libration has one; this motion is of kind 'circulation'"):
@@ -33,7 +33,7 @@ def test_a_round_has_no_half(circle: ModuleType) -> None:
 
 
 def test_rest_is_at_one_place(circle: ModuleType) -> None:
-    """At its launch from the launch on, elsewhere never."""
+    """A body at rest is at its launch place from the launch on, and elsewhere never."""
     motion = circle.solve(lam0=0, L=1)
     assert motion.time_at(0) == 0.0
     with pytest.raises(SolutionError, match=r"never at lam = 1; it rests at 0\.0"):
@@ -41,19 +41,23 @@ def test_rest_is_at_one_place(circle: ModuleType) -> None:
 
 
 def test_lost_on_the_way_to_the_top(circle: ModuleType) -> None:
-    """V**2 = 2 g L (1 + cos): inside the circle N vanishes where the cosine is -2/3, and no top is ever approached."""
+    """With V**2 = 2 g L (1 + cos), N vanishes inside the circle at a cosine of -2/3, so that the top is never
+    approached.
+    """
     motion = circle.solve(lam0=0, v0=TO_THE_TOP, L=1, contact="above")
     assert (motion.kind, motion.events[-1].kind) == ("transit", "liftoff")
     with mp.workdps(30):
         there = mp.acos(-mpf(2) / 3)
         assert ulps(motion.legs[-1].lam_end, there) <= 2.0
-        # tan((pi + angle)/4) = exp(omega t) on the separatrix.
+        # On the separatrix tan((pi + angle)/4) = exp(omega t).
         when = mp.log(mp.tan((mp.pi + there) / 4)) / mp.sqrt(mpf("9.81"))
         assert ulps(motion.t_end, when) <= 4.0
 
 
 def test_an_approach_has_a_last_digit(circle: ModuleType) -> None:
-    """At 5 s it is known how far the top is; after 1000 s that is no number any more. A horizon ends it."""
+    """At 5 s the distance to the top is known, and after 1000 s it has no digits left, unless a horizon ends the
+    motion.
+    """
     motion = circle.solve(lam0=0, v0=TO_THE_TOP, L=1)
     with mp.workdps(30):
         assert ulps(motion.lam(5.0), 4 * mp.atan(mp.exp(5 * mp.sqrt(mpf("9.81")))) - mp.pi) <= 2.0
@@ -64,7 +68,7 @@ def test_an_approach_has_a_last_digit(circle: ModuleType) -> None:
 
 
 def test_a_fall_without_an_end(tmp_path: Path) -> None:
-    """Down a line by g t**2/4 in x, as long as that is a double with room to spare."""
+    """Down a line the body moves g t**2/4 in x, as long as that is well inside the range of doubles."""
     motion = gqm.build(gqm.derive(gqm.Curve.graph("-x"), gqm.Gravity()), name="line", folder=tmp_path).solve(lam0=0)
     for t in (1.0, 1e3, 1e20):
         assert motion.lam(t) == pytest.approx(9.81 * t**2 / 4.0, rel=1e-15)
@@ -73,7 +77,7 @@ def test_a_fall_without_an_end(tmp_path: Path) -> None:
 
 
 def test_a_fall_to_a_singular_point(tmp_path: Path) -> None:
-    """Down the graph of x**(3/2) from 1 to 0, where its curvature is infinite and beyond which there is nothing."""
+    """The graph of x**(3/2) is passed from 1 to 0, where its curvature is infinite and the curve ends."""
     motion = gqm.build(gqm.derive(gqm.Curve.graph("x*sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path).solve(
         lam0=1
     )
@@ -89,7 +93,7 @@ def test_a_fall_to_a_singular_point(tmp_path: Path) -> None:
 
 
 def test_a_fall_beyond_what_can_be_summed(tmp_path: Path) -> None:
-    """Down -exp(x): V**2 = 2 g (exp(x) - 1) along some e**300 m; beyond, the climb's square is no double."""
+    """Down -exp(x), V**2 = 2 g (exp(x) - 1) over some e**300 m; beyond, the square of the height is beyond doubles."""
     motion = gqm.build(gqm.derive(gqm.Curve.graph("-exp(x)"), gqm.Gravity()), name="cliff", folder=tmp_path).solve(
         lam0=0
     )
@@ -106,7 +110,7 @@ def test_a_fall_beyond_what_can_be_summed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("v0", ["1e-3", "1e-9", "1e-12", "1e-20"])
 def test_out_of_a_cusp_however_slowly(v0: str, module_of: Callable[[str], ModuleType]) -> None:
-    """It turns at 2 asin(k) after 2 sqrt(R/g) atanh(k), k = v0/(2 sqrt(g R))."""
+    """The body turns at 2 asin(k) after 2 sqrt(R/g) atanh(k), with k = v0/(2 sqrt(g R))."""
     motion = module_of("cycloid_arch").solve(lam0=0, v0=v0, R=1)
     with mp.workdps(40):
         k = mpf(v0) / (2 * mp.sqrt(mpf("9.81")))
@@ -115,7 +119,7 @@ def test_out_of_a_cusp_however_slowly(v0: str, module_of: Callable[[str], Module
 
 
 def test_out_of_a_cusp_the_wrong_way(module_of: Callable[[str], ModuleType]) -> None:
-    """The domain begins at it; released there, at the lowest place, the body rests."""
+    """The domain begins at the cusp; a body released there, at the lowest place, rests."""
     module = module_of("cycloid_arch")
     with pytest.raises(LaunchError, match=r"is the cusp itself, .* launch with direction=1 or from a place inside"):
         module.solve(lam0=0, v0=1, R=1, direction=-1)

@@ -1,4 +1,4 @@
-"""The quadrature rule, and panels of time and arc length on stretches whose times are known."""
+"""The quadrature rule, and panels of time and arc length, are right on segments with known times."""
 
 import math
 from collections.abc import Callable
@@ -34,13 +34,14 @@ ModuleOf = Callable[[str], ModuleType]
 ULP = 2.0**-52
 # Nodes and weights are rounded once each.
 RULE = ULP
-# How wrong the rule is about the first polynomial beyond its degree, of norm about 0.2: measured 1.9e-3.
+# The error of the rule for the first polynomial beyond its degree, of norm about 0.2. Measured: 1.9e-3.
 BEYOND = 1e-3
-# Interpolation at 21 nodes: each coefficient is a sum of 21 products of values up to 1. Measured 1.2e-16.
+# The tolerance of interpolation at 21 nodes: each coefficient is a sum of 21 products of values up to 1. Worst
+# measured: 1.2e-16.
 INTERPOLATION = 4 * ULP
-# A whole stretch, and any part of it, as a share of the whole. Measured 2.9e-16.
+# The tolerance of a whole segment and of any part of it, as a share of the whole. Worst measured: 2.9e-16.
 TIME = 4 * ULP
-# Speeds come without a difference of heights: measured 3.3e-16.
+# The tolerance of speeds, which are found without a difference of heights. Worst measured: 3.3e-16.
 SPEED = 4 * ULP
 
 NODES_BOTH = np.concatenate([-NODES[:0:-1], NODES])
@@ -48,7 +49,7 @@ G = 9.81
 
 
 def rule(weights: Any, degree: int) -> mpf:
-    """A rule's sum for a Legendre polynomial, without rounding."""
+    """Return a rule's sum for a Legendre polynomial, without rounding."""
     both = np.concatenate([weights[:0:-1], weights])
     with mp.workdps(40):
         pairs = zip(both, NODES_BOTH, strict=True)
@@ -56,7 +57,7 @@ def rule(weights: Any, degree: int) -> mpf:
 
 
 class Laid:
-    """Panels over a stretch of a module, as the runtime lays them."""
+    """Panels over a segment of a module, as the runtime lays them."""
 
     def __init__(self, module: ModuleType, kind: int, a: float, b: float, **given: Any) -> None:
         ref, w, stop = given.pop("ref", a), given.pop("w", 0.0), given.pop("stop", 1.0)
@@ -72,37 +73,37 @@ class Laid:
 
     @property
     def whole(self) -> float:
-        """The time of the whole stretch."""
+        """Return the time of the whole segment."""
         return float(self.marks[-1])
 
     def times(self, phi: Any) -> Any:
-        """Times at phase angles."""
+        """Return times at phase angles."""
         return read_off_many(self.edges, self.marks, self.time_terms, np.asarray(phi, dtype=float))
 
     def arcs(self, phi: Any) -> Any:
-        """Arc lengths at phase angles."""
+        """Return arc lengths at phase angles."""
         return read_off_many(self.edges, self.lengths, self.length_terms, np.asarray(phi, dtype=float))
 
     def speeds(self, phi: Any) -> Any:
-        """Speeds at phase angles."""
+        """Return speeds at phase angles."""
         return speeds_at(*self.at, np.asarray(phi, dtype=float))
 
 
 def share(actual: float, truth: mpf, of: float) -> float:
-    """A difference as a share of something."""
+    """Return a difference relative to a number."""
     return float(abs(mpf(float(actual)) - truth) / mpf(of))
 
 
 @pytest.fixture(scope="session")
 def slope(generated_folder: Any) -> ModuleType:
-    """A straight line by arc length, at an angle from the horizontal."""
+    """Return a straight line by arc length, at an angle from the horizontal."""
     curve = gqm.Curve.parametric(x="s*cos(angle)", z="s*sin(angle)", parameter="s")
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="slope", folder=generated_folder)
 
 
 @pytest.fixture(scope="session")
 def vee(generated_folder: Any) -> ModuleType:
-    """Two straight lines with a corner at the origin, which a user's formula may not have."""
+    """Return two straight lines with a corner at the origin, which a user's formula may not have."""
     curve = gqm.Curve.graph("abs(x)", parameter="x")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gqm_sym.derivation.pipeline.check_corners", lambda *_, **__: None)
@@ -112,14 +113,14 @@ def vee(generated_folder: Any) -> ModuleType:
 
 @pytest.mark.parametrize(("weights", "degree"), [(GAUSS_WEIGHTS, 19), (KRONROD_WEIGHTS, 31)])
 def test_a_rule_is_exact_to_its_degree_and_not_beyond(weights: Any, degree: int) -> None:
-    """Ten Gauss nodes integrate polynomials of degree 19, with eleven of Kronrod's those of degree 31; no more."""
+    """Ten Gauss nodes integrate polynomials up to degree 19 exactly, and with eleven Kronrod nodes up to degree 31."""
     assert abs(rule(weights, 0) - 2) <= RULE
     assert all(abs(rule(weights, k)) <= RULE for k in range(1, degree + 1))
     assert abs(rule(weights, degree + 1)) >= BEYOND
 
 
 def test_the_gauss_rule_uses_every_second_node() -> None:
-    """Gauss' nodes are the zeros of the tenth Legendre polynomial; between two of them lies one of Kronrod's."""
+    """Gauss' nodes are the zeros of the tenth Legendre polynomial, and between each two of them is one of Kronrod's."""
     zeros = np.polynomial.legendre.leggauss(10)[0]
     assert np.allclose(NODES_BOTH[1::2], zeros, rtol=0, atol=ULP)
     assert not GAUSS_WEIGHTS[0::2].any()
@@ -127,7 +128,9 @@ def test_the_gauss_rule_uses_every_second_node() -> None:
 
 @pytest.mark.parametrize("degree", range(COUNT))
 def test_values_at_the_nodes_become_the_integral_s_legendre_series(degree: int) -> None:
-    """A Legendre polynomial's integral from -1 is (P[n+1] - P[n-1])/(2n+1), up to the highest that 21 values hold."""
+    """The integral of a Legendre polynomial from -1 is (P[n+1] - P[n-1])/(2n+1), up to the highest that 21 values
+    determine.
+    """
     with mp.workdps(40):
         values = np.array([float(mp.legendre(degree, mpf(float(x)))) for x in NODES_BOTH])
     half, out = 0.75, np.empty(DEGREE)
@@ -155,7 +158,7 @@ def test_a_legendre_series_is_summed_as_its_terms_say() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.25, -0.75])
 def test_a_straight_line_from_place_to_place(angle: float, slope: ModuleType) -> None:
-    """With initial speed v0 uphill, the time to s is (v0 - V)/(g sin), or s/v0 on the level."""
+    """With the initial speed v0 uphill, the time to s is (v0 - V)/(g sin), or s/v0 on the level."""
     v0, a, b = 16.0, 1.5, 5.5
     laid = Laid(slope, REGULAR, a, b, w=v0**2, angle=angle)
     phi = np.linspace(0.0, 1.0, 23)
@@ -174,7 +177,7 @@ def test_a_straight_line_from_place_to_place(angle: float, slope: ModuleType) ->
 @pytest.mark.parametrize("angle", [0.5, 1e-6, -0.75, 1.5])
 @pytest.mark.parametrize("start", [0.0, 100.0])
 def test_free_fall_from_rest(angle: float, start: float, slope: ModuleType) -> None:
-    """Released on a slope: t = sqrt(2 s/(g sin)), s = g sin t**2/2, V = g sin t, on either side."""
+    """Released on a slope, t = sqrt(2 s/(g sin)), s = g sin t**2/2 and V = g sin t, on either side."""
     end = start - math.copysign(7.0, angle)
     laid = Laid(slope, FROM_TURN, start, end, angle=angle)
     phi = np.linspace(0.0, 1.0, 23)
@@ -192,7 +195,7 @@ def test_free_fall_from_rest(angle: float, start: float, slope: ModuleType) -> N
 
 @pytest.mark.parametrize("end", [2.0, 0.25, 1e-3, 1e-7])
 def test_the_tautochrone_between_its_turns(end: float, module_of: ModuleOf) -> None:
-    """On x = R(u + sin u), z = R(1 - cos u), arc length 4 R sin(u/2) oscillates harmonically, whatever the swing."""
+    """On x = R(u + sin u), z = R(1 - cos u), the arc length 4 R sin(u/2) oscillates harmonically at any amplitude."""
     laid = Laid(module_of("cycloid_plus"), TURN_TURN, -end, end, stop=math.pi, R="2")
     phi = np.linspace(0.0, math.pi, 23)
     assert laid.status == CONVERGED
@@ -209,7 +212,7 @@ def test_the_tautochrone_between_its_turns(end: float, module_of: ModuleOf) -> N
 
 @pytest.mark.parametrize("start", [0.0, -1.0, 3.0])
 def test_the_separatrix_of_the_pendulum(start: float, module_of: ModuleOf) -> None:
-    """Towards the hilltop the angle left is 4 atan(exp(-w t)); time grows with the logarithm of what is left."""
+    """Towards the hilltop the remaining angle is 4 atan(exp(-w t)), and the time grows with its logarithm."""
     laid = Laid(module_of("circle"), TO_EQUILIBRIUM, start, math.pi, stop=64.0, L="1")
     phi = np.linspace(0.0, 64.0, 23)
     times, speeds = laid.times(phi), laid.speeds(phi)
@@ -221,12 +224,12 @@ def test_the_separatrix_of_the_pendulum(start: float, module_of: ModuleOf) -> No
             truth = (mp.log(mp.tan(whole / 4)) - mp.log(mp.tan(left / 4))) / w
             assert share(times[k], truth, laid.whole) <= TIME
             v = 2 * w * mp.sin(left / 2)
-            # The exponential of an phase_angle of 64 has a rounding of its own in units of the anomaly's last place.
+            # The exponential of a phase angle of 64 has a rounding of its own, in units in the angle's last place.
             assert share(speeds[k], v, float(v)) <= SPEED + math.ulp(phase_angle)
 
 
 def test_a_corner_is_narrowed_down_or_owned_up_to(vee: ModuleType) -> None:
-    """A corner of the track inside a stretch costs panels, not honesty: the error named covers the error made."""
+    """At a corner inside a segment panels become many, and the stated error is at least the true one."""
     v0 = 10.0
     laid = Laid(vee, REGULAR, -1.0, 1.5, ref=0.0, w=v0**2)
     with mp.workdps(40):
@@ -237,7 +240,9 @@ def test_a_corner_is_narrowed_down_or_owned_up_to(vee: ModuleType) -> None:
 
 
 def test_an_end_taken_for_regular_that_is_not(slope: ModuleType) -> None:
-    """From rest without the root's substitution the panels run out: the status says so, and the error is honest."""
+    """From rest without the substitution for the root the number of panels does not suffice; the status says so, and
+    the error is right.
+    """
     laid = Laid(slope, REGULAR, 0.0, -5.0, w=0.0, angle=0.5)
     with mp.workdps(40):
         truth = mp.sqrt(10 / (mpf("9.81") * mp.sin(mpf("0.5"))))
@@ -247,14 +252,14 @@ def test_an_end_taken_for_regular_that_is_not(slope: ModuleType) -> None:
 
 
 def test_a_place_out_of_reach_has_no_time(slope: ModuleType) -> None:
-    """Uphill from rest V**2 is negative everywhere: no time, an infinite error."""
+    """Uphill from rest V**2 is negative everywhere, so that there is no time and the error is infinite."""
     laid = Laid(slope, FROM_TURN, 0.0, 5.0, angle=0.5)
     assert laid.status == FAILED
     assert math.isinf(laid.error)
 
 
 def test_next_to_the_separatrix_doubles_give_up(module_of: ModuleOf) -> None:
-    """Where V**2 all but vanishes inside, the status asks for extended precision; a fair swing does not."""
+    """If V**2 nearly vanishes inside, the status asks for extended precision; for an ordinary swing it does not."""
     circle = module_of("circle")
     hard = Laid(circle, TURN_TURN, -math.pi + 1e-10, math.pi - 1e-10, stop=math.pi, L="1")
     fair = Laid(circle, TURN_TURN, -2.0, 2.0, stop=math.pi, L="1")
@@ -263,10 +268,11 @@ def test_next_to_the_separatrix_doubles_give_up(module_of: ModuleOf) -> None:
 
 
 @pytest.mark.parametrize("amplitude", [1e-8, 0.3, 2.0, 3.0, 3.14])
-def test_the_error_named_is_no_less_than_the_error_made(amplitude: float, module_of: ModuleOf) -> None:
-    """A pendulum's half period is 2 K(sin(A/2))/w: quadrature and rounding together stay within what is named.
+def test_the_stated_error_is_no_less_than_the_true_one(amplitude: float, module_of: ModuleOf) -> None:
+    """A pendulum's half period is 2 K(sin(A/2))/w, and the error of quadrature and rounding together is at most the
+    stated one.
 
-    What the rounding of the ends costs is no part of quadrature; it is told by the balance.
+    The rounding of the ends is no part of quadrature; the condition number includes it.
     """
     laid = Laid(module_of("circle"), TURN_TURN, -amplitude, amplitude, stop=math.pi, L="1")
     with mp.workdps(40):

@@ -1,4 +1,6 @@
-"""Sweeps of motions that lose energy: closed forms, what `solve` says of each launch, the same bits on any cores."""
+"""Sweeps of motions with losses agree with closed forms and with `solve`, and have the same bits on any number of
+cores.
+"""
 
 import math
 from collections.abc import Callable
@@ -16,9 +18,9 @@ from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.sweep import quantities
 
 G = 9.81
-# Of elementary closed forms.
+# The relative tolerance of elementary closed forms.
 FEW = 1e-14
-# A sweep reads the same panels as a solved motion, which makes other polynomials of them.
+# A sweep reads the same panels as a solved motion, which converts them to other polynomials.
 ROUNDING = 4e-14
 
 Build = Callable[..., ModuleType]
@@ -26,12 +28,12 @@ EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
 
 
 def ring() -> Any:
-    """A full circle, its angle from the bottom."""
+    """Return a full circle, with its angle from the bottom."""
     return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
 
 
 def surveyed(wave: float = 0.02) -> Any:
-    """A valley of sixty points, where the curve is not smooth; with a wave above 0.05 it bends both ways."""
+    """Return a valley of sixty points, where the curve is not smooth; with a wave above 0.05 it bends both ways."""
     x = np.linspace(-1.5, 1.6, 60)
     return gqm.Curve.sampled(np.column_stack([x, 0.4 * x * x + wave * np.cos(4.0 * x)]))
 
@@ -63,7 +65,7 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
     assert (module.sweep("v_min", starts, **given).values == 0.0).all()
     for quantity in ("normal_force_min", "normal_force_max"):
         assert module.sweep(quantity, starts, m=2, **given | {"k": 2 * k}).values == pytest.approx(2 * G, rel=FEW)
-    # The middle is passed after a quarter of a swing and a little more.
+    # The body passes the middle after slightly more than a quarter of a swing.
     first = np.arccos(-np.sign(1.0) * offset / (np.abs(starts) - offset)) / math.sqrt(k)
     assert module.sweep("time_at", starts, lam=0.0, **given).values == pytest.approx(first, rel=FEW)
     beyond = module.sweep("time_at", starts, lam=2.0, **given)
@@ -71,7 +73,7 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
 
 
 def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
-    """On the way down W' = -2 g sin - 2 c W is linear; N = W + g cos is largest where its derivative vanishes."""
+    """On the way down W' = -2 g sin - 2 c W is linear, and N = W + g cos is largest where its derivative vanishes."""
     module = build("swept_ring", ring(), gqm.QuadraticDrag(b="c"))
     c, start = 0.3, 2.0
     with mp.workdps(30):
@@ -118,7 +120,7 @@ CASES = {
 
 
 def of_solved(quantity: str, motion: Any, target: float) -> float:
-    """The quantity of a solved motion; NaN if there is none."""
+    """Return the quantity of a solved motion; NaN if there is none."""
     try:
         return float(quantities.QUANTITIES[quantity].of_motion(motion, target))
     except SolutionError:
@@ -128,7 +130,9 @@ def of_solved(quantity: str, motion: Any, target: float) -> float:
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None:
-    """All quantities to a horizon and without one; what a sweep leaves has no number or is refused there too."""
+    """All quantities agree with `solve`, to a horizon and without one; launches without a value have none or are
+    refused there too.
+    """
     curve, force, given = CASES[name]
     module = build(f"swept_{name}", curve(), force())
     rng = np.random.default_rng(len(name))
@@ -151,7 +155,7 @@ def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None
 
 
 def test_the_same_bits_on_any_number_of_cores(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A launch is answered by itself, with parameters of its own."""
+    """A launch is answered independently of the others, with its own parameters."""
     module = build("swept_friction", ring(), gqm.CoulombFriction())
     starts = np.linspace(-2.0, 2.0, 300)
     mu = np.linspace(0.05, 0.3, 300)
@@ -166,9 +170,10 @@ def test_the_same_bits_on_any_number_of_cores(build: Build, monkeypatch: pytest.
 @pytest.mark.parametrize(("name", "speed"), [("track", 0.5), ("closed", 6.0)])
 @pytest.mark.parametrize("quantity", ["t_end", "rest_position", "normal_force_max"])
 def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, name: str, speed: float, build: Build) -> None:
-    """Between breaks the same is kept of the curve whichever launch comes first, for the parameters of that launch.
+    """Between breaks the same data are kept of the curve, whichever launch comes first, for the parameters of that
+    launch.
 
-    On the closed curve bodies run round more than once, so that they pass the same stretch on several laps.
+    On the closed curve bodies run round more than once, so that they pass the same part on several laps.
     """
     module, given = build(f"swept_{name}", *(make() for make in CASES[name][:2])), CASES[name][2]
     starts = np.linspace(0.1, 3.2, 60)
@@ -184,7 +189,9 @@ def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, name: str,
 
 @pytest.mark.parametrize(("name", "speed"), [("track", 0.5), ("closed", 6.0)])
 def test_one_launch_is_passed_as_many_are(name: str, speed: float, build: Build) -> None:
-    """`solve` rests when and where a sweep says, its places agree with its legs, and its legs do not depend on them."""
+    """`solve` rests at the time and place of a sweep, its places agree with its legs, and its legs do not depend on
+    them.
+    """
     module, given = build(f"swept_{name}", *(make() for make in CASES[name][:2])), CASES[name][2]
     starts = np.linspace(0.1, 3.2, 8)
     swept = {q: module.sweep(q, starts, speed, **given).values for q in ("t_end", "rest_position")}
@@ -202,9 +209,9 @@ def test_one_launch_is_passed_as_many_are(name: str, speed: float, build: Build)
 
 @pytest.mark.parametrize("name", ["track", "rail"])
 def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None:
-    """A body passes each break between its launch and its first turn before that turn, one after the other.
+    """A body passes the breaks between its launch and its first turn before that turn, one after the other.
 
-    There segments and panels end, and a phase angle may be larger by a rounding than the last one.
+    Segments and panels end there, and a phase angle may be larger by a rounding than the last one.
     """
     module = build(f"swept_{name}", *(make() for make in CASES[name][:2]))
     for start in np.linspace(2.2, 3.3, 23).tolist():
@@ -221,7 +228,7 @@ def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None
 
 
 def test_arrivals_at_the_end_of_a_track(build: Build) -> None:
-    """A body that runs off the track is at the end of it when the motion ends, however its times are rounded."""
+    """A body that runs off the track is at its end when the motion ends, however its times are rounded."""
     module = build("swept_track", *(make() for make in CASES["track"][:2]))
     end, speeds = module.solve(1.0, 9.0, 1, **CASES["track"][2]).legs[-1].lam_end, np.linspace(6.0, 9.0, 40)
     arrivals = module.sweep("time_at", 1.0, speeds, lam=end, **CASES["track"][2])
@@ -231,7 +238,7 @@ def test_arrivals_at_the_end_of_a_track(build: Build) -> None:
 
 
 def test_a_curve_for_each_parameter(build: Build) -> None:
-    """Launches are grouped by the parameters of the chart; those that cannot be are refused one by one."""
+    """Launches are grouped by the parameters of the chart; those without a curve are refused one by one."""
     rail = gqm.Curve.piecewise([gqm.line(length="a"), gqm.arc(radius=1, angle="pi/2")])
     module = build("swept_lengths", rail, gqm.CoulombFriction(mu="mu"))
     lengths = np.array([2.0, 3.0, 2.0, 3.0])

@@ -1,4 +1,4 @@
-"""Sweeps as what a user keeps: printed, in tables, with their launches, copied and pickled."""
+"""Sweeps can be kept: they print, make tables, know their launches, and are copied and pickled."""
 
 import copy
 import pickle
@@ -14,7 +14,7 @@ from gqm_sym.runtime import Sweep
 
 @pytest.fixture(scope="module")
 def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A pendulum."""
+    """Return a pendulum."""
     return gqm.build(
         gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="swing", folder=tmp_path_factory.mktemp("a")
     )
@@ -28,7 +28,7 @@ def grid(swing: ModuleType) -> Sweep:
 
 
 def test_the_launches_are_kept(grid: Sweep) -> None:
-    """The quantity and the arguments, as they were given."""
+    """A sweep keeps the quantity and the arguments, as they were given."""
     assert grid.quantity == "period"
     assert grid.arguments["L"] == [1, 2]
     assert grid.arguments["v0"] == 0.0
@@ -38,7 +38,7 @@ def test_the_launches_are_kept(grid: Sweep) -> None:
 
 
 def test_a_table(grid: Sweep, swing: ModuleType) -> None:
-    """A row for each launch, what is the same for all beside it; two columns for turning points."""
+    """A table has a row for each launch, without what is the same for all, and two columns for turning points."""
     table = grid.to_pandas()
     assert list(table.columns) == ["lam0", "L", "period", "status"]
     assert len(table) == 6
@@ -61,8 +61,8 @@ def test_a_dataset(grid: Sweep, swing: ModuleType) -> None:
     assert swing.sweep("period", 0.1).to_xarray()["period"].dims == ()
 
 
-def test_it_is_told(grid: Sweep, swing: ModuleType) -> None:
-    """The size, what is missing and why, and the first rows with units; as a table in notebooks."""
+def test_a_sweep_prints_itself(grid: Sweep, swing: ModuleType) -> None:
+    """A sweep prints its size, what is missing and why, and the first rows with units; notebooks show a table."""
     text = str(grid)
     assert text.startswith("period of 6 launches")
     assert "2 without a value" in text
@@ -72,14 +72,14 @@ def test_it_is_told(grid: Sweep, swing: ModuleType) -> None:
 
 
 def test_copies(grid: Sweep) -> None:
-    """They have everything."""
+    """Copies have everything that the sweep has."""
     for twin in (copy.deepcopy(grid), pickle.loads(pickle.dumps(grid))):
         assert np.array_equal(twin.values, grid.values, equal_nan=True)
         assert (twin.quantity, twin.arguments) == (grid.quantity, grid.arguments)
 
 
 def test_an_argument_that_there_is_not(swing: ModuleType) -> None:
-    """`solve`, `sweep` and the others say which was probably meant, and which there are."""
+    """The methods say which argument was probably meant, and which ones there are."""
     calls = {
         "solve": lambda: swing.solve(lam_0=1),
         "sweep": lambda: swing.sweep("period", lam0=1, l=2),

@@ -1,4 +1,4 @@
-"""Launches that all but reach a hilltop, or all but stop there: what a sweep says is what solving each of them says."""
+"""Launches that nearly reach a hilltop, or nearly stop there, have the same answers in sweeps as in `solve`."""
 
 import random
 from pathlib import Path
@@ -13,7 +13,7 @@ import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 from gqm_sym.runtime.sweep.quantities import SINGLE, SOLVE
 
-# Curves with hills: their heights as formulas, an estimate of a hilltop, and where to launch from.
+# A row has a curve with hills: its heights as formulas, an estimate of a hilltop, and the launch place.
 HILLS: dict[str, tuple[Any, Any, float, tuple[float, float]]] = {
     "two_wells": (gqm.Curve.graph("x**4/4 - x**2/2", parameter="x"), lambda x: x**4 / 4 - x**2 / 2, 0.0, (-1.3, 1.3)),
     "uneven_wells": (
@@ -35,7 +35,9 @@ COUNT = 5
 
 
 def launches(name: str) -> tuple[list[float], list[float], list[int], float, Any]:
-    """Places, speeds and directions: energies differ from the hilltop's by shares of 1e-8 to 1e-15; and the hilltop."""
+    """Return places, speeds and directions whose energies differ from the hilltop's by shares of 1e-8 to 1e-15, and the
+    hilltop.
+    """
     _, height, near, (low, high) = HILLS[name]
     draw = random.Random(name)
     with mp.workdps(40):
@@ -51,7 +53,7 @@ def launches(name: str) -> tuple[list[float], list[float], list[int], float, Any
 
 @pytest.fixture(scope="module")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
-    """The module of each curve."""
+    """Return the module of each curve."""
     folder: Path = tmp_path_factory.mktemp("hills")
     return {
         name: gqm.build(gqm.derive(curve, gqm.Gravity()), name=f"hills_{name}", folder=folder)
@@ -60,7 +62,7 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
 
 
 def asked(motion: Any, quantity: str, place: float) -> Any:
-    """The quantity of a solved motion; None where it has none."""
+    """Return the quantity of a solved motion, or None if it has none."""
     if quantity == "turning_points":
         return tuple(sorted(motion.turning_points)) if motion.kind == "libration" else None
     if quantity in ("v_min", "v_max"):
@@ -74,7 +76,7 @@ def asked(motion: Any, quantity: str, place: float) -> Any:
 
 @pytest.mark.parametrize("name", HILLS)
 def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType]) -> None:
-    """The same kinds of motion, and values that differ by roundings times the condition number."""
+    """A sweep gives the same kinds of motion, and values that differ by roundings times the condition number."""
     places, speeds, directions, target, top = launches(name)
     module, height = modules[name], HILLS[name][1]
     motions = [module.solve(*launch) for launch in zip(places, speeds, directions, strict=True)]
@@ -99,18 +101,18 @@ def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType])
                     assert abs(mpf(motions[k].v_min.value) - slowest) <= rounding
 
 
-# The error of a time of a body that passes a hilltop, in units in the last place. Doubles alone, measured from the
-# launch, are off by the inverse of the share of V**2 that is left there.
+# The error of the time of a body that passes a hilltop, in units in the last place. In doubles alone, measured from the
+# launch, it is the inverse of the share of V**2 at the hilltop.
 MAX_PASSING_ULPS = 6.0
 
 
 def ulps(value: float, truth: Any) -> float:
-    """How far a value is from the truth, in units in its last place."""
+    """Return the error of a value in units in its last place."""
     return abs(float((mpf(value) - truth) / mpf(float(np.spacing(value)))))
 
 
 def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str, ModuleType]) -> None:
-    """Lap times and arrivals are the elliptic integrals, and no launch is solved by itself."""
+    """Lap times and arrivals agree with elliptic integrals, and no launch is solved singly."""
     gaps = 10.0 ** -np.array([2.1, 3.2, 4.3, 6.4, 8.5])
     speeds, module = np.sqrt(4.0 * 9.81 * (1.0 + gaps)), modules["pendulum"]
     laps, arrivals = module.sweep("period", 0.0, speeds), module.sweep("time_at", 0.0, speeds, -1, lam=-9.0)
@@ -124,7 +126,7 @@ def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str,
 
 
 def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
-    """The time until they leave is the integral, for bodies that turn before and for those that do not."""
+    """The time until bodies leave is that of the integral, whether they turn before or not."""
     curve = gqm.Curve.graph("a*(x**4 - 2*x**2)", parameter="x", domain=(-2, "3/2"))
     model = gqm.derive(curve, gqm.Gravity(), parameters={"a": "1/3"})
     module = gqm.build(model, name="hill_to_leave", folder=tmp_path)
@@ -158,15 +160,15 @@ def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
         assert ulps(float(found.values[0]), truth) <= MAX_PASSING_ULPS, (lam0, direction)
 
 
-# Half periods: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
-# Distances of an energy from that of a hilltop, as shares of the well's depth.
+# The distances of an energy from that of a hilltop, as shares of the well's depth.
 GAPS = np.geomspace(0.3, 1e-7, 40)
 
 
 def test_half_periods_beside_a_hilltop_have_all_digits(modules: dict[str, ModuleType]) -> None:
-    """Of a pendulum that is thrown so that it all but comes to the top, by the complete elliptic integral."""
+    """For a pendulum thrown nearly to the top, half periods agree with the complete elliptic integral."""
     lam0 = np.linspace(-1.5, 2.0, GAPS.size)
     with mp.workdps(40):
         g = mpf("9.81")
@@ -180,7 +182,7 @@ def test_half_periods_beside_a_hilltop_have_all_digits(modules: dict[str, Module
 
 @pytest.mark.parametrize("name", ["uneven_wells", "two_wells", "waves"])
 def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[str, ModuleType]) -> None:
-    """Correctly rounded half periods and lap times, which compiled code finds without solving."""
+    """Compiled code finds correctly rounded half periods and lap times without solving."""
     _, height, near, (low, high) = HILLS[name]
     lam0 = np.linspace(low, high, 12)
     with mp.workdps(40):

@@ -1,4 +1,4 @@
-"""Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
+"""Sweeps over launches and parameters agree with closed forms, and with single motions."""
 
 import math
 import pickle
@@ -20,23 +20,25 @@ from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
 ModuleOf = Callable[[str], ModuleType]
 
-# Half periods away from barriers, in units of the last place.
+# The tolerance of half periods away from barriers, in units in the last place.
 ULPS = 4.0
-# An extreme is flat: its value has the digits of V or N themselves, relative to the largest.
+# An extreme is flat, so that its value has the digits of V or N themselves, relative to the largest.
 LOAD = 4e-15
-# Arrival by panels against the exact reading.
+# The tolerance of an arrival by panels against the exact reading.
 ARRIVAL = 4e-15
 
 
 def _pendulum(amplitude: float, length: float) -> mpf:
-    """Half period of a pendulum in closed form."""
+    """Return the half period of a pendulum in closed form."""
     with mp.workdps(40):
         k = mp.sin(mpf(amplitude) / 2)
         return 2 * mp.ellipk(k * k) * mp.sqrt(mpf(length) / mpf("9.81"))
 
 
 def test_half_periods_of_pendulums(module_of: ModuleOf) -> None:
-    """Released from rest anywhere away from the top, with any length: within a few last places of the closed form."""
+    """Released from rest anywhere away from the top, with any length, pendulums have half periods within a few last
+    places of the closed form.
+    """
     rng = np.random.default_rng(11)
     amplitude, length = np.append(rng.uniform(1e-6, 2.5, 150), [1e-8, 1e-3]), rng.uniform(0.1, 10.0, 152)
     got = module_of("circle").sweep("half_period", amplitude, L=length)
@@ -47,23 +49,23 @@ def test_half_periods_of_pendulums(module_of: ModuleOf) -> None:
 
 
 def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) -> None:
-    """Launches at other phases of one swing have its period; the same upwards and downwards."""
+    """Launches at other phases of one swing have its period, both upwards and downwards."""
     top = 1.25
     places = np.linspace(-1.2, 1.2, 7)
     speeds = np.sqrt(2 * 9.81 * (np.cos(places) - np.cos(top)))
     got = module_of("circle").sweep("period", places[:, None], speeds[:, None], [1, -1], L=1)
     assert got.values.shape == got.status.shape == (7, 2)
-    # Speeds are rounded, and the period follows the amplitude they mean.
+    # Speeds are rounded, and the period is that of the amplitude that they mean.
     assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
 
 
-# Whole turns away, and speeds in units of what just reaches the top.
+# The launches are whole turns away, and speeds are in units of the one that just reaches the top.
 LAUNCHES = [(turns, reach) for turns in (0, 1, -100) for reach in (1e-9, 1e-3, 0.4, 0.9)]
 
 
 @pytest.mark.parametrize(("turns", "reach"), LAUNCHES)
 def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: ModuleOf) -> None:
-    """A pendulum's half period, as near as the square of a speed and a place in doubles tell it."""
+    """A pendulum's half period is as accurate as the square of a speed and a place in doubles determine it."""
     rng = np.random.default_rng(5)
     lam0 = 2 * np.pi * turns + rng.uniform(-2.0, 2.0, 24)
     v0 = reach * np.sqrt(2 * 9.81 * (1 + np.cos(lam0)))
@@ -77,13 +79,13 @@ def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: Modu
                 return mp.pi / mp.sqrt(mpf("9.81")) / mp.agm(1, mp.sqrt(1 - square))
 
             w = mpf(speed) ** 2
-            # Three roundings of V**2 from the lowest place to the top, at most.
+            # The tolerance is three roundings of V**2 from the lowest place to the top.
             rounding = abs(mp.diff(truth, w)) * 3 * mpf(2) ** -53 * 4 * mpf("9.81")
             assert abs(mpf(float(value)) - truth(w)) <= ULPS * np.spacing(float(value)) + rounding
 
 
 def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
-    """Loop times are 4 K/v0 from the bottom; they have no half period, and no turning points."""
+    """From the bottom loop times are 4 K/v0, and there are no half periods and no turning points."""
     v0 = np.linspace(7.0, 30.0, 20)
     circle = module_of("circle")
     got = circle.sweep("period", 0.0, v0, L=1)
@@ -98,7 +100,7 @@ def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
 
 
 def test_next_to_a_barrier_the_exact_problem_answers(module_of: ModuleOf) -> None:
-    """Orbits that doubles cannot time have every digit all the same."""
+    """Orbits that doubles cannot time have all digits too."""
     amplitude = np.pi - np.array([1e-2, 1e-4, 1e-8])
     got = module_of("circle").sweep("half_period", amplitude, L=1)
     for value, a in zip(got.values, amplitude, strict=True):
@@ -136,14 +138,16 @@ def test_turning_points_and_loads_as_of_one_motion(v0: float, module_of: ModuleO
 
 
 def test_loads_next_to_a_barrier(module_of: ModuleOf) -> None:
-    """An orbit that is left to the exact problem has its loads at the bottom too."""
+    """An orbit that is left to the exact problem has its largest load at the bottom too."""
     top = np.pi - 1e-5
     got = module_of("circle").sweep("normal_force_max", top, L=1)
     assert got.values == pytest.approx(9.81 * (1 + 2 * (1 - np.cos(top))), rel=LOAD)
 
 
 def test_arrivals(module_of: ModuleOf) -> None:
-    """First times at places ahead, behind, beyond the turn and laps away, as of one motion; never is NaN."""
+    """First times at places ahead, behind, beyond the turn and laps away are those of one motion, and NaN if there is
+    none.
+    """
     circle = module_of("circle")
     for lam0, v0, way in ((0.5, 1.0, 1), (0.5, 1.0, -1), (0.5, 0.0, 1), (0.0, 9.0, 1), (0.0, 9.0, -1)):
         motion = circle.solve(lam0, v0, way, L=1)
@@ -155,13 +159,14 @@ def test_arrivals(module_of: ModuleOf) -> None:
                 assert np.isnan(value)
                 assert motion.kind == "libration" or (place - lam0) * way < 0
             else:
-                # Both are differences of times since the turn: of up to half a period, and as its last place goes.
+                # Both are differences of times since the turn of up to half a period, and have errors in its last
+                # place.
                 last = np.spacing(0.5 * motion.period)
                 assert value == pytest.approx(motion.time_at(float(place)), rel=ARRIVAL, abs=last)
 
 
 def _falls(places: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distances from an axis to begin at, and places on the way through it: many of them a moment later."""
+    """Return distances of launches from an axis, and places on the way through it, many of them a moment later."""
     rng = np.random.default_rng(3)
     start = rng.uniform(0.1, 2.6, places)
     share = np.append(rng.uniform(0.0, 1.0, places - places // 4), 10.0 ** rng.uniform(-12, -1, places // 4))
@@ -169,7 +174,7 @@ def _falls(places: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_arrivals_of_released_pendulums(module_of: ModuleOf) -> None:
-    """All digits, in the first moments too."""
+    """Arrivals have all digits, in the first moments too."""
     start, places = _falls(40)
     swept = module_of("circle").sweep("time_at", start, lam=places, L=1)
     assert not swept.status.any()
@@ -182,7 +187,7 @@ def test_arrivals_of_released_pendulums(module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("speed", [0.0, 1e-6, 1.0])
 def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
-    """As single motions have them, however many terms the series needs."""
+    """Arrivals agree with single motions, however many terms the series needs."""
     start, places = (distances - np.pi / 2 for distances in _falls(24))
     ellipse = module_of("ellipse")
     swept = ellipse.sweep("time_at", start, speed, -1, lam=places, a=2, b=1)
@@ -206,7 +211,7 @@ def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
     ],
 )
 def test_extremes_beat_all_states(track: str, v0: float, size: dict[str, Any], module_of: ModuleOf) -> None:
-    """None of many states has a greater or a smaller load, and the best of them comes near."""
+    """Of many states none has a larger or a smaller load, and the most extreme of them comes near."""
     module = module_of(track)
     for lam0 in (0.3, 1.1):
         motion = module.solve(lam0, v0, **size)
@@ -220,7 +225,7 @@ def test_extremes_beat_all_states(track: str, v0: float, size: dict[str, Any], m
 
 
 def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:
-    """NaN in, a place outside the domain, and a motion that leaves: codes, not exceptions."""
+    """NaN as input, a place outside the domain and a motion that leaves give codes, not exceptions."""
     got = module_of("cycloid_arch").sweep("period", [np.nan, 99.0, 3.5], R=1)
     assert np.isnan(got.values).all()
     assert [STATUS_SENTENCES[code] for code in got.status] == [
@@ -232,7 +237,7 @@ def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:
 
 
 def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
-    """Threads and chunks change nothing; broadcast columns need not lie in memory."""
+    """Threads and chunks change nothing, and broadcast columns need not be copied in memory."""
     amplitude = np.linspace(0.1, 1.0, 300)
     length = np.linspace(0.5, 2.0, 120)[:, None]
     circle = module_of("circle")
@@ -242,7 +247,7 @@ def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
 
 
 def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
-    """None of many states beats them, and the best of these comes near."""
+    """None of many states exceeds the extremes, and the most extreme of these comes near."""
     model = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.CoulombFriction(mu="0.1"))
     ring = gqm.build(model, name="rough_ring", folder=generated_folder)
     for v0 in (2.0, 9.0):
@@ -256,20 +261,22 @@ def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
 
 
 def test_a_force_may_be_infinite() -> None:
-    """At a cusp, through which the body goes, and where a spiral winds into its pole."""
+    """The force is infinite at a cusp that the body passes, and at the pole into which a spiral winds."""
     assert cycloid.sweep("normal_force_min", [0.5, 0.6]).values.tolist() == [-math.inf] * 2
     assert not log_spiral.sweep("normal_force_max", [1.9, 2.0], 2.5).status.any()
 
 
 def test_columns_may_be_read_only(module_of: ModuleOf) -> None:
-    """Arrays that must not be written to, as a memory map's, are columns too."""
+    """Arrays that must not be written to, such as a memory map's, may be columns too."""
     amplitude = np.linspace(0.1, 1.0, 5)
     amplitude.flags.writeable = False
     assert not module_of("circle").sweep("half_period", amplitude, L=1).status.any()
 
 
 def test_mistakes_are_named(module_of: ModuleOf) -> None:
-    """An unknown quantity, a missing place, a negative speed, shapes that do not fit, a length below zero."""
+    """An unknown quantity, a missing place, a negative speed, shapes that do not fit and a length below zero are
+    named.
+    """
     sweep = module_of("circle").sweep
     with pytest.raises(InputError, match="quantity: must be one of half_period"):
         sweep("frequency", 0.1, L=1)
@@ -288,7 +295,7 @@ def test_mistakes_are_named(module_of: ModuleOf) -> None:
 
 
 def test_loads_of_a_swing_next_to_the_top(module_of: ModuleOf) -> None:
-    """Orbits that are solved one by one: N is m g (3 - 2 cos A) at the bottom, m g cos(A) where it turns."""
+    """On orbits that are solved singly N is m g (3 - 2 cos A) at the bottom, and m g cos(A) at the turn."""
     amplitude = np.pi - np.array([1e-7, 1e-9])
     circle = module_of("circle")
     most, least = (circle.sweep(f"normal_force_{end}", amplitude, L=1).values for end in ("max", "min"))
@@ -298,7 +305,7 @@ def test_loads_of_a_swing_next_to_the_top(module_of: ModuleOf) -> None:
 
 
 def test_cores_where_the_system_tells_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without an affinity all cores of the machine are this process's; one at least."""
+    """Without an affinity all cores of the machine count as this process's, and at least one."""
     monkeypatch.delattr(threads.os, "sched_getaffinity")
     for count, cores in ((6, 6), (None, 1)):
         threads.cores.cache_clear()
@@ -308,7 +315,7 @@ def test_cores_where_the_system_tells_no_more(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_sweep_is_an_array_of_its_values(module_of: ModuleOf) -> None:
-    """NumPy reads the values; statuses, routes and pickles are of the same shape."""
+    """NumPy reads the values of a sweep; statuses, routes and pickles have the same shape."""
     swept = module_of("circle").sweep("half_period", [0.1, 0.2, np.nan], L=1)
     assert np.array_equal(np.asarray(swept), swept.values, equal_nan=True)
     assert np.asarray(swept, dtype=np.float32).dtype == np.float32
@@ -330,7 +337,9 @@ def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
 
 
 def test_actions_and_their_gradients(module_of: ModuleOf) -> None:
-    """Of a pendulum: 16 sqrt(g L**3) (E(m) - (1 - m) K(m)); by the energy they change as the period says."""
+    """For a pendulum the action is 16 sqrt(g L**3) (E(m) - (1 - m) K(m)), and its derivative by the energy is the
+    period.
+    """
     circle, places = module_of("circle"), np.array([0.5, 1.5, 3.0])
     swept = circle.sweep("action", places, L=1, g=9.81, gradient="lam0")
     for place, value in zip(places.tolist(), swept.values.tolist(), strict=True):
@@ -357,7 +366,9 @@ def test_old_names_of_a_sweep(old: str, new: str, module_of: ModuleOf) -> None:
 
 
 def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
-    """From the top of a quartic hill (gravity that pulls upwards on a bowl): no body goes on to where it would fall."""
+    """From the top of a quartic hill (a bowl whose gravity pulls upwards), no body is followed to where it would
+    fall.
+    """
     speeds, g = np.array([0.5, 1.0, 2.5]), mpf(9.81)
     swept = module_of("quartic").sweep("t_end", 0.0, speeds, contact="below", g=-9.81)
     assert swept.route_counts() == {"single": speeds.size}
@@ -373,7 +384,7 @@ def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("omega", [0.7, 2.0, 3.0, 4.0])
 def test_a_hoop_that_turns(omega: float) -> None:
-    """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above."""
+    """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above it."""
     v0, g, square = np.array([1.0, 2.0, 4.0]), mpf(9.81), mpf(omega) ** 2
     swept = {name: circle_rotating.sweep(name, 0.0, v0, Omega=omega) for name in ("turning_points", "half_period")}
     assert swept["half_period"].route_counts() == {"batch": v0.size}
@@ -392,8 +403,8 @@ def test_a_hoop_that_turns(omega: float) -> None:
             assert abs(swept["turning_points"].values[k] / np.array([-top, top]) - 1).max() < 4e-16
 
 
-# Graphs z(x) with their derivatives, swept more widely than closed forms of second divided differences hold: over one
-# turn of a wave, or a narrow range of hyperbolic functions.
+# These graphs z(x), with their derivatives, are swept more widely than closed forms of second divided differences hold:
+# over one turn of a wave, or a narrow range of hyperbolic functions.
 WIDE = {
     "wave": ("x**2/2 + sin(3*x)/10", lambda x: x**2 / 2 + mp.sin(3 * x) / 10, lambda x: x + 3 * mp.cos(3 * x) / 10),
     "chain": ("cosh(x) + x/3", lambda x: mp.cosh(x) + x / 3, lambda x: mp.sinh(x) + mpf(1) / 3),
@@ -402,7 +413,7 @@ WIDE = {
 
 @pytest.mark.parametrize("name", WIDE)
 def test_wide_orbits_stay_in_batches(name: str, generated_folder: Path) -> None:
-    """As wide as they may be, their half periods have their digits."""
+    """Half periods of orbits as wide as possible have all digits."""
     text, z, slope = WIDE[name]
     module = gqm.build(
         gqm.derive(gqm.Curve.graph(text, parameter="x"), gqm.Gravity()), name=f"wide_{name}", folder=generated_folder
@@ -426,17 +437,18 @@ def test_wide_orbits_stay_in_batches(name: str, generated_folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def incline(generated_folder: Path) -> ModuleType:
-    """A straight line from x = -1 to x = 2, down a slope of 3 in 4: g acts along it with 3/5."""
+    """Return a straight line from x = -1 to x = 2, down a slope of 3 in 4, with the acceleration g*3/5 along it."""
     line = gqm.Curve.graph("-3*x/4", parameter="x", domain=(-1, 2))
     return gqm.build(gqm.derive(line, gqm.Gravity()), name="incline", folder=generated_folder)
 
 
-# Launch place, speed, direction: from rest; down; up to a turning point and back; up and out; from the end inwards.
+# A row has launch place, speed and direction: from rest; down; up to a turning point and back; up and out; from the end
+# inwards.
 LEAVING = np.array([[0.5, 0, 1], [-1, 1, 1], [0.3, 2, -1], [1.5, 0.01, -1], [0.5, 9, -1], [2, 3, -1]], dtype=float)
 
 
 def test_bodies_leave_through_the_ends_of_a_line(incline: ModuleType) -> None:
-    """With constant acceleration all is in closed form; nothing is solved one by one."""
+    """With constant acceleration everything has a closed form, and nothing is solved singly."""
     (lam0, v0, direction), pull = LEAVING.T, 0.6 * 9.81
     out_below = v0**2 > 2 * pull * 1.25 * (lam0 + 1)
     out_below &= direction < 0
@@ -456,7 +468,9 @@ def test_bodies_leave_through_the_ends_of_a_line(incline: ModuleType) -> None:
 
 
 def test_bodies_that_leave_come_to_places(incline: ModuleType) -> None:
-    """Before and behind the turning point, and never beyond it or against the direction of motion."""
+    """Bodies reach places before and behind the turning point, but none beyond it or against the direction of
+    motion.
+    """
     lam0, v0, direction = LEAVING.T
     pull, top = 0.6 * 9.81 / 1.25, np.where(direction < 0, lam0 - (v0 / 1.25) ** 2 / (2 * 0.6 * 9.81 / 1.25), lam0)
     for place in (-0.9, 0.1, 0.4, 1.0, 1.9):
@@ -470,7 +484,7 @@ def test_bodies_that_leave_come_to_places(incline: ModuleType) -> None:
 
 
 def test_a_narrow_peak_of_the_load(generated_folder: Path) -> None:
-    """Next to where r = 1/sin(theta) - 2 turns round the origin, the grid of an orbit is much coarser than the peak."""
+    """Where r = 1/sin(theta) - 2 turns round the origin, the grid of an orbit is much coarser than the peak."""
     curve = gqm.Curve.polar("1/sin(theta) - 2", parameter="theta", domain=("0.1", "3.04"))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="conchoid", folder=generated_folder)
     lam0, v0 = np.array([1.15546, 0.6]), np.array([7.866, 5.0])
@@ -483,7 +497,7 @@ def test_a_narrow_peak_of_the_load(generated_folder: Path) -> None:
 
 
 def test_small_swings_keep_contact(module_of: ModuleOf) -> None:
-    """Next to the bottom a panel of a table tells less than the orbit, and no launch is solved by itself for that."""
+    """Next to the bottom a panel of a table resolves less than the orbit, but no launch is solved singly for that."""
     swept = module_of("circle").sweep("t_end", 10.0 ** np.linspace(-9, -1, 9), contact="above", t_max=5.0, L=1)
     assert swept.values.tolist() == [5.0] * 9
     assert swept.route_counts() == {"single": 9}

@@ -56,15 +56,15 @@ def atanhc(t):  # type: ignore[no-untyped-def]
 @Inlined
 def divdiff1_sin(x, y, h):  # type: ignore[no-untyped-def]
     """sin[x,y] = cos((x+y)/2) sinc(h/2); near a zero of the cosine the rounding of x + y counts."""
-    middle, rest = two_sum(x, y)
-    return (cos(0.5 * middle) - 0.5 * rest * sin(0.5 * middle)) * sinc(0.5 * h)
+    middle, middle_low = two_sum(x, y)
+    return (cos(0.5 * middle) - 0.5 * middle_low * sin(0.5 * middle)) * sinc(0.5 * h)
 
 
 @Inlined
 def divdiff1_cos(x, y, h):  # type: ignore[no-untyped-def]
     """cos[x,y] = -sin((x+y)/2) sinc(h/2); near a zero of the sine the rounding of x + y counts."""
-    middle, rest = two_sum(x, y)
-    return -(sin(0.5 * middle) + 0.5 * rest * cos(0.5 * middle)) * sinc(0.5 * h)
+    middle, middle_low = two_sum(x, y)
+    return -(sin(0.5 * middle) + 0.5 * middle_low * cos(0.5 * middle)) * sinc(0.5 * h)
 
 
 @Inlined

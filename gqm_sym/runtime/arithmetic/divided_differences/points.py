@@ -22,10 +22,10 @@ def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
         return w, y, x, -h2, -h1
     # Here y is the lowest or the highest point. The gap between x and w is w - x if x and w are small compared with the
     # gaps.
-    rest = h1 + h2 if fabs(h1) <= fabs(x) + fabs(w) else w - x
+    gap = h1 + h2 if fabs(h1) <= fabs(x) + fabs(w) else w - x
     if h1 > 0.0:
-        return (x, w, y, rest, -h2) if rest >= 0.0 else (w, x, y, -rest, h1)
-    return (y, x, w, -h1, rest) if rest >= 0.0 else (y, w, x, h2, -rest)
+        return (x, w, y, gap, -h2) if gap >= 0.0 else (w, x, y, -gap, h1)
+    return (y, x, w, -h1, gap) if gap >= 0.0 else (y, w, x, h2, -gap)
 
 
 @Inlined
@@ -38,9 +38,9 @@ def around(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     x_between, w_between = (not y_between) & (fabs(h1) < fabs(h2)), (not y_between) & (fabs(h1) >= fabs(h2))
     # If y is the lowest or the highest point, the gap between x and w is w - x if these are small compared with the
     # gaps.
-    rest = choose(fabs(h1) <= fabs(x) + fabs(w), h1 + h2, w - x)
+    gap = choose(fabs(h1) <= fabs(x) + fabs(w), h1 + h2, w - x)
     return (
-        *(x, choose(w_between, w, y), choose(w_between, rest, h1)),
-        *(choose(x_between, x, y), w, choose(x_between, rest, h2)),
+        *(x, choose(w_between, w, y), choose(w_between, gap, h1)),
+        *(choose(x_between, x, y), w, choose(x_between, gap, h2)),
         choose(x_between, h2, choose(w_between, h1, h1 + h2)),
     )

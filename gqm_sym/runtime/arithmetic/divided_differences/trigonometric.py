@@ -23,11 +23,11 @@ from gqm_sym.runtime.compiled.intrinsics import choose, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 # |h1| + |h2| up to which `symmetric_parts` may be used: the rest of its series is below 1e-19 there.
-NEAR = 1.0
+MAX_SPAN = 1.0
 
 # The same limit for sin and cos, whose parts do not cancel while the points span at most a whole turn, the widest
 # swing of a pendulum.
-WIDE = 3.2
+MAX_WAVE_SPAN = 3.2
 
 
 def _even(shift: int, terms: int) -> tuple[float, ...]:
@@ -35,12 +35,13 @@ def _even(shift: int, terms: int) -> tuple[float, ...]:
     return tuple((-1.0) ** k / factorial(2 * k + shift) for k in reversed(range(terms)))
 
 
-# The series of sinc, and of sinc and cosine of half the argument, with as many terms as NEAR and WIDE require.
+# The series of sinc, and of sinc and cosine of half the argument, with as many terms as MAX_SPAN and MAX_WAVE_SPAN
+# require.
 NEAR_SERIES = (_even(1, 10), _even(1, 8), _even(0, 9))
 WIDE_SERIES = (_even(1, 16), _even(1, 12), _even(0, 12))
 
 # sinc as a polynomial in the square of its argument, highest power first. It interpolates at Chebyshev nodes for
-# arguments up to WIDE, and its error with rounded coefficients is below 3e-17.
+# arguments up to MAX_WAVE_SPAN, and its error with rounded coefficients is below 3e-17.
 SINC = (
     -3.4909674184529875e-23,
     1.947320408026163e-20,
@@ -73,16 +74,16 @@ def symmetric_parts(h1, h2, sign, sums):  # type: ignore[no-untyped-def]
 
 @Inlined
 def divdiff2_sin_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sin[x,y,w] = (B cos M - A sin M)/2, M = (x+2y+w)/4, A and B from half the gaps; NaN beyond `WIDE`."""
+    """sin[x,y,w] = (B cos M - A sin M)/2, M = (x+2y+w)/4, A and B from half the gaps; NaN beyond `MAX_WAVE_SPAN`."""
     u, v = 0.5 * h1, 0.5 * h2
     even, odd = symmetric_parts(u, v, 1.0, WIDE_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= WIDE, 0.5 * (odd * cos(m) - even * sin(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_WAVE_SPAN, 0.5 * (odd * cos(m) - even * sin(m)), nan)
 
 
 @Inlined
 def sinc_near(h):  # type: ignore[no-untyped-def]
-    """sin(h)/h, for ``|h|`` <= `WIDE`."""
+    """sin(h)/h, for ``|h|`` <= `MAX_WAVE_SPAN`."""
     return polynomial(SINC, h * h)
 
 
@@ -90,10 +91,10 @@ def sinc_near(h):  # type: ignore[no-untyped-def]
 def divdiff1_cos_in_square(h1, h2):  # type: ignore[no-untyped-def]
     """(cos v - cos h)/(v**2 - h**2): cos(sqrt(t))[h**2, v**2], with the gaps h1 = v + h and h2 = h - v.
 
-    It is also the second difference of cos over -h, v, h. It is NaN where h is beyond `WIDE`.
+    It is also the second difference of cos over -h, v, h. It is NaN where h is beyond `MAX_WAVE_SPAN`.
     """
     u, v = 0.5 * h1, 0.5 * h2
-    return choose(fabs(u) + fabs(v) <= WIDE, -0.5 * sinc_near(u) * sinc_near(v), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_WAVE_SPAN, -0.5 * sinc_near(u) * sinc_near(v), nan)
 
 
 @Inlined
@@ -109,7 +110,7 @@ def divdiff2_cos_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     u, v = 0.5 * h1, 0.5 * h2
     even, odd = symmetric_parts(u, v, 1.0, WIDE_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= WIDE, -0.5 * (odd * sin(m) + even * cos(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_WAVE_SPAN, -0.5 * (odd * sin(m) + even * cos(m)), nan)
 
 
 @Inlined
@@ -130,20 +131,20 @@ def divdiff2_cos(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 
 @Inlined
 def divdiff2_sinh_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine; NaN beyond `NEAR`."""
+    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine; NaN beyond `MAX_SPAN`."""
     u, v = 0.5 * h1, 0.5 * h2
     even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= NEAR, 0.5 * (odd * cosh(m) + even * sinh(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_SPAN, 0.5 * (odd * cosh(m) + even * sinh(m)), nan)
 
 
 @Inlined
 def divdiff2_cosh_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine; NaN beyond `NEAR`."""
+    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine; NaN beyond `MAX_SPAN`."""
     u, v = 0.5 * h1, 0.5 * h2
     even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= NEAR, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_SPAN, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
 
 
 @Inlined
@@ -166,7 +167,7 @@ def divdiff2_cosh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 def divdiff2_exp(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """exp[x,y,w] = exp(M) (A + B)/2; points far apart share the factor exp(w)."""
     u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
+    if fabs(u) + fabs(v) <= MAX_SPAN:
         even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
         return 0.5 * exp(0.25 * (x + w + 2.0 * y)) * (even + odd)
     _a, _b, c, u, v = ordered(x, y, w, h1, h2)
@@ -177,7 +178,7 @@ def divdiff2_exp(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 @Inner
 def divdiff2_tan(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tan[x,y,w] = (B cos m + A sin m)/(cos x cos y cos w), m = (x+w)/2, from whole gaps."""
-    if fabs(h1) + fabs(h2) <= NEAR:
+    if fabs(h1) + fabs(h2) <= MAX_SPAN:
         even, odd = symmetric_parts(h1, h2, 1.0, NEAR_SERIES)
         m = 0.5 * (x + w)
         return (odd * cos(m) + even * sin(m)) / (cos(x) * cos(y) * cos(w))
@@ -188,7 +189,7 @@ def divdiff2_tan(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 @Inner
 def divdiff2_tanh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tanh[x,y,w] = (B cosh m - A sinh m)/(cosh x cosh y cosh w), as for the tangent."""
-    if fabs(h1) + fabs(h2) <= NEAR:
+    if fabs(h1) + fabs(h2) <= MAX_SPAN:
         even, odd = symmetric_parts(h1, h2, -1.0, NEAR_SERIES)
         m = 0.5 * (x + w)
         return (odd * cosh(m) - even * sinh(m)) / cosh(x) / (cosh(y) * cosh(w))

@@ -14,8 +14,8 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     X,
     Z,
     fill_points,
-    nearly_add,
     piece_of,
+    sloppy_add,
 )
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
@@ -28,7 +28,7 @@ stacked_bends = on_stack(4 * RULE)
 
 @Inner
 def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
-    """Fill the second derivatives of x and z by u at places on a piece, two doubles each."""
+    """Fill the second derivatives of x and z with respect to u at places on a piece, two doubles each."""
     k = piece_of(curve, number)
     precise, count = curve.counts[k, 0], curve.counts[k, 1]
     for row in range(2):
@@ -42,7 +42,7 @@ def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
                     bend[i] = fma(bend[i], u[i], term)
                 else:
                     s, s_low = multiply(bend[i], bend_low[i], u[i], u[RULE + i])
-                    bend[i], bend_low[i] = nearly_add(s, s_low, term, term_low)
+                    bend[i], bend_low[i] = sloppy_add(s, s_low, term, term_low)
 
 
 @Inner
@@ -55,7 +55,7 @@ def fill_path(curve, number, n, u, points):  # type: ignore[no-untyped-def]
     Returns
     -------
     (float, float)
-        Bounds on the errors of the coordinates, and of their derivatives by u.
+        Bounds on the errors of the coordinates, and of their derivatives with respect to u.
     """
     fill_points(curve, number, n, u, points)
     k, (h, h_low) = piece_of(curve, number), curve.offset

@@ -111,10 +111,10 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     begin, begin_low = multiply(length, length_low, span[0], 0.0)
     half, half_low = multiply(length, length_low, 0.5 * (span[1] - span[0]), 0.0)
     for i in range(RULE):
-        way, way_low = add(1.0, 0.0, points[i], 0.0)
-        way, way_low = multiply(way, way_low, half, half_low)
-        way, way_low = add(way, way_low, begin, begin_low)
-        _, (u[i], u[RULE + i]) = place_at(parts.curve, number, (way, way_low))
+        place, place_low = add(1.0, 0.0, points[i], 0.0)
+        place, place_low = multiply(place, place_low, half, half_low)
+        place, place_low = add(place, place_low, begin, begin_low)
+        _, (u[i], u[RULE + i]) = place_at(parts.curve, number, (place, place_low))
     fill_values(parts, number, RULE, u, values)
     for row in range(parts.values.size):
         for i in range(RULE):
@@ -122,9 +122,9 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
                 sign = 1.0 - 2.0 * side
                 gain, gain_low = values[row, 0, i], values[row, 1, i]
                 gain, gain_low = add(gain, gain_low, -ends[row, 0, side], -ends[row, 1, side])
-                way, way_low = add(1.0, 0.0, sign * points[i], 0.0)
-                way, way_low = multiply(way, way_low, sign * half, sign * half_low)
-                differences[side, row, 0, i], differences[side, row, 1, i] = divide(gain, gain_low, way, way_low)
+                place, place_low = add(1.0, 0.0, sign * points[i], 0.0)
+                place, place_low = multiply(place, place_low, sign * half, sign * half_low)
+                differences[side, row, 0, i], differences[side, row, 1, i] = divide(gain, gain_low, place, place_low)
     return half
 
 

@@ -27,10 +27,10 @@ from gqm_sym.runtime.charts.double_double.turning_points import (
     locate,
 )
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
-from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, Bounded, Orbit
+from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, BoundedNumber, Orbit
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
 from gqm_sym.runtime.double_double.recording import BoundTape
 
@@ -49,17 +49,17 @@ def fill_stops(curve, found, phases, width, stops):  # type: ignore[no-untyped-d
     ``width`` contains the orbit's width in arc length as two doubles, negative for a lap backwards, and then 1 for a
     libration and 0 for a lap.
     """
-    curve, found = unshared(curve), uncounted(found)
+    curve, found = unshared(curve), borrowed(found)
     row = LOWER if width[2] != 0.0 else LAUNCH
-    number, at = int(found[row, 0]), (found[row, 1], found[row, 2])
-    base, _ = arc_between(curve, number, (-1.0, 0.0), number, at)
+    number, place = int(found[row, 0]), (found[row, 1], found[row, 2])
+    base, _ = arc_between(curve, number, (-1.0, 0.0), number, place)
     for i in range(phases.size):
         share, share_low = phases[i], 0.0
         if width[2] != 0.0:
             s, s_low, _, _ = sine_and_cosine(0.5 * share, 0.0)
             share, share_low = multiply(s, s_low, s, s_low)
-        way, way_low = multiply(share, share_low, width[0], width[1])
-        other, to = place_at(curve, number, add(base[0], base[1], way, way_low))
+        distance, distance_low = multiply(share, share_low, width[0], width[1])
+        other, to = place_at(curve, number, add(base[0], base[1], distance, distance_low))
         stops[i, 0], stops[i, 1], stops[i, 2] = other, to[0], to[1]
 
 
@@ -78,15 +78,15 @@ def fill_passage(curve, tape, work, p, found, stops, times, middle):  # type: ig
     middle : int
         The number of the first stop that is nearer to the upper turning point; -1 for a lap.
     """
-    curve, work, found = unshared(curve), uncounted(work), uncounted(found)
-    stops, times = uncounted(stops), uncounted(times)
+    curve, work, found = unshared(curve), borrowed(work), borrowed(found)
+    stops, times = borrowed(stops), borrowed(times)
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
-    fill_parameters(tape, uncounted(p), work)
+    tape = (address, borrowed(operations), parts, registers)
+    fill_parameters(tape, borrowed(p), work)
     path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
     row = LOWER if middle >= 0 else LAUNCH
-    number, at = int(found[row, 0]), (found[row, 1], found[row, 2])
-    way = -1 if stops[stops.shape[0] - 1, 0] < number else 1
+    number, place = int(found[row, 0]), (found[row, 1], found[row, 2])
+    direction = -1 if stops[stops.shape[0] - 1, 0] < number else 1
     high, low, error = 0.0, 0.0, 0.0
     for j in range(stops.shape[0]):
         inward = 0 if middle < 0 else 1 if j <= middle else -1
@@ -94,16 +94,16 @@ def fill_passage(curve, tape, work, p, found, stops, times, middle):  # type: ig
         turn = int(found[end, 0]) if inward != 0 else 0, found[end, 1], found[end, 2]
         last = int(stops[j, 0])
         while True:
-            to = (stops[j, 1], stops[j, 2]) if number == last else (float(way), 0.0)
-            if to[0] != at[0] or to[1] != at[1]:
-                one, other = (at, to) if way > 0 else (to, at)
+            to = (stops[j, 1], stops[j, 2]) if number == last else (float(direction), 0.0)
+            if to[0] != place[0] or to[1] != place[1]:
+                one, other = (place, to) if direction > 0 else (to, place)
                 part, rounding = time_on_piece(path, number, one, other, turn, inward)
                 high, low = add(high, low, part[0], part[1])
                 error += rounding + UNIT * high
-            at = to
+            place = to
             if number == last or high != high:
                 break
-            number, at = number + way, (-float(way), 0.0)
+            number, place = number + direction, (-float(direction), 0.0)
         times[j, 0], times[j, 1], times[j, 2] = high, low, error
 
 
@@ -142,13 +142,13 @@ class ChartPassage:
         return float(self.found[BEHIND, 0]), float(self.found[AHEAD, 0])
 
     @property
-    def turning_points(self) -> tuple[Bounded, Bounded]:
+    def turning_points(self) -> tuple[BoundedNumber, BoundedNumber]:
         """The lower and the upper turning point of a libration in arc length."""
         found = self.found
         place = minus(found[PLACE, :2].tolist(), self._pieces.start_length)
-        ways = minus((0.0, 0.0), found[BEHIND, :2].tolist()), found[AHEAD, :2].tolist()
+        distances = minus((0.0, 0.0), found[BEHIND, :2].tolist()), found[AHEAD, :2].tolist()
         low, high = (found[PLACE, 2] + found[[BEHIND, AHEAD], 2]).tolist()
-        return Bounded(*plus(place, ways[0]), low), Bounded(*plus(place, ways[1]), high)
+        return BoundedNumber(*plus(place, distances[0]), low), BoundedNumber(*plus(place, distances[1]), high)
 
     @cached_property
     def orbit(self) -> Orbit | None:
@@ -157,10 +157,10 @@ class ChartPassage:
         if self._direction:
             count = len(self._pieces.curve.counts)
             stop = found[LAUNCH, :3] + (self._direction * count, 0.0, 0.0)
-            duration = Bounded(*self._times(stop[None], -1)[-1].tolist())
-            ends = (Bounded(nan, nan, nan),) * 2
+            duration = BoundedNumber(*self._times(stop[None], -1)[-1].tolist())
+            ends = (BoundedNumber(nan, nan, nan),) * 2
         else:
-            duration = Bounded(*self._times(found[[MIDDLE, UPPER], :3], 0)[-1].tolist())
+            duration = BoundedNumber(*self._times(found[[MIDDLE, UPPER], :3], 0)[-1].tolist())
             ends = self.turning_points
         return Orbit(duration, *ends) if duration.error <= MAX_ERROR * duration.high else None
 

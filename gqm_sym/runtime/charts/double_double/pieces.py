@@ -18,11 +18,11 @@ from numpy.polynomial.chebyshev import cheb2poly
 from numpy.polynomial.legendre import legval
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, two_sum
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
-from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
@@ -50,7 +50,7 @@ MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
+# Columns of the points that `fill_points` fills: x, z and their derivatives with respect to u, two doubles each.
 # `offset_path.fill_path` adds the length of the path over that of the curve.
 X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
 
@@ -67,7 +67,7 @@ class TrueCurve(NamedTuple):
     counts : (n, 2) array of int
         The number of powers that need two doubles, and the number of all powers.
     errors : (n, 2) array
-        Bounds on the errors of the coordinates, and on those of their derivatives by u.
+        Bounds on the errors of the coordinates, and on those of their derivatives with respect to u.
     lengths : (n, 3) array
         Arc length as two doubles, and a bound on its error.
     edges : (n+1,) array
@@ -103,7 +103,7 @@ TRUE_CURVE = types.NamedTuple(
 
 
 @Inlined
-def nearly_add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
+def sloppy_add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
     """Return the sum within 2 UNIT of the larger term, faster than `add`."""
     s, e = two_sum(a, b)
     return fast_sum(s, e + (a_low + b_low))
@@ -113,14 +113,14 @@ def nearly_add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
 def unshared(curve):  # type: ignore[no-untyped-def]
     """Return a curve to whose arrays numba does not count references."""
     return TrueCurve(
-        uncounted(curve.terms),
-        uncounted(curve.counts),
-        uncounted(curve.errors),
-        uncounted(curve.lengths),
-        uncounted(curve.edges),
+        borrowed(curve.terms),
+        borrowed(curve.counts),
+        borrowed(curve.errors),
+        borrowed(curve.lengths),
+        borrowed(curve.edges),
         curve.period,
-        uncounted(curve.rule),
-        uncounted(curve.tails),
+        borrowed(curve.rule),
+        borrowed(curve.tails),
         curve.offset,
     )
 
@@ -150,9 +150,9 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
             term, term_low = curve.terms[k, 2 * row, j], curve.terms[k, 2 * row + 1, j]
             for i in range(n):
                 s, s_low = multiply(slope[i], slope_low[i], u[i], u[RULE + i])
-                slope[i], slope_low[i] = nearly_add(s, s_low, value[i], value_low[i])
+                slope[i], slope_low[i] = sloppy_add(s, s_low, value[i], value_low[i])
                 s, s_low = multiply(value[i], value_low[i], u[i], u[RULE + i])
-                value[i], value_low[i] = nearly_add(s, s_low, term, term_low)
+                value[i], value_low[i] = sloppy_add(s, s_low, term, term_low)
 
 
 @Inner
@@ -165,14 +165,14 @@ def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
     rule, u, points = curve.rule, stacked_places(), stacked_points()
     width, width_low = add(right[0], right[1], -left[0], -left[1])
     for i in range(RULE):
-        way, way_low = multiply(width, width_low, rule[0, i], rule[1, i])
-        u[i], u[RULE + i] = add(left[0], left[1], way, way_low)
+        distance, distance_low = multiply(width, width_low, rule[0, i], rule[1, i])
+        u[i], u[RULE + i] = add(left[0], left[1], distance, distance_low)
     fill_points(curve, number, RULE, u, points)
     total, low, one, two = 0.0, 0.0, 0.0, 0.0
     for i in range(RULE):
         s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
         t, t_low = multiply(points[DZ + i], points[DZ_LOW + i], points[DZ + i], points[DZ_LOW + i])
-        s, s_low = nearly_add(s, s_low, t, t_low)
+        s, s_low = sloppy_add(s, s_low, t, t_low)
         s, s_low = square_root(s, s_low)
         s, s_low = multiply(s, s_low, rule[2, i], rule[3, i])
         total, low = add(total, low, s, s_low)
@@ -186,10 +186,10 @@ def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def speed_at(curve, number, at):  # type: ignore[no-untyped-def]
-    """Return the derivative of arc length by u at a place, as a double."""
+def speed_at(curve, number, place):  # type: ignore[no-untyped-def]
+    """Return the derivative of arc length with respect to u at a place, as a double."""
     u, points = stacked_places(), stacked_points()
-    u[0], u[RULE] = at
+    u[0], u[RULE] = place
     fill_points(curve, number, 1, u, points)
     return sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
 
@@ -207,29 +207,29 @@ def place_at(curve, number, length):  # type: ignore[no-untyped-def]
         length = add(length[0], length[1], lengths[k, 0], lengths[k, 1])
     k = piece_of(curve, number)
     while length[0] >= lengths[k, 0] and (curve.period > 0.0 or number < count - 1):
-        rest = add(length[0], length[1], -lengths[k, 0], -lengths[k, 1])
-        if rest[0] < 0.0:
+        remainder = add(length[0], length[1], -lengths[k, 0], -lengths[k, 1])
+        if remainder[0] < 0.0:
             break
-        length, number = rest, number + 1
+        length, number = remainder, number + 1
         k = piece_of(curve, number)
-    at, begin = (2.0 * length[0] / lengths[k, 0] - 1.0, 0.0), (-1.0, 0.0)
+    place, begin = (2.0 * length[0] / lengths[k, 0] - 1.0, 0.0), (-1.0, 0.0)
     for _ in range(MAX_STEPS):
-        arc, _ = arc_on(curve, number, begin, at)
-        rest = add(length[0], length[1], -arc[0], -arc[1])
-        speed = speed_at(curve, number, at)
-        step = rest[0] / speed
-        at = add(at[0], at[1], step, rest[1] / speed)
+        arc, _ = arc_on(curve, number, begin, place)
+        remainder = add(length[0], length[1], -arc[0], -arc[1])
+        speed = speed_at(curve, number, place)
+        step = remainder[0] / speed
+        place = add(place[0], place[1], step, remainder[1] / speed)
         if not fabs(step) > MAX_LAST_STEP:
             break
-    return number, at
+    return number, place
 
 
 @Inner
-def arc_between(curve, number, at, other, to):  # type: ignore[no-untyped-def]
+def arc_between(curve, number, place, other, to):  # type: ignore[no-untyped-def]
     """Return the arc length from a place on a piece to one on the same or a later piece, with its error."""
     if number == other:
-        return arc_on(curve, number, at, to)
-    (high, low), error = arc_on(curve, number, at, (1.0, 0.0))
+        return arc_on(curve, number, place, to)
+    (high, low), error = arc_on(curve, number, place, (1.0, 0.0))
     for between in range(number + 1, other):
         k = piece_of(curve, between)
         high, low = add(high, low, curve.lengths[k, 0], curve.lengths[k, 1])
@@ -240,12 +240,12 @@ def arc_between(curve, number, at, other, to):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def foot(curve, number, at, point):  # type: ignore[no-untyped-def]
+def foot(curve, number, place, point):  # type: ignore[no-untyped-def]
     """Return the place on a piece, near a place on it, where the perpendicular from a point meets the curve."""
     x, x_low, z, z_low = point
     u, points = stacked_places(), stacked_points()
     for _ in range(MAX_STEPS):
-        u[0], u[RULE] = at
+        u[0], u[RULE] = place
         fill_points(curve, number, 1, u, points)
         x_gap, x_gap_low = add(x, x_low, -points[X], -points[X_LOW])
         z_gap, z_gap_low = add(z, z_low, -points[Z], -points[Z_LOW])
@@ -254,10 +254,10 @@ def foot(curve, number, at, point):  # type: ignore[no-untyped-def]
         s, s_low = add(s, s_low, t, t_low)
         square = points[DX] * points[DX] + points[DZ] * points[DZ]
         step, step_low = s / square, s_low / square
-        at = add(at[0], at[1], step, step_low)
+        place = add(place[0], place[1], step, step_low)
         if not fabs(step) > 1e-30:
             break
-    return at
+    return place
 
 
 @entry(types.UniTuple(REAL, 2)(TRUE_CURVE, INTEGER, types.UniTuple(REAL, 4)))
@@ -277,7 +277,7 @@ def chebyshev_tables():  # type: ignore[no-untyped-def]
     for j in range(NODES):
         for k in range(NODES):
             quarters = (j * (2 * k + 1)) % (4 * NODES) / NODES
-            _, _, c, c_low = sine_and_cosine(*multiply(quarters, 0.0, QUARTER[0], QUARTER[1]))
+            _, _, c, c_low = sine_and_cosine(*multiply(quarters, 0.0, HALF_PI[0], HALF_PI[1]))
             share = (1.0 if j == 0 else 2.0) / NODES
             fit[0, j, k], fit[1, j, k] = share * c, share * c_low
             if j == 1:

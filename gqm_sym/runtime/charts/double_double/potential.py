@@ -48,16 +48,16 @@ def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def
 
 
 @Inner
-def energy_at(path, number, at):  # type: ignore[no-untyped-def]
-    """Return the potential (two doubles, error) at a place on a piece, its derivative by u, and the derivative of arc
-    length by u.
+def energy_at(path, number, place):  # type: ignore[no-untyped-def]
+    """Return the potential (two doubles, error) at a place on a piece, its derivative with respect to u, and the
+    derivative of arc length with respect to u.
 
     The potential is that on the body's path; the arc length is that of the curve.
     """
     curve, tape, work, _ = path
     address, operations, parts, registers = tape
     u, points = stacked_places(), stacked_points()
-    u[0], u[RULE] = at
+    u[0], u[RULE] = place
     error, _ = fill_path(curve, number, 1, u, points)
     fill_registers(tape, work, 1, points, error)
     call_interpreter(address, operations, parts[0], parts[2], work, 1)
@@ -70,9 +70,9 @@ def energy_at(path, number, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def position(curve, number, at):  # type: ignore[no-untyped-def]
+def position(curve, number, place):  # type: ignore[no-untyped-def]
     """Return the approximate arc length of a place."""
     count = curve.counts.shape[0]
     k = piece_of(curve, number)
     low, high = curve.edges[k], curve.edges[k + 1]
-    return low + 0.5 * (1.0 + at) * (high - low) + (number // count) * curve.period
+    return low + 0.5 * (1.0 + place) * (high - low) + (number // count) * curve.period

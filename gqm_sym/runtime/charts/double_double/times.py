@@ -52,8 +52,8 @@ def fill_places(curve, left, width, spread, u, factors):  # type: ignore[no-unty
     """
     rule, (sign, origin, origin_low) = curve.rule, spread
     for i in range(RULE):
-        way, way_low = multiply(width[0], width[1], rule[0, i], rule[1, i])
-        u[i], u[RULE + i] = add(left[0], left[1], way, way_low)
+        angle, angle_low = multiply(width[0], width[1], rule[0, i], rule[1, i])
+        u[i], u[RULE + i] = add(left[0], left[1], angle, angle_low)
         factors[i], factors[RULE + i] = rule[2, i], rule[3, i]
     if sign != 0.0:
         for i in range(RULE):
@@ -168,9 +168,9 @@ def time_on_piece(path, number, low, high, turn, inward):  # type: ignore[no-unt
         here, there = position(path.curve, number, near[0]), position(path.curve, number, far[0])
         if fabs(here - position(path.curve, turn[0], turn[1])) <= MAX_NEAR * fabs(there - here):
             (value, value_low, _), slope, _ = energy_at(path, number, near)
-            rest = ((path.level[0] - value) + (path.level[1] - value_low)) / (-sign * slope[0])
-            if 0.0 < rest <= MAX_NEAR * 2.0:
-                origin, origin_low = add(near[0], near[1], -sign * rest, 0.0)
+            correction = ((path.level[0] - value) + (path.level[1] - value_low)) / (-sign * slope[0])
+            if 0.0 < correction <= MAX_NEAR * 2.0:
+                origin, origin_low = add(near[0], near[1], -sign * correction, 0.0)
                 spread = (sign, origin, origin_low)
     if spread[0] == 0.0:
         return time_by_panels(path, number, low, high, spread)

@@ -7,7 +7,7 @@ from numba import types
 from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, arc_between, foot, place_at, unshared
 from gqm_sym.runtime.charts.double_double.potential import Path, energy_at, position
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
@@ -29,29 +29,29 @@ ROWS, COLUMNS = 8, 4
 
 
 @Inner
-def find_turn(path, number, at, inward):  # type: ignore[no-untyped-def]
+def find_turn(path, number, place, inward):  # type: ignore[no-untyped-def]
     """Return the turning point (piece, place) near a place, a bound on half V**2 there, and its slope.
 
     ``inward`` is 1 if the motion lies above it, -1 if below. The place is NaN where Newton's method fails.
     """
     before, moves, side = 0.0, 0, float(inward)
     for _ in range(MAX_STEPS):
-        (value, value_low, error), slope, speed = energy_at(path, number, at)
+        (value, value_low, error), slope, speed = energy_at(path, number, place)
         half, half_low = add(path.level[0], path.level[1], -value, -value_low)
         step, step_low = divide(half, half_low, slope[0], slope[1])
-        at = add(at[0], at[1], step, step_low)
-        over = side * at[0] - 1.0 + side * at[1]
+        place = add(place[0], place[1], step, step_low)
+        over = side * place[0] - 1.0 + side * place[1]
         if fabs(step) < 0.5 and moves < MAX_MOVES and (over >= -AT_EDGE or over < -2.0 - AT_EDGE):
             # The turning point lies on a neighbouring piece, or on the edge between the two pieces.
-            way = inward if over >= -AT_EDGE else -inward
-            if path.curve.period > 0.0 or 0 <= number + way < path.curve.counts.shape[0]:
-                number, at, before, moves = number + way, (-float(way), 0.0), 0.0, moves + 1
+            direction = inward if over >= -AT_EDGE else -inward
+            if path.curve.period > 0.0 or 0 <= number + direction < path.curve.counts.shape[0]:
+                number, place, before, moves = number + direction, (-float(direction), 0.0), 0.0, moves + 1
                 continue
         if 0.0 < before < MAX_LAST_STEP or step == 0.0:
             ratio = step / before if before > 0.0 else 0.0
-            if side * at[0] < -1.0:
-                at = (-side, 0.0)
-            return (number, at[0], at[1]), fabs(half) * ratio * ratio + error, slope[0] / speed
+            if side * place[0] < -1.0:
+                place = (-side, 0.0)
+            return (number, place[0], place[1]), fabs(half) * ratio * ratio + error, slope[0] / speed
         before = fabs(step)
     return (number, nan, nan), nan, nan
 
@@ -82,27 +82,32 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
     found : (ROWS, COLUMNS) array
         Filled. On entry it contains the error of the launch in arc length.
     """
-    curve, work, found = unshared(curve), uncounted(work), uncounted(found)
+    curve, work, found = unshared(curve), borrowed(work), borrowed(found)
     address, operations, parts, registers = tape
-    tape = (address, uncounted(operations), parts, registers)
-    fill_parameters(tape, uncounted(p), work)
+    tape = (address, borrowed(operations), parts, registers)
+    fill_parameters(tape, borrowed(p), work)
     length, length_low, v0, v0_low, by_point, x, x_low, z, z_low = launch
-    doubt = found[LAUNCH, 3]
-    number, at = place_at(curve, start, (length, length_low))
+    uncertainty = found[LAUNCH, 3]
+    number, launch_place = place_at(curve, start, (length, length_low))
     if by_point != 0.0:
-        at = foot(curve, number, at, (x, x_low, z, z_low))
+        launch_place = foot(curve, number, launch_place, (x, x_low, z, z_low))
     path = Path(curve, tape, work, (0.0, 0.0, 0.0, 0.0))
-    (value, value_low, error), slope, speed = energy_at(path, number, at)
+    (value, value_low, error), slope, speed = energy_at(path, number, launch_place)
     half, half_low = multiply(v0, v0_low, 0.5 * v0, 0.5 * v0_low)
     high, low = add(value, value_low, half, half_low)
-    level = (high, low, 0.0, error + UNIT * half + fabs(slope[0]) * (doubt / speed + 4.0 * UNIT))
+    level = (high, low, 0.0, error + UNIT * half + fabs(slope[0]) * (uncertainty / speed + 4.0 * UNIT))
     found[:] = nan
-    found[LAUNCH, 0], found[LAUNCH, 1], found[LAUNCH, 2], found[LAUNCH, 3] = number, at[0], at[1], doubt
+    found[LAUNCH, 0], found[LAUNCH, 1], found[LAUNCH, 2], found[LAUNCH, 3] = (
+        number,
+        launch_place[0],
+        launch_place[1],
+        uncertainty,
+    )
     if by_point != 0.0:
-        length, length_low = arc_from(curve, start, number, at)
-    found[PLACE, 0], found[PLACE, 1], found[PLACE, 2] = length, length_low, doubt
+        length, length_low = arc_from(curve, start, number, launch_place)
+    found[PLACE, 0], found[PLACE, 1], found[PLACE, 2] = length, length_low, uncertainty
     if ends[2] == 0.0:
-        path, rest = Path(curve, tape, work, level), 0.0
+        path, residual = Path(curve, tape, work, level), 0.0
         for row, place, inward in ((LOWER, ends[0], 1), (UPPER, ends[1], -1)):
             guess, near = place_at(curve, number, (place - position(curve, number, -1.0), 0.0))
             turn, left, fall = find_turn(path, guess, near, inward)
@@ -112,19 +117,19 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
                 turn[2],
                 (left + level[3]) / fabs(fall),
             )
-            rest = max(rest, left)
-        level = (level[0], level[1], rest, level[3])
+            residual = max(residual, left)
+        level = (level[0], level[1], residual, level[3])
         fill_middle(curve, found)
     found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3] = level
 
 
 @Inner
-def arc_from(curve, start, number, at):  # type: ignore[no-untyped-def]
+def arc_from(curve, start, number, place):  # type: ignore[no-untyped-def]
     """Return the arc length from the left edge of a piece to a place before or behind it."""
     edge = (-1.0, 0.0)
     if number >= start:
-        return arc_between(curve, start, edge, number, at)[0]
-    arc, _ = arc_between(curve, number, at, start, edge)
+        return arc_between(curve, start, edge, number, place)[0]
+    arc, _ = arc_between(curve, number, place, start, edge)
     return -arc[0], -arc[1]
 
 
@@ -133,13 +138,13 @@ def fill_middle(curve, found):  # type: ignore[no-untyped-def]
     """Fill the arc lengths between launch and turning points, and a place between these."""
     first, last, number = int(found[LOWER, 0]), int(found[UPPER, 0]), int(found[LAUNCH, 0])
     low, high = (found[LOWER, 1], found[LOWER, 2]), (found[UPPER, 1], found[UPPER, 2])
-    at = found[LAUNCH, 1], found[LAUNCH, 2]
+    place = found[LAUNCH, 1], found[LAUNCH, 2]
     if not (low[0] == low[0] and high[0] == high[0] and first <= number <= last):
         found[LOWER, 1] = nan
         return
-    arc, error = arc_between(curve, first, low, number, at)
+    arc, error = arc_between(curve, first, low, number, place)
     found[BEHIND, 0], found[BEHIND, 1], found[BEHIND, 2] = arc[0], arc[1], error + found[LAUNCH, 3] + found[LOWER, 3]
-    arc, error = arc_between(curve, number, at, last, high)
+    arc, error = arc_between(curve, number, place, last, high)
     found[AHEAD, 0], found[AHEAD, 1], found[AHEAD, 2] = arc[0], arc[1], error + found[LAUNCH, 3] + found[UPPER, 3]
     middle = 0.5 * (low[0] + high[0])
     if first != last:

@@ -38,21 +38,22 @@ RADIUS, MAX_TURN, TERMS = 4.0, 2.0, 36
 
 # The number of parts of a piece is multiplied by one of these, the first for which the last coefficients of its roll
 # angle are below MAX_TAIL.
-FINER, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
+REFINEMENTS, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
 # The matrix that maps values at the nodes to those of the derivative.
 DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
 
-# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
+# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these with respect to
+# arc length.
 CURVE_ROWS = 13
 Long = Any  # an array of the longest floats
 
 
-class Pen(NamedTuple):
+class Pose(NamedTuple):
     """The end of a piece: its coordinates, the frame in rows, and the roll angle of a banked rail."""
 
     place: Long
     frame: Long
-    lean: Long = 0.0
+    roll_angle: Long = 0.0
 
 
 class Pieces(NamedTuple):
@@ -111,8 +112,8 @@ class SpaceRail:
             If pieces do not meet, a closed rail does not close, or the frame of a banked one has no roll angle.
         """
         numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
-        pen = _start(*(float(number) for number in islice(numbers, 6))) if self.placed else None
-        start, parts, joints = pen, [], [0.0]
+        pose = _start(*(float(number) for number in islice(numbers, 6))) if self.placed else None
+        start, parts, joints = pose, [], [0.0]
         for count, kind in enumerate(self.pieces, start=1):
             where = f"piecewise: piece {count} ({kind})"
             given = [float(number) for number in islice(numbers, PIECE_NUMBERS[kind])]
@@ -120,25 +121,27 @@ class SpaceRail:
                 if self.banked:
                     raise DeclarationError(f"{where}: has no roll of its own; declare the roll by a formula in s")
                 part, begin, end = _curve(next(segments), np.array(p), given, where)
-                if pen is not None:
+                if pose is not None:
                     length = joints[-1] + float(part.lengths.sum())
-                    _check_joint(pen, begin, length, f"{where}: begins", "the piece before it ends")
+                    _check_joint(pose, begin, length, f"{where}: begins", "the piece before it ends")
             else:
-                assert pen is not None
-                begin = pen
-                part, end = _piece(*_rates(kind, given, where), pen, where, self.banked)
-            start, pen = start or begin, end
+                assert pose is not None
+                begin = pose
+                part, end = _piece(*_rates(kind, given, where), pose, where, self.banked)
+            start, pose = start or begin, end
             parts.append(part)
             joints.append(joints[-1] + float(part.lengths.sum()))
             if sum(one.lengths.size for one in parts) > MAX_PIECES:
                 raise BudgetError(f"chart: {where}: {MAX_PIECES} pieces reach no farther; let the rail turn less")
         assert start is not None
-        assert pen is not None
+        assert pose is not None
         if self.closed:
-            _check_joint(pen, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
-            if self.banked and not abs(np.sin(0.5 * (pen.lean - start.lean))) <= MAX_MISMATCH:
-                leans = f"{float(pen.lean)!r} rad at its end, and {float(start.lean)!r} rad at its start"
-                raise DeclarationError(f"piecewise: closed: the rail leans by {leans}; let it roll back")
+            _check_joint(pose, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
+            if self.banked and not abs(np.sin(0.5 * (pose.roll_angle - start.roll_angle))) <= MAX_MISMATCH:
+                roll_angles = (
+                    f"{float(pose.roll_angle)!r} rad at its end, and {float(start.roll_angle)!r} rad at its start"
+                )
+                raise DeclarationError(f"piecewise: closed: the rail leans by {roll_angles}; let it roll back")
         lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
         edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
         return assemble_in_space(
@@ -163,23 +166,23 @@ class SpaceRail:
         return None
 
 
-def _start(x: float, y: float, z: float, heading: float, climb: float, roll: float) -> Pen:
+def _start(x: float, y: float, z: float, heading: float, climb: float, roll: float) -> Pose:
     """Return the start of a rail, whose frame leans to the left by the roll angle."""
     cosine, sine, level, rise = cos(heading), sin(heading), cos(climb), sin(climb)
     ahead = np.array([level * cosine, level * sine, rise], dtype=np.longdouble)
     left = np.array([-sine, cosine, 0.0], dtype=np.longdouble)
     up = np.array([-rise * cosine, -rise * sine, level], dtype=np.longdouble)
-    lean, upright = sin(roll), cos(roll)
-    frame = np.stack([ahead, upright * left - lean * up, upright * up + lean * left])
-    return Pen(np.array([x, y, z], dtype=np.longdouble), frame, np.longdouble(roll))
+    roll_sine, roll_cosine = sin(roll), cos(roll)
+    frame = np.stack([ahead, roll_cosine * left - roll_sine * up, roll_cosine * up + roll_sine * left])
+    return Pose(np.array([x, y, z], dtype=np.longdouble), frame, np.longdouble(roll))
 
 
-def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
+def _check_joint(end: Pose, begin: Pose, length: float, who: str, whom: str) -> None:
     """Refuse a joint at which the place or the tangent jumps."""
     gap = float(np.sqrt(((begin.place - end.place) ** 2).sum()))
     turn = float(np.sqrt(((begin.frame[0] - end.frame[0]) ** 2).sum()))
     if not (gap <= MAX_MISMATCH * length and turn <= MAX_MISMATCH):
-        place, other = (tuple(pen.place.astype(float).tolist()) for pen in (begin, end))
+        place, other = (tuple(pose.place.astype(float).tolist()) for pose in (begin, end))
         raise DeclarationError(
             f"{who} at {place!r}, {gap:.3g} m and {turn:.3g} rad off where {whom}: {other!r}; "
             f"both must match within {MAX_MISMATCH:g} of the rail's length and {MAX_MISMATCH:g} rad"
@@ -212,10 +215,10 @@ def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
     return length, rates
 
 
-def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tuple[Pieces, Pen]:
+def _piece(length: float, rates: Long, pose: Pose, where: str, banked: bool) -> tuple[Pieces, Pose]:
     """Return a piece with given rates, in enough parts to resolve its roll angle too, and its right end."""
-    for finer in FINER if banked else FINER[:1]:
-        pieces, end, spin, leaning = _turned(length, rates, pen, where, finer)
+    for finer in REFINEMENTS if banked else REFINEMENTS[:1]:
+        pieces, end, spin, end_roll = _turned(length, rates, pose, where, finer)
         if not banked:
             break
         with np.errstate(all="ignore"):
@@ -224,15 +227,15 @@ def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tu
             # The frame rolls; and where a climbing track turns, the horizontal direction turns about the tangent.
             slopes = spin + up * change
         half = 0.5 * pieces.lengths[:, None]
-        leans = np.cumsum(np.append(pen.lean, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
+        roll_angles = np.cumsum(np.append(pose.roll_angle, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
         # Beyond a vertical tangent, the roll angle is measured from another horizontal direction.
-        off = np.abs(np.sin(0.5 * (leans[1:] - leaning))).max()
+        off = np.abs(np.sin(0.5 * (roll_angles[1:] - end_roll))).max()
         if np.abs(half * (slopes @ FIT[-2:].T)).max() <= MAX_TAIL and off <= MAX_MISMATCH:
             bends = slopes @ DERIVATIVE / half
             rows = (slopes, bends, bends @ DERIVATIVE / half)
             known = (np.append(row, roll[:, None], axis=1) for row, roll in zip(pieces[2:], rows, strict=True))
-            anchors = np.column_stack([pieces.anchors, leans[:-1]])
-            return Pieces(pieces.lengths, anchors, *known), end._replace(lean=leans[-1])
+            anchors = np.column_stack([pieces.anchors, roll_angles[:-1]])
+            return Pieces(pieces.lengths, anchors, *known), end._replace(roll_angle=roll_angles[-1])
     else:
         raise DeclarationError(
             f"{where}: its tangent is vertical, or nearly so, where there is no level to measure a roll angle from; "
@@ -241,7 +244,7 @@ def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tu
     return pieces, end
 
 
-def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tuple[Pieces, Pen, Array, Long]:
+def _turned(length: float, rates: Long, pose: Pose, where: str, finer: int) -> tuple[Pieces, Pose, Array, Long]:
     """Return a piece with given rates, its right end, the roll rate at the nodes, and the roll angles at the ends of
     its parts.
     """
@@ -268,11 +271,11 @@ def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tup
         series.append(total / (k + 1))
     frames = np.empty((count + 1, 3, 3), dtype=np.longdouble)
     passed: Long = sum(series)
-    frames[0] = pen.frame
+    frames[0] = pose.frame
     for k in range(count):
         frames[k + 1] = passed[k] @ frames[k]
     gained: Long = step * sum(term[:, 0] / (k + 1) for k, term in enumerate(series))
-    gains = np.concatenate([pen.place[None], np.einsum("ki,kij->kj", gained, frames[:-1])])
+    gains = np.concatenate([pose.place[None], np.einsum("ki,kij->kj", gained, frames[:-1])])
     places = np.cumsum(gains, axis=0)
     shares = 0.5 * (1.0 + np.asarray(NODES, dtype=np.longdouble))
     at_nodes: Long = sum(term[:, None] * (shares**k)[:, None, None] for k, term in enumerate(series))
@@ -287,7 +290,7 @@ def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tup
     pieces = Pieces(np.full(count, float(step)), places[:-1], *rows)
     across, along = -frames[1:, 0, 1], frames[1:, 0, 0]
     left, upright = (frames[1:, row, 0] * across + frames[1:, row, 1] * along for row in (1, 2))
-    return pieces, Pen(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
+    return pieces, Pose(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
 
 
 def _on_parts(length: float, rates: Long, count: int) -> Long:
@@ -310,7 +313,7 @@ def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
     return out
 
 
-def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Pieces, Pen, Pen]:
+def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Pieces, Pose, Pose]:
     """Return a curve with formulas, and both its ends."""
     low, high = ends
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
@@ -322,7 +325,7 @@ def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Piece
 
     found = divided(rows, np.array([low, high]), 3, where=where)
     at_ends = rows(np.array([low, high]), np.zeros((2, 1)))[:, :, 0].T
-    begin, end = (Pen(row[:3].astype(np.longdouble), _level(row[4:7])) for row in at_ends)
+    begin, end = (Pose(row[:3].astype(np.longdouble), _level(row[4:7])) for row in at_ends)
     values = np.moveaxis(found.at_nodes, 0, 1)
     anchors = found.at_edges[:3].T.astype(np.longdouble)
     return Pieces(found.lengths, anchors, values[:, :3], values[:, 3:6], values[:, 6:]), begin, end

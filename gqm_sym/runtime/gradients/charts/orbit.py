@@ -54,7 +54,7 @@ MAX_ROUNDING = 1e-16
 AT_EDGE = 1e-15
 
 # The step of the difference quotient for the second derivative at an extreme, as a share of the orbit's width.
-BESIDE = 2.0**-20
+DIFFERENCE_STEP_SHARE = 2.0**-20
 
 
 @entry(types.void(TRUE_CURVE, INTEGER, MATRIX, types.UniTuple(types.float64, 4), MATRIX, MATRIX), checked=False)
@@ -82,11 +82,11 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
     for k in range(panels.shape[0]):
         fill_panel(kind, (panels[k, 0], 0.0), (panels[k, 1], panels[k, 2]), 0, curve.rule, nodes)
         for i in range(RULE):
-            way, way_low = multiply(nodes[0, i], nodes[1, i], width, width_low)
-            piece, at = place_at(curve, number, add(base[0], base[1], way, way_low))
+            distance, distance_low = multiply(nodes[0, i], nodes[1, i], width, width_low)
+            piece, place = place_at(curve, number, add(base[0], base[1], distance, distance_low))
             to = k * RULE + i
             shares[0, to], shares[1, to] = nodes[0, i], nodes[1, i]
-            places[0, to], places[1, to], places[2, to] = piece, at[0], at[1]
+            places[0, to], places[1, to], places[2, to] = piece, place[0], place[1]
 
 
 def source_along(problem: Problem) -> ChartSource:
@@ -100,7 +100,7 @@ def source_along(problem: Problem) -> ChartSource:
 
 
 class ChartOrbitDerivatives(OrbitDerivatives):
-    """A libration or circulation along a chart, with derivatives by all variables.
+    """A libration or circulation along a chart, with derivatives with respect to all variables.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         self._inputs = np.hstack([self.variables, pairs(*given), pairs(*((s, 0.0, 0.0) for s in self._shifts))])
 
     @property
-    def launch_moves(self) -> Array:
+    def launch_changes(self) -> Array:
         """The change of the launch place relative to the points of the curve."""
         moves = np.zeros(self.source.variables)
         moves[self.source.parameters] = 1.0
@@ -289,7 +289,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
         difference quotient.
         """
-        steps = BESIDE * self.width * np.array([[0.0], [-1.0], [1.0]])
+        steps = DIFFERENCE_STEP_SHARE * self.width * np.array([[0.0], [-1.0], [1.0]])
         lam = (place + steps).ravel()
         places = self._shape.places(lam)
         rows = self._values(speed_program(self.source), self._inputs, np.zeros((2, lam.size)), places)[:, 0]
@@ -305,8 +305,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         curvature = (after[1] - before[1]) / (steps[2] - steps[1])
         return np.vstack([here[:2], curvature, here[2:]])
 
-    def without_shift(self, moved: Array, lam: Array) -> Array:
-        """Return the change that `OrbitDerivatives.without_shift` describes."""
+    def relative_change(self, moved: Array, lam: Array) -> Array:
+        """Return the change that `OrbitDerivatives.relative_change` describes."""
         moved = moved.copy()
         moved[list(self.source.shaping)] -= self._shape.shifts(self._shape.places(lam))[:, 0]
         return moved

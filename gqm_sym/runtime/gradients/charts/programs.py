@@ -1,11 +1,11 @@
 """The programs of gradients along charts: the formulas of a motion over coordinates of the plane, recorded as tapes.
 
-A chart has no formulas for its coordinates, so they are inputs at each place: x and z, their derivatives by the
-parameter u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter
-that shapes the curve moves each of its points across the curve: only the normal part of a displacement counts. Arc
-lengths between such points change by the curvature times the displacement. The arc length of a point from the start
-point of the curve then grows by a known ``shift``. Since the arc length of the launch is given, the launch moves to
-another point.
+A chart has no formulas for its coordinates, so they are inputs at each place: x and z, their derivatives with respect
+to the parameter u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A
+parameter that shapes the curve moves each of its points across the curve: only the normal part of a displacement
+counts. Arc lengths between such points change by the curvature times the displacement. The arc length of a point from
+the start point of the curve then grows by a known ``shift``. Since the arc length of the launch is given, the launch
+moves to another point.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
-from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Local, Program, assemble
+from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, LocalMotion, Program, assemble
 
-# The number of coordinates of a point (x, z, their derivatives by u, and the curvature), and that of a displacement.
+# The number of coordinates of a point (x, z, their derivatives with respect to u, and the curvature), and that of a
+# displacement.
 POINT, DISPLACEMENT = 5, 2
 
 
@@ -26,7 +27,7 @@ class ChartSource(NamedTuple):
     Attributes
     ----------
     potential : callable
-        ``f(op, x, z, p)`` gives the effective potential and its derivatives by x and z.
+        ``f(op, x, z, p)`` gives the effective potential and its derivatives with respect to x and z.
     inertia : callable or None
         ``f(op, p)`` gives 1 + beta; None where it is 1.
     parameters, mass : int
@@ -62,7 +63,9 @@ class ChartSource(NamedTuple):
         return 1 + self.point
 
     def _at(self, op: Recorder, numbers: Sequence[TapeNumber]) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        """Return the potential at a point, and its derivatives by arc length and by the run-time parameters."""
+        """Return the potential at a point, and its derivatives with respect to arc length and the run-time
+        parameters.
+        """
         (x, z, dx, dz), p = numbers[:4], op.values[: self.parameters]
         value, by_x, by_z = map(op.number, self.potential(op, x, z, p))
         partials, speed = gradient(op, value, p), op.sqrt(dx * dx + dz * dz)
@@ -77,7 +80,7 @@ class ChartSource(NamedTuple):
         speed = op.sqrt(dx * dx + dz * dz)
         return [(k, (z * dx - x * dz) / speed) for k, (x, z) in zip(self.shaping, moves, strict=True)]
 
-    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+    def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at the point with the given coordinates."""
         n, end = self.variables, self.variables + self.point
         v0, energy = op.values[n - LAUNCH_VARIABLES + 1 : n]
@@ -87,10 +90,10 @@ class ChartSource(NamedTuple):
         for k, shift in zip(self.shaping, op.values[end : self.inputs], strict=True):
             by_parameters[k] = by_parameters[k] - launch_slope * shift
         half, one, zero = (v0 * v0 / 2 + energy) + (launched - value), op.number(1), op.number(0)
-        stretches = [zero] * self.parameters
+        strains = [zero] * self.parameters
         for k, across in self._displacements(op, op.places[1:]):
-            stretches[k] = -(op.places[POINT] * across)
-        return Local(half, -slope, [*by_parameters, launch_slope, v0, one], one, zero, stretches)
+            strains[k] = -(op.places[POINT] * across)
+        return LocalMotion(half, -slope, [*by_parameters, launch_slope, v0, one], one, zero, strains)
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
@@ -102,20 +105,20 @@ def chart_circulation_program(source: ChartSource) -> Program:
     """Return the integrands over a lap, as `programs.circulation_program` does; the last input is the length of the
     lap.
 
-    The results are dt/dshare with its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives, and
-    the derivatives of ds/dlam.
+    The results are dt/dshare with its derivatives with respect to all variables, V**2 dt/dshare (1+beta) with its
+    derivatives, and the derivatives of ds/dlam.
     """
     op = Recorder(source.inputs + 1, source.coordinates)
     here, inertia = source.local(op, op.place), source.one_plus_beta(op)
     rate = op.values[-1] / op.sqrt(2 * here.half)
     power = 2 * rate * here.half * inertia
     rates, powers = [rate], [power]
-    stretches = [*here.ds_partials, *[op.number(0)] * LAUNCH_VARIABLES]
+    strains = [*here.ds_partials, *[op.number(0)] * LAUNCH_VARIABLES]
     by_inertia = gradient(op, inertia, op.values[: source.variables])
-    for stretch, change, by in zip(stretches, here.half_partials, by_inertia, strict=True):
+    for strain, change, by in zip(strains, here.half_partials, by_inertia, strict=True):
         faster = change / (2 * here.half)
-        rates.append(rate * (stretch - faster))
-        powers.append(power * (stretch + faster + by / inertia))
+        rates.append(rate * (strain - faster))
+        powers.append(power * (strain + faster + by / inertia))
     return assemble(op, [*rates, *powers, *here.ds_partials])
 
 
@@ -124,8 +127,8 @@ def chart_path_program(source: ChartSource) -> Program:
     """Return the program of states at a point, as `programs.path_program` does, with derivatives at points of the
     curve.
 
-    The coordinates are x and z with their first three derivatives by u, and for each parameter that shapes the curve
-    the displacement of x and z with its first two.
+    The coordinates are x and z with their first three derivatives with respect to u, and for each parameter that shapes
+    the curve the displacement of x and z with its first two.
     """
     count, p = len(source.shaping), source.parameters
     op = Recorder(p, 8 + 6 * count)
@@ -155,7 +158,9 @@ def chart_path_program(source: ChartSource) -> Program:
 
 @lru_cache(maxsize=64)
 def speed_program(source: ChartSource) -> Program:
-    """Return the program of half of V**2 at a point, and its derivatives by arc length and by all variables."""
+    """Return the program of half of V**2 at a point, and its derivatives with respect to arc length and all
+    variables.
+    """
     op = Recorder(source.inputs, source.coordinates)
     here = source.local(op, op.place)
     return assemble(op, [here.half, here.half_slope, *here.half_partials])

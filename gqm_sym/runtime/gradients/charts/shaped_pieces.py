@@ -53,17 +53,17 @@ PLACE = 3
 
 
 @entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
-def fill_places(curve, number, ways, places):  # type: ignore[no-untyped-def]
+def fill_places(curve, number, lengths, places):  # type: ignore[no-untyped-def]
     """Fill the places (PLACE rows) at arc lengths, two doubles each, from the left edge of a piece."""
     curve = unshared(curve)
-    for i in range(ways.shape[1]):
-        piece, at = place_at(curve, number, (ways[0, i], ways[1, i]))
-        places[0, i], places[1, i], places[2, i] = piece, at[0], at[1]
+    for i in range(lengths.shape[1]):
+        piece, place = place_at(curve, number, (lengths[0, i], lengths[1, i]))
+        places[0, i], places[1, i], places[2, i] = piece, place[0], place[1]
 
 
 @entry(types.void(TRUE_CURVE, MATRIX, MATRIX), checked=False)
 def fill_coordinates(curve, places, rows):  # type: ignore[no-untyped-def]
-    """Fill x, z and their derivatives by u, two doubles each, at places."""
+    """Fill x, z and their derivatives with respect to u, two doubles each, at places."""
     curve, u, points = unshared(curve), stacked_places(), stacked_points()
     for i in range(places.shape[1]):
         u[0], u[RULE] = places[1, i], places[2, i]
@@ -154,7 +154,7 @@ class ShapedPieces:
         fill_places(pieces.curve, pieces.begin, from_edge, places)
         return places
 
-    def lengthened(self, places: Array) -> Array:
+    def arc_length_changes(self, places: Array) -> Array:
         """Return the increase of the arc length from the start point to points of equal u: a row for each parameter."""
         self._make(int(places[0].min()), int(places[0].max()))
         found = []
@@ -174,12 +174,12 @@ class ShapedPieces:
         rows = self.coordinates(places)[::2]
         (dx, dz), moved = rows[2:4], rows[POINT:]
         # Points of equal u are displaced along the curve as well.
-        shifts: Array = self.lengthened(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        shifts: Array = self.arc_length_changes(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
         return shifts
 
     def path(self, places: Array, orders: int = 4) -> Array:
-        """Return the coordinates in doubles with all derivatives by u below an order, and the displacements with two
-        derivatives.
+        """Return the coordinates in doubles with all derivatives with respect to u below an order, and the
+        displacements with two derivatives.
         """
         if places.size:
             self._make(int(places[0].min()), int(places[0].max()))
@@ -238,7 +238,9 @@ def _quotient(before: Array, after: Array, step: float) -> Array:
 
 
 def _derivatives(terms: Array, places: Array, count: int) -> Array:
-    """Return coordinates at places and their derivatives by u, beginning with order 0, from coefficients in doubles."""
+    """Return coordinates at places and their derivatives with respect to u, beginning with order 0, from coefficients
+    in doubles.
+    """
     chosen, u = terms[places[0].astype(np.int64) % len(terms)], places[1]
     rows, powers = [], np.vander(u, NODES, increasing=True)
     for _ in range(count):

@@ -242,14 +242,15 @@ def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array
     frame : Frame
         The frame to the accuracy of doubles.
     at_rest : callable
-        The force on a body at rest, and its derivative by the place, at places that are given as two doubles each.
+        The force on a body at rest, and its derivative with respect to the place, at places that are given as two
+        doubles each.
     """
     place, low, size = (float(frame.p[k]) for k in (PLACE, PLACE_LOW, RANGE))
     force, slope = at_rest(np.array([place]), np.array([low]))
     place, low = add(place, low, -float(force[0] / slope[0]), 0.0)  # Newton's method doubles the digits
     distances = size * np.append(SHARES, 0.0)
-    high, rest = two_sum.py_func(np.full(NODES + 1, place), distances)
-    forces, slopes = at_rest(high, rest + low)
+    high, rounding = two_sum.py_func(np.full(NODES + 1, place), distances)
+    forces, slopes = at_rest(high, rounding + low)
     terms = chebyshev.cheb2poly(chebyshev.chebfit(SHARES, forces[:NODES] / distances[:NODES], DEGREE - 1))
     terms[0] = slopes[NODES]
     p = frame.p.copy()

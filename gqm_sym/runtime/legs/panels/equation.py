@@ -164,7 +164,7 @@ def distance(w, march):  # type: ignore[no-untyped-def]
 
 @Inner
 def slope_at(w, march):  # type: ignore[no-untyped-def]
-    """Return the derivative of the distance by the march variable."""
+    """Return the derivative of the distance with respect to the march variable."""
     return 2.0 * march.g * w + march.c
 
 

@@ -97,11 +97,11 @@ class PanelRequest(NamedTuple):
 
 
 @Inner
-def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # type: ignore[no-untyped-def]
+def resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work):  # type: ignore[no-untyped-def]
     """Decide whether a panel resolves time as far as that is required.
 
     ``worst`` is the ratio of middle coefficients of the other functions. If the panel is a very small part of a smooth
-    one (``is_sliver``), only noise is unresolved, which the error of the time includes.
+    one (``is_tiny_part``), only noise is unresolved, which the error of the time includes.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # 
         fill_rates(march, panel, work)
         work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
         timed, ratio = are_resolved(work, TIME_RATE, LOAD)
-    timed = timed or (needed and is_sliver and work[TAILS] < inf)
+    timed = timed or (needed and is_tiny_part and work[TAILS] < inf)
     # If only time needs narrow panels while V**2 decreases, there is a turn ahead.
     turning = end < panel.v2 and ratio > TURNING_RATIO * worst
     if timed:
@@ -234,8 +234,8 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
         factor = growth(worst)
         if fine and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
-            is_sliver = width <= NOISE_WIDTH_RATIO * widest
-            done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_sliver, work)
+            is_tiny_part = width <= NOISE_WIDTH_RATIO * widest
+            done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work)
             if is_at_cusp(length, unit, work):
                 return 0.0, step, False
             if done:

@@ -11,22 +11,32 @@ from gqm_sym.runtime.legs.panels.polynomials import COUNT
 
 # The codes of the end of a run:
 #
-# ========== ==================================================================================================
-# TURN       V**2 vanished, and the body turns or rests
-# LIMIT      the end of the domain, or of the range of breaks that were given
-# LIFTOFF    N took the sign that it cannot have
-# ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not linear in
-#            V**2, it is closer to it than doubles resolve its place
-# PAUSED     it has run far enough for once
-# NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
-# SPENT      too many panels were needed
-# SLOWED     the body becomes slow from the place given, but does not turn; it has to be run again from there
-# FULL       the record is full
-# ========== ==================================================================================================
+# ==================== ========================================================================================
+# END_TURN             V**2 vanished, and the body turns or rests
+# END_LIMIT            the end of the domain, or of the range of breaks that were given
+# END_LIFTOFF          N took the sign that it cannot have
+# END_ASYMPTOTE        V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not
+#                      linear in V**2, it is closer to it than doubles resolve its place
+# END_PAUSE            it has run as far as one run may go
+# END_TOO_NARROW       a place where the functions are not smooth: no panel that doubles can represent is narrow enough
+# END_TOO_MANY_PANELS  too many panels were needed
+# END_SLOW             the body becomes slow from the place given, but does not turn; it has to be run again from there
+# END_RECORD_FULL      the record is full
+# ==================== ========================================================================================
 #
-# GOES_ON is the code of a run that has not ended.
-TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, SLOWED, FULL = range(9)
-GOES_ON = -1
+# END_NONE is the code of a run that has not ended.
+(
+    END_TURN,
+    END_LIMIT,
+    END_LIFTOFF,
+    END_ASYMPTOTE,
+    END_PAUSE,
+    END_TOO_NARROW,
+    END_TOO_MANY_PANELS,
+    END_SLOW,
+    END_RECORD_FULL,
+) = range(9)
+END_NONE = -1
 
 # A body this close to a turn, as a share of the distance run, counts as being there, because some laws have no value
 # beyond a turn.
@@ -43,7 +53,7 @@ CLOSE_SHARE = 2.0**-10
 SHARE_AT_REST, SLOWER_FACTOR, SLOWER_SHARE = 1e-6, 2.0**-4, 0.2501
 
 
-class Timed(NamedTuple):
+class LastTimed(NamedTuple):
     """The last point of a run up to which time is counted.
 
     Attributes
@@ -66,7 +76,7 @@ class End(NamedTuple):
     Attributes
     ----------
     what : int
-        One of the codes from TURN to FULL.
+        One of the codes from END_TURN to END_RECORD_FULL.
     place : (float, float)
         The place as two doubles.
     v2 : float
@@ -114,18 +124,18 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
         slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
         goes_on = at_rest > 0.0 or (at_rest >= SHARE_AT_REST * slope and slower >= SLOWER_SHARE * slope)
         if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
-            return (ASYMPTOTE, run_length, panel.v2) if goes_on else (TURN, run_length - panel.v2 / slope, 0.0)
-    return NARROWED, run_length, panel.v2
+            return (END_ASYMPTOTE, run_length, panel.v2) if goes_on else (END_TURN, run_length - panel.v2 / slope, 0.0)
+    return END_TOO_NARROW, run_length, panel.v2
 
 
 @Inner
 def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
-    """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise GOES_ON."""
+    """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise END_NONE."""
     if change.first == change.touch and not forces.linear:
         what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
-        if what == TURN:
+        if what == END_TURN:
             return what, turn, v2
-    return GOES_ON, run_length, panel.v2
+    return END_NONE, run_length, panel.v2
 
 
 @Inner
@@ -145,26 +155,26 @@ def may_pause(forces, march, route, run_length, speeds, panel, work):  # type: i
 
 @Inner
 def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
-    """Return the code of the end of a run after a panel, or GOES_ON."""
+    """Return the code of the end of a run after a panel, or END_NONE."""
     if change.first <= 1.0:
         if change.first == change.turn:
-            return TURN
-        return ASYMPTOTE if change.first == change.touch else GOES_ON
+            return END_TURN
+        return END_ASYMPTOTE if change.first == change.touch else END_NONE
     if at_limit:
-        return LIMIT
-    return PAUSED if pauses else GOES_ON
+        return END_LIMIT
+    return END_PAUSE if pauses else END_NONE
 
 
 @Inner
 def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # type: ignore[no-untyped-def]
-    """Return the code of the end of a run before a panel, or GOES_ON."""
+    """Return the code of the end of a run before a panel, or END_NONE."""
     if contact_sign != 0 and contact_sign == -only_sign:
-        return LIFTOFF
+        return END_LIFTOFF
     if not has_room:
-        return FULL
+        return END_RECORD_FULL
     if fast_again:
-        return SLOWED
-    return LIMIT if at_limit else GOES_ON
+        return END_SLOW
+    return END_LIMIT if at_limit else END_NONE
 
 
 @Inner
@@ -174,14 +184,14 @@ def conclude(forces, route, march, end, timed, searching, run_length):  # type: 
     middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
     v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - run_length
     place = middle
-    if what == TURN or (what == ASYMPTOTE and forces.linear):
+    if what == END_TURN or (what == END_ASYMPTOTE and forces.linear):
         place = located(march.origin, v, run_length, breaks, end.upcoming)
-    elif searching and what != FULL:
-        goes_on = what == PAUSED or what == SLOWED or (what == LIMIT and route.period > 0.0)
+    elif searching and what != END_RECORD_FULL:
+        goes_on = what == END_PAUSE or what == END_SLOW or (what == END_LIMIT and route.period > 0.0)
         no_turn_until = run_length - timed.distance if goes_on else inf
-        what, v2, sign, changes = SLOWED, timed.v2, timed.contact_sign, timed.change_count
+        what, v2, sign, changes = END_SLOW, timed.v2, timed.contact_sign, timed.change_count
     else:
-        place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, run_length, breaks, end.upcoming)
+        place = (route.limit, 0.0) if what == END_LIMIT else located(march.origin, v, run_length, breaks, end.upcoming)
         middle = place
     count, upcoming = end.panel_count, end.upcoming
     return End(what, place, v2, sign, end.step, no_turn_until, middle, end.half_c, changes, count, upcoming)

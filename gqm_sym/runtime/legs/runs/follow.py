@@ -49,8 +49,8 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import point_buffer
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
 from gqm_sym.runtime.legs.panels.widest import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, SLOWED, SPENT, TURN
-from gqm_sym.runtime.legs.runs.route import Start
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_RECORD_FULL, END_SLOW, END_TOO_MANY_PANELS, END_TURN
+from gqm_sym.runtime.legs.runs.route import RunStart
 from gqm_sym.runtime.legs.runs.run import run
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
@@ -176,7 +176,7 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
 
 
 @Inner
-def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
+def direction_from_rest(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
     """Return the direction in which a body at rest leaves a place, or 0 if it stays; and whether it could stay on some
     slope.
 
@@ -205,9 +205,9 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
     """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel."""
     while True:
         end = run(forces, start, route, off, record)
-        if end.what != SLOWED or end.panel_count > 0:
+        if end.what != END_SLOW or end.panel_count > 0:
             return end
-        start = Start(
+        start = RunStart(
             *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
             *(end.no_turn_until, start.width, False),
         )
@@ -220,7 +220,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     """
     if start.v2 == 0.0 and forces.linear and start.may_be_whole:
         end = run_whole(forces, start, route, off, record)
-        if end.what == TURN:
+        if end.what == END_TURN:
             return end, 2
     return run_to_end(forces, start, route, off, record), 0
 
@@ -233,7 +233,7 @@ class Followed(NamedTuple):
     what, contact_sign : int
         As in `runs.ends.End`.
     direction : int
-        At a turn, the direction that `released` returns; otherwise that of the motion.
+        At a turn, the direction that `direction_from_rest` returns; otherwise that of the motion.
     could_stay : bool
         At a turn, whether the body could stay there on some slope; otherwise True.
     is_whole : bool
@@ -262,7 +262,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         The module's compiled functions, and the kind of its forces.
     p : array
         Run-time parameters.
-    start : Start
+    start : RunStart
     route : Route
     record : array
         Filled in (`leg_record`).
@@ -281,12 +281,12 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     is_whole = back > 0
     what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
     direction, could_stay = start.direction, True
-    if what == TURN:
+    if what == END_TURN:
         back = run_back(forces, end, breaks, off, record, used) if back == 0 else back
         time_from_end = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
-        direction, could_stay = released(dissipation.static_balance, p, here, here, direction)
-    elif what == ASYMPTOTE and dissipation.linear:
+        direction, could_stay = direction_from_rest(dissipation.static_balance, p, here, here, direction)
+    elif what == END_ASYMPTOTE and dissipation.linear:
         back = approach(forces, end, breaks, off, record, used)
     record[END], record[END_LOW] = end.place
     record[MIDDLE], record[MIDDLE_LOW] = end.middle
@@ -294,5 +294,5 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), time_from_end
     record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
-        what = FULL if back == NO_SPACE else SPENT
+        what = END_RECORD_FULL if back == NO_SPACE else END_TOO_MANY_PANELS
     return Followed(what, end.contact_sign, direction, could_stay, is_whole, end.step, end.no_turn_until, end.v2)

@@ -72,7 +72,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     kink,
     size_at,
 )
-from gqm_sym.runtime.legs.runs.route import Ahead
+from gqm_sym.runtime.legs.runs.route import CurveAhead
 
 # The ratio of V**2 to the largest V**2 so far above which gaps are passed by kept data. Near a turn a rounding of the
 # largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
@@ -204,7 +204,7 @@ def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-un
 ROUNDINGS_OF_TIMES = 1e-12
 
 
-class Passed(NamedTuple):
+class RunState(NamedTuple):
     """The state of a run.
 
     Attributes
@@ -213,7 +213,7 @@ class Passed(NamedTuple):
         The march variable and the distance from the origin.
     v2, largest_v2 : float
         V**2 there, and the largest so far.
-    ahead : Ahead
+    ahead : CurveAhead
     panel_count : int
         The number of recorded panels.
     """
@@ -222,7 +222,7 @@ class Passed(NamedTuple):
     run_length: float
     v2: float
     largest_v2: float
-    ahead: Ahead
+    ahead: CurveAhead
     panel_count: int
 
 
@@ -293,6 +293,6 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         record[to + TIME_ERROR], may_join = NO_RATES if has_values else NO_VALUES, not has_values
         to += COLUMNS if has_values else 0
     if upcoming > ahead.upcoming:
-        left, ahead = marched(run_length, march), Ahead(upcoming, ahead.span, inf, True)
+        left, ahead = marched(run_length, march), CurveAhead(upcoming, ahead.span, inf, True)
         count = (to - HEAD) // COLUMNS + (1 if may_join else 0)
-    return Passed(left, run_length, v2, largest_v2, ahead, count)
+    return RunState(left, run_length, v2, largest_v2, ahead, count)

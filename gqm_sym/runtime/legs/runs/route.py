@@ -17,7 +17,7 @@ STOPPING_SHARE = 2.0
 REST_STEPS = 4
 
 
-class Start(NamedTuple):
+class RunStart(NamedTuple):
     """The start of a run.
 
     Attributes
@@ -111,7 +111,7 @@ class Route(NamedTuple):
     period: float
 
 
-class Ahead(NamedTuple):
+class CurveAhead(NamedTuple):
     """The data of the curve ahead of a panel.
 
     Attributes
@@ -183,7 +183,7 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
     if contact_sign == 0:
         contact_sign = sign_of_load(forces, place, start.v2, point)
     march, widest = begin_march(forces, start, place, span, contact_sign, point)
-    return march, contact_sign, Ahead(upcoming, span, widest, True)
+    return march, contact_sign, CurveAhead(upcoming, span, widest, True)
 
 
 @Inner
@@ -192,7 +192,7 @@ def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-unt
     upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
     if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
         return ahead
-    return Ahead(upcoming + 1, span_before(breaks, upcoming + 1, v, off), inf, v2 == 0.0)
+    return CurveAhead(upcoming + 1, span_before(breaks, upcoming + 1, v, off), inf, v2 == 0.0)
 
 
 @Inner
@@ -207,4 +207,4 @@ def limited(forces, march, panel, ahead, change, run_length, point):  # type: ig
     slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
     if slope < 0.0:
         widest = marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
-    return Ahead(ahead.upcoming, ahead.span, widest, True)
+    return CurveAhead(ahead.upcoming, ahead.span, widest, True)

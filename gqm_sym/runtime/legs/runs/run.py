@@ -26,11 +26,11 @@ from gqm_sym.runtime.legs.panels.resolution import first_change_of, size_at
 from gqm_sym.runtime.legs.panels.widest import ALWAYS, HIGH_V2_RATIO, MAX_PANELS, MAYBE, NEVER, PanelRequest, next_panel
 from gqm_sym.runtime.legs.runs.changes import changes_at_once, cut_panel, first_changes
 from gqm_sym.runtime.legs.runs.ends import (
-    GOES_ON,
-    SPENT,
-    TURN,
+    END_NONE,
+    END_TOO_MANY_PANELS,
+    END_TURN,
     End,
-    Timed,
+    LastTimed,
     conclude,
     end_at_once,
     may_pause,
@@ -38,8 +38,8 @@ from gqm_sym.runtime.legs.runs.ends import (
     what_after,
     what_before,
 )
-from gqm_sym.runtime.legs.runs.gaps import Passed, pass_gaps
-from gqm_sym.runtime.legs.runs.route import Ahead, begin, limited, pass_break
+from gqm_sym.runtime.legs.runs.gaps import RunState, pass_gaps
+from gqm_sym.runtime.legs.runs.route import CurveAhead, begin, limited, pass_break
 
 # The number of panels after which a run pauses.
 PANELS_PER_RUN = 512
@@ -91,24 +91,24 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     march, nu, ahead = begin(forces, start, route, off, point)
     v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(start.step, march)
     # When time is not counted any more, a turn is searched for.
-    what, panel_count, recorded, change_count, searching, at_stop = GOES_ON, 0, 0, 0, False, False
+    what, panel_count, recorded, change_count, searching, at_stop = END_NONE, 0, 0, 0, False, False
     # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; with laws that
     # are not linear only the part next to the end is.
     middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
-    timed = Timed(run_length, v2, nu, change_count)
+    timed = LastTimed(run_length, v2, nu, change_count)
     for _ in range(MAX_PANELS):
         if at_stop and not searching:
             left, run_length, v2, largest_v2, ahead, recorded = pass_gaps(
-                *(forces, march, route, nu, Passed(left, run_length, v2, largest_v2, ahead, recorded), record, work)
+                *(forces, march, route, nu, RunState(left, run_length, v2, largest_v2, ahead, recorded), record, work)
             )
-            timed = Timed(run_length, v2, nu, change_count)
+            timed = LastTimed(run_length, v2, nu, change_count)
         late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
         ahead = pass_break(march, route, off, v2, ahead, run_length)
         at_end = ahead.upcoming == route.breaks.size
         stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
         has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
         what = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
-        if what != GOES_ON:
+        if what != END_NONE:
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
@@ -125,7 +125,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
                 continue  # with the forces for this sign
         change = first_changes(march, panel, largest_v2, load_change, work)
         what, run_length, v2 = turn_below_noise(forces, march, panel, change, run_length, point)
-        if what == TURN:
+        if what == END_TURN:
             break
         ahead = limited(forces, march, panel, ahead, change, run_length, point)
         if ahead.widest < width:
@@ -137,7 +137,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             )
             continue
         if not searching and timing != ALWAYS and (late or not is_timed):
-            searching, timed = True, Timed(run_length, v2, nu, change_count)
+            searching, timed = True, LastTimed(run_length, v2, nu, change_count)
         right, ends_here = left + width, change.first <= 1.0
         if ends_here:
             right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, run_length, work, point)
@@ -146,17 +146,25 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         largest_v2 = largest_after(largest_v2, v2, ends_here, work)
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
         ahead, timed = (
-            Ahead(ahead.upcoming, ahead.span, inf, True),
-            timed if searching else Timed(run_length, v2, nu, change_count),
+            CurveAhead(ahead.upcoming, ahead.span, inf, True),
+            timed if searching else LastTimed(run_length, v2, nu, change_count),
         )
         pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work)
         what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
-        if what != GOES_ON:
+        if what != END_NONE:
             v2 = 0.0 if ends_here else v2
             break
         if ends_here:
             change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
     onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
-    ends = (SPENT if what == GOES_ON else what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin)
+    ends = (
+        END_TOO_MANY_PANELS if what == END_NONE else what,
+        march.origin,
+        v2,
+        nu,
+        onwards,
+        start.no_turn_until,
+        march.origin,
+    )
     end = End(*ends, half_c, change_count, recorded, ahead.upcoming)
     return conclude(forces, route, march, end, timed, searching, run_length)

@@ -73,7 +73,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     size_at,
     tail_of,
 )
-from gqm_sym.runtime.legs.runs.ends import GOES_ON, TURN, End
+from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 
 # The first width to try if none is known, in units of the first panel's width.
 FIRST_WIDTH = 2.0
@@ -332,14 +332,14 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
     Returns
     -------
     End
-        Its code is GOES_ON if the leg must be followed panel by panel.
+        Its code is END_NONE if the leg must be followed panel by panel.
     """
     breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:
         upcoming += 1
     room = offset(route.limit if upcoming == breaks.size else breaks[upcoming], origin, v)
     march, span, nu = March(origin, v, 0.0, 1.0), span_before(breaks, upcoming, v, off), start.contact_sign
-    what, middle, h = GOES_ON, origin, 0.0
+    what, middle, h = END_NONE, origin, 0.0
     if nu == 0:
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and has_space(record, HEAD + 3 * COLUMNS, 0):
@@ -355,7 +355,7 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
             if not has_panels:
                 enter_rows(record, work)
             if not has_panels or enter_parts(record, h, work):
-                what, middle = TURN, located(origin, v, 0.5 * h, breaks, upcoming)
+                what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
                 enter_time(record, HEAD, first, has_panels)
                 enter_time(record, HEAD + 2 * COLUMNS, second, has_panels)
     place = located(origin, v, h, breaks, upcoming)

@@ -31,7 +31,7 @@ BLOCK = 2048
 # An extreme this near to the end of a motion, as a share of its time, counts as the end. An extreme this near to a jump
 # of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
 # is on one side of the jump.
-AT_END, AT_BREAK, BESIDE = 1e-12, 1e-9, 1e-13
+AT_END, AT_BREAK, SIDE_SHARE = 1e-12, 1e-9, 1e-13
 
 
 class Switch(NamedTuple):
@@ -157,14 +157,15 @@ def places_at(motion: Any, changes: Changes, points: MarchPoints) -> Array:
 def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
     """Return the changes of the states of a motion at points."""
     found = StateChanges(changes, points)
-    found.lam = changes.told(found.lam, found.arc, points.laps)
+    found.lam = changes.parameter_change(found.lam, found.arc, points.laps)
     if changes.law.by_arc_length:
         found.s = found.lam
     return found
 
 
 def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
-    """Return the derivatives of a quantity of a motion by all variables; for turning points, a column for each.
+    """Return the derivatives of a quantity of a motion with respect to all variables; for turning points, a column for
+    each.
 
     Parameters
     ----------
@@ -195,7 +196,9 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
 def turning_points(motion: Any, changes: Changes) -> Array:
     """Return the derivatives of the turning points of a motion."""
     turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
-    columns = [changes.told(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns]
+    columns = [
+        changes.parameter_change(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns
+    ]
     if motion.problem.w0 == 0.0:
         columns.insert(0, np.eye(changes.variables)[-2])
     return np.array(columns).reshape(-1, changes.variables).T[:, : len(motion.turning_points)]
@@ -210,7 +213,7 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         return zero, zero
     run, origin = changes.runs[k], changes.ends[k]
     if what == "rest":
-        return changes.told(origin.sigma, origin.arc, run.laps), origin.delay
+        return changes.parameter_change(origin.sigma, origin.arc, run.laps), origin.delay
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
@@ -224,7 +227,9 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
-    return changes.told(moved, origin.arc, run.laps), origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
+    return changes.parameter_change(moved, origin.arc, run.laps), origin.delay + v * law.ds[0] * (
+        moved - origin.sigma
+    ) / speed
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
@@ -278,7 +283,7 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
         if not is_stationary and np.abs(found.lam - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(found.lam):
             # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
             # itself.
-            sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * BESIDE * t_end
+            sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * SIDE_SHARE * t_end
             states = [motion.state(side[0]) for side in sides]
             values = [abs(state.v) if of_speed else state.normal_force for state in states]
             near, far = _changed(
@@ -294,15 +299,15 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
     """Return the changes of the speed or the contact force at times that change by ``moved``; without it, the places
     stay fixed.
     """
-    at, v = states_at(changes, motion._march_points(t)[0]), motion.state(t).v
+    changed, v = states_at(changes, motion._march_points(t)[0]), motion.state(t).v
     if moved is None:
-        moved = -at.labels * at.law.ds / v
+        moved = -changed.labels * changed.law.ds / v
     if of_speed:
-        faster: Array = np.sign(v) * (at.v + 0.5 * at.law.force[0] / at.law.ds * moved)
+        faster: Array = np.sign(v) * (changed.v + 0.5 * changed.law.force[0] / changed.law.ds * moved)
         return faster
     law = changes.law
-    rate = law.parameters[0, law.mass] * law.loads(at.states)[0] * v / at.law.ds
-    stronger: Array = at.normal_force + rate * moved
+    rate = law.parameters[0, law.mass] * law.loads(changed.states)[0] * v / changed.law.ds
+    stronger: Array = changed.normal_force + rate * moved
     return stronger
 
 
@@ -313,9 +318,9 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tupl
     """
     t = found.t
     for _ in range(NEWTON_STEPS):
-        at = states_at(changes, motion._march_points(np.array([t]))[0])
-        law = at.law
-        slope, by_place, by_w = law.force if of_speed else changes.law.loads(at.states)
+        changed = states_at(changes, motion._march_points(np.array([t]))[0])
+        law = changed.law
+        slope, by_place, by_w = law.force if of_speed else changes.law.loads(changed.states)
         bend, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
         step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:

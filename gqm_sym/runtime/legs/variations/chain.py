@@ -46,7 +46,7 @@ SIGMA, Y, DELAY, ARC, ORIGIN_ROWS = range(5)
 
 # The records of runs, the indices at which they begin and at which the panels of each half begin, and the panels
 # (`equation.lay_panels`).
-LAID = types.Tuple((VECTOR, WHOLE, WHOLE, MATRIX))
+PANELS_OF_RUNS = types.Tuple((VECTOR, WHOLE, WHOLE, MATRIX))
 
 # The rows of changes of states.
 LAM, S, X, SPEED_ROW, Y_ROW, ARC_ROW, STATE_ROWS = 0, 1, 2, 4, 6, 7, 8
@@ -100,13 +100,13 @@ def go_back(origin, solutions, parameters, force, step, rate):  # type: ignore[n
             origin[ARC, i] -= solutions[(2 * n + 4 + i) * WIDE + COUNT]
 
 
-@entry(types.void(LAID, MATRIX, MATRIX, VECTOR, VECTOR, CUBE, CUBE, CUBE), checked=False)
+@entry(types.void(PANELS_OF_RUNS, MATRIX, MATRIX, VECTOR, VECTOR, CUBE, CUBE, CUBE), checked=False)
 def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends):  # type: ignore[no-untyped-def]
     """Solve the variational equation on all panels, and carry the change of the launch from run to run.
 
     Parameters
     ----------
-    laid : LAID
+    laid : PANELS_OF_RUNS
         The runs.
     law : array
         The law in the states of `equation.lay_panels`.
@@ -171,13 +171,13 @@ def panel_at(first, panels, half, w):  # type: ignore[no-untyped-def]
     return low
 
 
-@entry(types.void(LAID, CUBE, CUBE, WHOLE, MATRIX, INTEGER, CUBE, MATRIX), checked=False)
+@entry(types.void(PANELS_OF_RUNS, CUBE, CUBE, WHOLE, MATRIX, INTEGER, CUBE, MATRIX), checked=False)
 def fill_along(laid, series, origins, halves, points, rows, found, states):  # type: ignore[no-untyped-def]
     """Fill the changes of states at march variables.
 
     Parameters
     ----------
-    laid : LAID
+    laid : PANELS_OF_RUNS
         The runs.
     series : (panels, COUNT, 3 * n + 4) array
         The Chebyshev coefficients of the solutions.
@@ -208,11 +208,11 @@ def fill_along(laid, series, origins, halves, points, rows, found, states):  # t
             for row in range(rows):
                 sums[row] += wave * terms[row]
             before, wave = wave, 2.0 * x * wave - before
-        way = panel[PANEL_HEADING] * panel[OUTWARD]
+        direction = panel[PANEL_HEADING] * panel[OUTWARD]
         for j in range(n + 2):
             found[SIGMA, j, i] = origin[SIGMA, j]
             found[Y, j, i] = mixed(origin, sums, n + 2, 1, n, j) if whole else 0.0
-            found[DELAY, j, i] = origin[DELAY, j] + way * mixed(origin, sums, 0, 1, n, j)
+            found[DELAY, j, i] = origin[DELAY, j] + direction * mixed(origin, sums, 0, 1, n, j)
             found[ARC, j, i] = origin[ARC, j] + (sums[2 * n + 4 + j] if whole and j < n else 0.0)
         states[PLACE, i], states[PLACE_LOW, i] = place_on(panel, w)
         states[W, i], states[STATE_HEADING, i], states[STATE_SIGN, i] = (

@@ -13,7 +13,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, RIGHT, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS, WIDE
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.chain import ORIGIN_ROWS, STATE_ROWS, fill_along, fill_states, follow_changes
 from gqm_sym.runtime.legs.variations.chart_law import law_of
 from gqm_sym.runtime.legs.variations.equation import CONTACT_SIGN, PANEL_COLUMNS, end_speed, lay_panels
@@ -43,7 +43,7 @@ class Origin(NamedTuple):
     arc: Array
 
 
-class Along(NamedTuple):
+class ChangesAlong(NamedTuple):
     """The changes of some states.
 
     Attributes
@@ -82,7 +82,7 @@ class Changes:
 
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
         self.law, self._problem = law_of(problem), problem
-        self.followed, self.runs = len(runs), [run for run in runs if run.what != ASYMPTOTE]
+        self.followed, self.runs = len(runs), [run for run in runs if run.what != END_ASYMPTOTE]
         records = [run.record for run in self.runs]
         begins = np.cumsum([0, *(record.size for record in records[:-1])])
         self._first = np.empty(2 * len(records) + 1, dtype=np.int64)
@@ -105,7 +105,9 @@ class Changes:
         return self.law.count + 2
 
     def by_all(self, rows: Array) -> Array:
-        """Extend derivatives by the run-time parameters to derivatives by all variables, where the others are zero."""
+        """Extend derivatives with respect to the run-time parameters to derivatives with respect to all variables,
+        where the others are zero.
+        """
         return np.concatenate([rows, np.zeros((2, *rows.shape[1:]))])
 
     @property
@@ -142,7 +144,7 @@ class Changes:
         n, launch = self.law.count, self._problem.launch
         changes = np.zeros((ORIGIN_ROWS, n + 2))
         sigma, y, delay, arc = changes
-        sigma += self.law.launch_moves
+        sigma += self.law.launch_changes
         arc -= start.ds[0] * sigma
         y[n + 1] = 2.0 * launch.v0.value
         if launch.v0.value == 0.0:
@@ -155,7 +157,7 @@ class Changes:
                 delay[n + 1] = 2.0 * start.ds[0] / abs(LawRows(self.law.matrix(state)).force[0, 0])
         return changes
 
-    def told(self, sigma: Array, arc: Array, laps: Array | float) -> Array:
+    def parameter_change(self, sigma: Array, arc: Array, laps: Array | float) -> Array:
         """Return the change of a place in the curve's parameter, from the changes of its label and of the arc length to
         it (`Origin`).
         """
@@ -171,16 +173,16 @@ class Changes:
         """Return the Chebyshev coefficients of the solutions."""
         return np.ascontiguousarray((self._solutions[:, :, :COUNT] @ TO_COEFFICIENTS.T).swapaxes(1, 2))
 
-    def along(self, halves: NDArray[np.int64], w: Array, v: Array, *, whole: bool = True) -> Along:
+    def along(self, halves: NDArray[np.int64], w: Array, v: Array, *, whole: bool = True) -> ChangesAlong:
         """Return the changes of states at march variables w on halves with given numbers; unless ``whole``, those of
         places and times only.
         """
         found, states = np.empty((ORIGIN_ROWS, self.variables, w.size)), np.empty((5, w.size))
         rows = self._series.shape[2] if whole else self.variables
         fill_along(self._laid, self._series, self._origins, halves, np.array([w, v * v]), rows, found, states)
-        return Along(found, states)
+        return ChangesAlong(found, states)
 
-    def states(self, along: Along, law: Array, v: Array) -> Array:
+    def states(self, along: ChangesAlong, law: Array, v: Array) -> Array:
         """Return the changes of states at given times (`chain.fill_states`), given the law and the velocities there."""
         path = self.law.path(*along.states[:2])
         found = np.empty((STATE_ROWS, self.variables, v.size))

@@ -46,12 +46,12 @@ class ChartLaw(Law):
         self._launch = problem.launch.lam0
 
     @property
-    def launch_moves(self) -> Array:
+    def launch_changes(self) -> Array:
         """See `Law`. The launch place is a fixed arc length, so its label changes if points shift along the curve."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
         place = self._shape.places(np.array([self._launch.value]), self._launch.low)
-        moves[list(self._forces.shaping)] = -self._shape.lengthened(place)[:, 0]
+        moves[list(self._forces.shaping)] = -self._shape.arc_length_changes(place)[:, 0]
         return moves
 
     @property

@@ -184,12 +184,12 @@ def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
     states = np.empty((5, MARKS * runs + COUNT * count))
     for k in range(runs):
         record, one, other = records[begins[k] :], first[2 * k], first[2 * k + 1]
-        v2, on_way, at_end = record[START_V2], panels[one], panels[other if record[BACK] > 0.0 else one]
+        v2, first_panel, at_end = record[START_V2], panels[one], panels[other if record[BACK] > 0.0 else one]
         # If there are no panels from the start, the start is the middle.
-        mark_state(states, k, record, START, v2, on_way)
+        mark_state(states, k, record, START, v2, first_panel)
         mark_state(states, runs + k, record, END, 0.0, at_end)
         middle_v2 = end_speed(panels[other - 1]) ** 2 if record[AHEAD] > 0.0 else v2
-        mark_state(states, 2 * runs + k, record, MIDDLE, middle_v2, on_way)
+        mark_state(states, 2 * runs + k, record, MIDDLE, middle_v2, first_panel)
     for k in range(count):
         panel = panels[k]
         for j in range(COUNT):
@@ -274,7 +274,7 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
         work[factor + j] = exp(u * (width * ENDS_BY_NODE[j]) * work[factor + j])
     for row in range(n + 2):
         # A row for each parameter, for sigma, and for the solution that begins with y = 1, which has no source.
-        force, stretch = (n + 5 + row, 2 + row) if row < n else (n + 3, 1)
+        force, strain = (n + 5 + row, 2 + row) if row < n else (n + 3, 1)
         if row <= n:
             for j in range(COUNT):
                 work[source + j] = law[force, at + j] / work[factor + j]
@@ -287,8 +287,8 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
             share = y / (panel[SPEEDS + j] * work[growth + j]) ** 2
             # No solution begins with y = 1 where V**2 is 0.
             out[shares + j] = share if by_distance or row <= n else 0.0
-            stretched = law[stretch, at + j] / law[0, at + j] if row <= n else 0.0
-            work[rate + j] = twice * law[0, at + j] / panel[SPEEDS + j] * (stretched - 0.5 * out[shares + j])
+            strain_share = law[strain, at + j] / law[0, at + j] if row <= n else 0.0
+            work[rate + j] = twice * law[0, at + j] / panel[SPEEDS + j] * (strain_share - 0.5 * out[shares + j])
         start[row] = work[factor + COUNT] * (work[gained + COUNT] + start[row])
         out[shares + COUNT] = start[row]
         to_means(work, rate, out, times)

@@ -21,11 +21,11 @@ from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, ST
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT
-from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.programs import force_program, law_program, load_program, range_program
 
 # The ratio of the rounding errors of doubles to those of double-double arithmetic.
-COARSER = 0.5 * ULP / UNIT
+ROUNDING_RATIO = 0.5 * ULP / UNIT
 
 # The largest relative error of the force at which panels still distinguish rounding from structure.
 MAX_FORCE_ERROR = 1e-11
@@ -37,8 +37,8 @@ class LawRows(NamedTuple):
     Attributes
     ----------
     matrix : (2 * k + 5, n) array
-        ds/dlam, its derivative by the place and those by the k run-time parameters, then F = dW/dlam and its
-        derivatives by the place, by W and by the parameters.
+        ds/dlam, its derivative with respect to the place and those with respect to the k run-time parameters, then F =
+        dW/dlam and its derivatives with respect to the place, W and the parameters.
     """
 
     matrix: Array
@@ -51,7 +51,7 @@ class LawRows(NamedTuple):
 
     @property
     def force(self) -> Array:
-        """F and its derivatives by the place and by W: a row for each."""
+        """F and its derivatives with respect to the place and W: a row for each."""
         first = (len(self.matrix) - 1) // 2
         force: Array = self.matrix[first : first + 3]
         return force
@@ -96,8 +96,8 @@ class Law(ABC):
 
     @property
     @abstractmethod
-    def launch_moves(self) -> Array:
-        """The derivatives of the label of the launch by each variable."""
+    def launch_changes(self) -> Array:
+        """The derivatives of the label of the launch with respect to each variable."""
 
     @property
     @abstractmethod
@@ -110,8 +110,8 @@ class Law(ABC):
 
     @abstractmethod
     def loads(self, states: Array) -> Array:
-        """Return the slope of the contact force per mass along the motion, and its derivatives by the place and by
-        W.
+        """Return the slope of the contact force per mass along the motion, and its derivatives with respect to the
+        place and W.
         """
 
     @abstractmethod
@@ -147,7 +147,7 @@ class FormulaLaw(Law):
         self._exact, self._domain = formulas.exact, formulas.domain_of
 
     @property
-    def launch_moves(self) -> Array:
+    def launch_changes(self) -> Array:
         """See `Law`."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
@@ -185,7 +185,7 @@ class FormulaLaw(Law):
         places, signs, counts = [], [], []
         for run in runs:
             v, halves = run.record[HEADING], [(run.record[START], run.half_c, run.panels_ahead)]
-            if run.what != ASYMPTOTE:
+            if run.what != END_ASYMPTOTE:
                 halves.append((run.record[END], 0.0, run.panels_back))
             counts.append(sum(len(panels) for *_, panels in halves))
             for sense, (origin, half_c, panels) in zip((v, -v), halves, strict=False):
@@ -209,12 +209,12 @@ class FormulaLaw(Law):
         Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
         """
         states = states_of(places, np.zeros_like(places), np.zeros_like(places), v, nu)
-        lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
+        lows = np.abs(self.parameters[1]) / ROUNDING_RATIO  # doubles lack the low parts
         force, slope = self.values(force_program(self._exact, self.count), states, lows)
-        return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
+        return force[0], ROUNDING_RATIO * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
     def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """Return the force dW/dlam on a body at rest, without friction, and its derivative by the place.
+        """Return the force dW/dlam on a body at rest, without friction, and its derivative with respect to the place.
 
         Places are given as two doubles each.
         """

@@ -14,8 +14,9 @@ from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
 def law_program(law: ExactLaw, parameters: int) -> Program:
     """Return the program of the law of a motion with losses, whose two coordinates are a place and V**2.
 
-    The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
-    place and the parameters, and dW/dlam, where W is V**2, and its derivatives by the place, W and the parameters.
+    The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives with
+    respect to the place and the parameters, and dW/dlam, where W is V**2, and its derivatives with respect to the
+    place, W and the parameters.
     """
     op, ds, slope = _law(law, parameters)
     (lam, w), p = op.places, op.values[:parameters]
@@ -25,7 +26,7 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
 @lru_cache(maxsize=64)
 def load_program(law: ExactLaw, parameters: int) -> Program:
     """Return the program of the slope of the contact force per mass along a motion with losses, and of its derivatives
-    by the place and by W.
+    with respect to the place and W.
 
     The inputs are those of `law_program`.
     """
@@ -46,8 +47,8 @@ def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumb
 
 @lru_cache(maxsize=64)
 def force_program(law: ExactLaw, parameters: int) -> Program:
-    """Return the program of dW/dlam at a place and V**2, and its derivative by the place; the inputs are those of
-    `law_program`.
+    """Return the program of dW/dlam at a place and V**2, and its derivative with respect to the place; the inputs are
+    those of `law_program`.
     """
     op, _, slope = _law(law, parameters)
     return assemble(op, [slope, *gradient(op, slope, [op.place])])
@@ -55,8 +56,8 @@ def force_program(law: ExactLaw, parameters: int) -> Program:
 
 @lru_cache(maxsize=64)
 def range_program(domain: Callable[..., Any], parameters: int) -> Program:
-    """Return the program of both ends of the parameter's range and its period, each with its derivatives by the
-    run-time parameters.
+    """Return the program of both ends of the parameter's range and its period, each with its derivatives with respect
+    to the run-time parameters.
 
     Those that do not exist are zero.
     """
@@ -84,8 +85,8 @@ class ChartForces(NamedTuple):
     shaping: tuple[int, ...]
 
 
-# The number of derivatives of x and z by u, from order 0 on, that describe a point of a chart, and the number of those
-# that its curvature needs; each displacement has as many of the latter.
+# The number of derivatives of x and z with respect to u, from order 0 on, that describe a point of a chart, and the
+# number of those that its curvature needs; each displacement has as many of the latter.
 ORDERS, CURVED = 5, 3
 
 
@@ -108,18 +109,20 @@ class _ChartPoint:
         self.x, self.z = x, z
         self.load = op.number(forces.law.static_normal_load(op, *point, self.p))
         self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
-        self.stretches = [op.number(0)] * forces.parameters
+        self.strains = [op.number(0)] * forces.parameters
         for k, moved in self._displacements():
-            self.stretches[k] = (dx * moved[2] + dz * moved[3]) / square
+            self.strains[k] = (dx * moved[2] + dz * moved[3]) / square
 
     def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
-        """Return, for each parameter that shapes the curve, the displacement with its derivatives by u."""
+        """Return, for each parameter that shapes the curve, the displacement with its derivatives with respect to u."""
         first, count = 2 * ORDERS, 2 * CURVED
         starts = range(first, first + count * len(self._forces.shaping), count)
         return [(k, self.op.places[i : i + count]) for k, i in zip(self._forces.shaping, starts, strict=True)]
 
     def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        """Return the derivatives of a quantity of a point by arc length, by V**2, and by the run-time parameters."""
+        """Return the derivatives of a quantity of a point with respect to arc length, V**2, and the run-time
+        parameters.
+        """
         op, count = self.op, 2 * (ORDERS - 1)
         *by_places, by_w = gradient(op, quantity, [*op.places[:count], self.w])
         by_parameters = gradient(op, quantity, self.p)
@@ -138,32 +141,34 @@ def chart_law_program(forces: ChartForces) -> Program:
     The derivatives are by the place, by W and by the parameters. If arc lengths grow, so does the change of W over
     them.
     """
-    at = _ChartPoint(forces)
-    along, by_w, by_parameters = at.partials(at.slope)
-    by_parameters = [part + at.slope * stretch for part, stretch in zip(by_parameters, at.stretches, strict=True)]
-    return assemble(at.op, [*at.stretches, at.slope, along, by_w, *by_parameters])
+    chart_point = _ChartPoint(forces)
+    along, by_w, by_parameters = chart_point.partials(chart_point.slope)
+    by_parameters = [
+        part + chart_point.slope * strain for part, strain in zip(by_parameters, chart_point.strains, strict=True)
+    ]
+    return assemble(chart_point.op, [*chart_point.strains, chart_point.slope, along, by_w, *by_parameters])
 
 
 @lru_cache(maxsize=64)
 def chart_load_program(forces: ChartForces) -> Program:
-    """Return the program of the slope of the contact force per mass along a motion, and of its derivatives by the place
-    and by W.
+    """Return the program of the slope of the contact force per mass along a motion, and of its derivatives with respect
+    to the place and W.
     """
-    at = _ChartPoint(forces)
-    along, by_w, _ = at.partials(at.curvature * at.w + at.load)
-    load_slope = along + by_w * at.slope
-    return assemble(at.op, [load_slope, *at.partials(load_slope)[:2]])
+    chart_point = _ChartPoint(forces)
+    along, by_w, _ = chart_point.partials(chart_point.curvature * chart_point.w + chart_point.load)
+    load_slope = along + by_w * chart_point.slope
+    return assemble(chart_point.op, [load_slope, *chart_point.partials(load_slope)[:2]])
 
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
     """Return the program of states at a point, as `gradients.programs.path_program`."""
-    at = _ChartPoint(forces)
-    op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
-    for quantity in (at.x, at.z, None, m * at.curvature, m * at.load, op.number(0)):
+    chart_point = _ChartPoint(forces)
+    op, m, outputs = chart_point.op, chart_point.p[forces.mass], list[TapeNumber]()
+    for quantity in (chart_point.x, chart_point.z, None, m * chart_point.curvature, m * chart_point.load, op.number(0)):
         if quantity is None:
-            outputs += [op.number(1), *at.stretches, op.number(0)]
+            outputs += [op.number(1), *chart_point.strains, op.number(0)]
         else:
-            along, _, by_parameters = at.partials(quantity)
+            along, _, by_parameters = chart_point.partials(quantity)
             outputs += [quantity, *by_parameters, along]
     return assemble(op, outputs)

@@ -90,15 +90,15 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     middle, v2 = np.atleast_1d(state.lam), np.atleast_1d(state.v2)
     shares = np.arange(2 * count + 1) / (2 * count) - 0.5
     places = middle + length * shares.reshape(-1, *np.ones(middle.ndim, dtype=int))
-    at, speeds = places.ravel(), np.broadcast_to(v2, places.shape).ravel()
-    x, z, _, _, force = path_and_force_at(f.addresses, f.p, at, speeds)
+    lam, speeds = places.ravel(), np.broadcast_to(v2, places.shape).ravel()
+    x, z, _, _, force = path_and_force_at(f.addresses, f.p, lam, speeds)
     if formulas.path_in_space is None:
-        angle = formulas.charted(problem.p).points(at)[2]
-        y, along_x, along_y, along_z = 0.0 * at, -force * np.sin(angle), 0.0 * at, force * np.cos(angle)
+        angle = formulas.charted(problem.p).points(lam)[2]
+        y, along_x, along_y, along_z = 0.0 * lam, -force * np.sin(angle), 0.0 * lam, force * np.cos(angle)
     else:
-        y, along_x, along_y, along_z = path_in_space(formulas, f.p, at, speeds, np.ones(at.size))
+        y, along_x, along_y, along_z = path_in_space(formulas, f.p, lam, speeds, np.ones(lam.size))
     # Ends and couplings are at the even places, middles of cars at the odd ones.
-    found = [row.reshape(places.shape)[1::2] for row in (at, x, y, z)]
+    found = [row.reshape(places.shape)[1::2] for row in (lam, x, y, z)]
     found += [row.reshape(places.shape)[1::2] / count for row in (force, along_x, along_y, along_z)]
     heights = z.reshape(places.shape)[::2]
     # The force of a coupling is gravity on the cars behind it, less their mass times the acceleration of the train.
@@ -120,10 +120,10 @@ def _loads(problem: Problem, state: Any, places: Array, gravity: float) -> tuple
     """Return the loads on riders upwards, to the left and ahead at places of a train."""
     lam, v, ahead = (np.atleast_1d(row) for row in (state.lam, state.v, state.n_longitudinal))
     speeds, direction = (np.broadcast_to(row, places.shape).ravel() for row in (v * v, np.sign(v)))
-    formulas, p, at = problem.formulas, problem.functions.p, places.ravel()
-    upwards, sideways = rider_loads(formulas, p, at, speeds, direction, np.zeros(at.size))[:2]
+    formulas, p, car_places = problem.formulas, problem.functions.p, places.ravel()
+    upwards, sideways = rider_loads(formulas, p, car_places, speeds, direction, np.zeros(car_places.size))[:2]
     # The acceleration is that of the train; the component of gravity along the track is that at the car.
     chart = formulas.charted(problem.p)
-    slopes, slope = chart.points(at)[2].reshape(places.shape), chart.points(lam.ravel())[2].reshape(lam.shape)
+    slopes, slope = chart.points(car_places)[2].reshape(places.shape), chart.points(lam.ravel())[2].reshape(lam.shape)
     felt = ahead + (slopes - slope) * gravity / STANDARD_GRAVITY
     return upwards.reshape(places.shape), sideways.reshape(places.shape), felt

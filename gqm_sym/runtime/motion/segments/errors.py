@@ -20,7 +20,7 @@ MAX_END_ROUNDINGS = 2.0
 # The error of the potential's slope along a chart that has no formulas, in roundings of the largest slope; the same in
 # roundings of the largest slope times ds, which is small along the path of a centre (2.5 was measured); and the number
 # of places of a closed chart at which the largest slope is searched for.
-CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 4.0, 16
+CHART_ROUNDINGS, CENTRE_ROUNDINGS, SLOPE_SAMPLES = 8.0, 4.0, 16
 
 # The error of a place due to the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
@@ -86,7 +86,7 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
     if f.exact is None:
         # Slopes of a chart without formulas are known to a rounding of the largest. The path of a centre has the
         # rounding errors of the curve, which are larger by the factor 1/ds.
-        around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
+        around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, SLOPE_SAMPLES)])
         largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
         shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
         roundings = max(CHART_ROUNDINGS, CENTRE_ROUNDINGS / shortest) if shortest > 0.0 else inf

@@ -9,7 +9,7 @@ from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUIL
 
 # The distance from an equilibrium up to which an approach to it is computed. It is near the smallest distance that
 # doubles resolve.
-NEAREST = 1e-300
+MIN_EQUILIBRIUM_DISTANCE = 1e-300
 
 # Phase angles of such an approach at which panels begin, because panels must be short near its start.
 APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
@@ -17,7 +17,7 @@ APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
 def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
     """Return a segment from ``start`` towards an equilibrium, up to the resolution of doubles."""
-    stop = log(abs(start - equilibrium) / NEAREST)
+    stop = log(abs(start - equilibrium) / MIN_EQUILIBRIUM_DISTANCE)
     marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
     return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)
 

@@ -167,8 +167,8 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
         else:
             for j in range(n):
                 total, lost = two_sum(rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j])
-                middles[j], rest = two_sum(rows[LAUNCH_PLACE, j], 0.5 * total)
-                rests[j] = rest + 0.5 * lost
+                middles[j], rounding = two_sum(rows[LAUNCH_PLACE, j], 0.5 * total)
+                rests[j] = rounding + 0.5 * lost
             ends = rows[END_LOW, :n], rows[END_HIGH, :n]
             call_orbit_invariants_batch(fns.orbit_invariants, n, ends[0], ends[1], middles, rests, p, invariants)
     return count + more

@@ -7,7 +7,7 @@ Otherwise they are approximated by Newton's method and then proved by interval b
 from math import fabs, inf, nan
 
 from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch, call_turning_point_batch
-from gqm_sym.runtime.compiled.intrinsics import choose, fma, whole_below
+from gqm_sym.runtime.compiled.intrinsics import choose, floor_of, fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS, distance_to_axis
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
@@ -80,7 +80,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
     call_turning_point_batch(fns.turning_point, n, axis, w0, p, out)
     for j in range(n):
         period, rests = 2.0 * steps[j], w0[j] == 0.0
-        periods = choose(period > 0.0, whole_below(axis[j] / period + 0.5), 0.0)
+        periods = choose(period > 0.0, floor_of(axis[j] / period + 0.5), 0.0)
         offsets[j] = fma(-periods, period, axis[j])
         halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
         ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
@@ -110,7 +110,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
 
 
 @Inner
-def stop_at_hills(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
+def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
     """Let searches that would begin at a mirror image begin at the axis of symmetry if V**2 < 0 there.
 
     The image has the same V**2, and belongs to another orbit then. ``axes`` has the distances of the axes from the
@@ -178,7 +178,7 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
     for j in range(n):
         step, low, itself = steps[j], places_low[j], direction[j] * (places[j] - start[j])
         first = distance_to_axis(start[j], direction[j], places[j], step)
-        passed = whole_below((first - itself) / step + 0.5)  # steps from the known axis to the first ahead
+        passed = floor_of((first - itself) / step + 0.5)  # steps from the known axis to the first ahead
         known_well = monotone & (low == low) & (first == itself)  # axes have the rounding of steps
         first += choose(known_well, direction[j] * low, 0.0)
         # A body released at rest moves towards the axis and turns on the other side of it.
@@ -195,7 +195,7 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
         number[j] = choose(known | (step == 0.0), 0.0, direction[j] * passed)
         axes[j] = choose((w0[j] == 0.0) & (first > 0.0) & (first < length[j]), first, trial[j])
     if not monotone and contains(state, SEEKING):
-        stop_at_hills(fns, n, rows, p, axes, work)
+        start_at_axes(fns, n, rows, p, axes, work)
 
 
 @Inner
@@ -223,7 +223,7 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
     behind, axes = rows[ZERO_BEHIND, :n], work[5, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
-        passed = choose(step > 0.0, whole_below((ahead - axis[j]) / step), 0.0)
+        passed = choose(step > 0.0, floor_of((ahead - axis[j]) / step), 0.0)
         last, number[j] = axis[j] + step * passed, number[j] + direction[j] * passed
         end[j], axis[j] = direction[j] * ahead, direction[j] * last
         length[j] = choose(length_behind[j] == CLOSED, length[j] - ahead, length_behind[j])
@@ -235,7 +235,7 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
         direction[j], zero[j] = -direction[j], choose(known, behind[j], 0.0)
         state[j] = choose((w0[j] > 0.0) & (behind[j] != behind[j]), SEEKING, FOUND)
     if not monotone and contains(state, SEEKING):
-        stop_at_hills(fns, n, rows, p, axes, work)
+        start_at_axes(fns, n, rows, p, axes, work)
 
 
 @Inner
@@ -269,19 +269,19 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
             places[j] = start[j] + offsets[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
-            at, w = trial[j], w0[j] - 2.0 * offsets[j] * out[0, j]
+            guess, w = trial[j], w0[j] - 2.0 * offsets[j] * out[0, j]
             before = w > 0.0
-            low, high = choose(before, at, bracket_low[j]), choose(before, bracket_high[j], at)
-            better = at + at * (w / (2.0 * offsets[j] * out[2, j] + w))
-            close = fabs(better - at) <= LAST_STEP * at
+            low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
+            better = guess + guess * (w / (2.0 * offsets[j] * out[2, j] + w))
+            close = fabs(better - guess) <= LAST_STEP * guess
             bracketed = high < inf
-            within = (better > low) & (better < choose(bracketed, high, 4.0 * at))
-            new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * at))
+            within = (better > low) & (better < choose(bracketed, high, 4.0 * guess))
+            new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * guess))
             new = choose(new > length[j], length[j], new)
-            lost = (w != w) | (before & (at >= length[j]))
+            lost = (w != w) | (before & (guess >= length[j]))
             live = state[j] == SEEKING
             zero[j] = choose(live & close, better, zero[j])
-            trial[j] = choose(live, new, at)
+            trial[j] = choose(live, new, guess)
             bracket_low[j], bracket_high[j] = low, high
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
         if not contains(state, SEEKING):
@@ -327,7 +327,7 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         first, second = a[j], direction[j] * zero[j]
         missed = fabs(0.5 * (first + second) - axis[j])
         even = missed <= EVEN_TOLERANCE * (fabs(start[j]) + fabs(first) + fabs(second))
-        known = number[j] == 2.0 * whole_below(0.5 * number[j])
+        known = number[j] == 2.0 * floor_of(0.5 * number[j])
         between = (step[j] == 0.0) | ((fabs(first - second) < MAX_WIDTH * step[j]) & known)
         state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
     for j in range(n):

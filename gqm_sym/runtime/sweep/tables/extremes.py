@@ -25,15 +25,15 @@ FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
 
 @Inlined
-def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
+def level_on(passage, half_v2_at_edges, j):  # type: ignore[no-untyped-def]
     """Return V**2/2 at an edge of panel j of a passage, the column of the powers about that edge, and the edge's place
     on the panel.
 
     It is the edge that is farther from a turning point, because the lowest place of a small swing is near it.
     """
     if j == 0 and passage.panels > 1:
-        return slacks[1], RIGHT_TERMS, 1.0
-    return slacks[j], LEFT_TERMS, -1.0
+        return half_v2_at_edges[1], RIGHT_TERMS, 1.0
+    return half_v2_at_edges[j], LEFT_TERMS, -1.0
 
 
 @Inner
@@ -76,7 +76,7 @@ def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-d
 
 
 @Inner
-def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+def best_sample(curve, path, passage, half_v2_at_edges, force, sign):  # type: ignore[no-untyped-def]
     """Return the largest value of ``sign`` times V**2 or the contact force at the samples, its panel, and its place
     there.
     """
@@ -84,7 +84,7 @@ def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-u
     best, best_j, best_x = -inf, 0, 0.0
     (first, low_x), (last, high_x) = path
     for j in range(first, last + 1):
-        k, slack = (passage.first + j) % count, slacks[j]
+        k, slack = (passage.first + j) % count, half_v2_at_edges[j]
         low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
         prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if first < j < last else NEAR))
         for i in range(SAMPLES):
@@ -95,14 +95,14 @@ def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-u
             else:
                 # The end itself is sampled, because the next panel shares it.
                 x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
-                value = load_on(curve, k, level_on(passage, slacks, j), force, x)
+                value = load_on(curve, k, level_on(passage, half_v2_at_edges, j), force, x)
             if sign * value > best:
                 best, best_j, best_x = sign * value, j, x
     return best, best_j, best_x
 
 
 @Inner
-def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+def passage_extreme(curve, orbit, passage, half_v2_at_edges, force, sign):  # type: ignore[no-untyped-def]
     """Return the result of `orbit_extremes.extreme` on a tabulated curve: the best of all samples, refined on the
     panels to which it belongs.
 
@@ -117,7 +117,7 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
     if meets_turn and not (force or sign > 0.0):
         return 0.0
-    best, best_j, best_x = best_sample(curve, path, passage, slacks, force, sign)
+    best, best_j, best_x = best_sample(curve, path, passage, half_v2_at_edges, force, sign)
     if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
         return sqrt(orbit.v2)
     for step in range(-1, 2):
@@ -130,6 +130,6 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
         if shared:
             ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
             k = (passage.first + j) % count
-            best = max(best, sign * refined(curve, k, level_on(passage, slacks, j), force, sign, x, ends))
+            best = max(best, sign * refined(curve, k, level_on(passage, half_v2_at_edges, j), force, sign, x, ends))
     value = sign * best
     return curve.mass * value if force else sqrt(max(value, 0.0))

@@ -49,11 +49,11 @@ def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
 
     Return the size of the last Legendre terms, and the size with which it is compared.
     """
-    rest, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
+    residuals, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
     for j in range(NODES):
-        size, sums[0, j], sums[1, j] = max(size, fabs(rest[j])), 0.0, 0.0
+        size, sums[0, j], sums[1, j] = max(size, fabs(residuals[j])), 0.0, 0.0
     for turn in range(CORRECTIONS + 1):
-        fit(rest, 0, series, 0)
+        fit(residuals, 0, series, 0)
         powers(series, 0, terms, 0)
         for j in range(NODES):
             sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], terms[j], 0.0)
@@ -63,7 +63,7 @@ def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
             for j in range(NODES - 1, -1, -1):
                 value, low = multiply_pairs(value, low, POINTS[i], 0.0)
                 value, low = add(value, low, sums[0, j], sums[1, j])
-            rest[i] = add(values[0, i], values[1, i], -value, -low)[0]
+            residuals[i] = add(values[0, i], values[1, i], -value, -low)[0]
     return max(fabs(work[NODES - 2]), fabs(work[NODES - 1])), size
 
 

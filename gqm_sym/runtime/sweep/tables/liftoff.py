@@ -59,7 +59,7 @@ def change_between(curve, k, slack, side, before, after):  # type: ignore[no-unt
 
 
 @Inner
-def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-untyped-def]
+def loss_on_way(curve, passage, half_v2_at_edges, side, begin, sense):  # type: ignore[no-untyped-def]
     """Return the first place between ``begin`` and one end of a passage at which the track would pull.
 
     Parameters
@@ -78,7 +78,7 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
     rows, paths, count, last = curve.rows, curve.table.paths, curve.levels.size, passage.panels - 1
     j, start = begin
     while 0 <= j <= last:
-        k, slack = (passage.first + j) % count, slacks[j]
+        k, slack = (passage.first + j) % count, half_v2_at_edges[j]
         prepare(curve, k, FAR | LOAD)
         stop = float(sense)
         if j == (last if sense > 0 else 0):
@@ -101,7 +101,7 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
 
 
 @Inner
-def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyped-def]
+def liftoff_place(curve, orbit, passage, half_v2_at_edges, side):  # type: ignore[no-untyped-def]
     """Return the place at which a body leaves the track before it reaches an end of it; NaN if it never does."""
     table, period = curve.table, curve.period
     index, x, _ = locate(table, period, orbit.lam0)
@@ -111,10 +111,10 @@ def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyp
     at_low, at_high = orbit.low == 0.0, orbit.high == 0.0
     if not orbit.circulates and (at_low or at_high):
         j, x = (0, passage.low_x) if at_low else (last, passage.high_x)
-    for way in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
-        sense = orbit.direction if way == 0 else -orbit.direction
-        lost, where = loss_on_way(curve, passage, slacks, side, (j, x), sense)
-        if way == 0 and lost == j and where == x:
+    for passes in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
+        sense = orbit.direction if passes == 0 else -orbit.direction
+        lost, where = loss_on_way(curve, passage, half_v2_at_edges, side, (j, x), sense)
+        if passes == 0 and lost == j and where == x:
             return orbit.lam0
         if lost >= 0:
             k = (passage.first + lost) % curve.levels.size

@@ -81,20 +81,20 @@ def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
     It is convex where one term of its second derivative, in powers of the distance from the edge, outweighs all
     negative terms. In a flat well the terms before this one are as small as the edge is near the lowest place.
     """
-    lead, behind, way, first = 0.0, 0.0, 1.0, 0
+    lead, behind, power, first = 0.0, 0.0, 1.0, 0
     for j in range(1, NODES):
-        bend = j * (j + 1) * row[at + j] * way
-        behind, way = behind + max(-bend, 0.0), -2.0 * edge * way
+        bend = j * (j + 1) * row[at + j] * power
+        behind, power = behind + max(-bend, 0.0), -2.0 * edge * power
         if bend > lead:
             lead, behind, first = bend, 0.0, j
     distance, height = 2.0, 0.0
     if not lead > 2.0 * behind:
         return inf
     for _ in range(HALVINGS):
-        before, way = 0.0, 1.0
+        before, power = 0.0, 1.0
         for j in range(1, first):
-            before, way = before + max(-j * (j + 1) * row[at + j] * way, 0.0), -edge * distance * way
-        if 2.0 * before > first * (first + 1) * row[at + first] * way:
+            before, power = before + max(-j * (j + 1) * row[at + j] * power, 0.0), -edge * distance * power
+        if 2.0 * before > first * (first + 1) * row[at + first] * power:
             break
         distance *= 0.5
     for j in range(NODES - 1, -1, -1):

@@ -31,7 +31,7 @@ class Passage(NamedTuple):
         The index of the first panel, and the number of panels. On a closed curve indices continue from lap to lap.
     low_x, high_x : float
         The places of both ends on their panels, in [-1, 1].
-    low_rest, high_rest : float
+    low_to_edge, high_from_edge : float
         The distances from the lower end to the right edge of its panel, and from the left edge of the last panel to the
         upper end, in units of half these panels.
     width : float
@@ -52,8 +52,8 @@ class Passage(NamedTuple):
     panels: int
     low_x: float
     high_x: float
-    low_rest: float
-    high_rest: float
+    low_to_edge: float
+    high_from_edge: float
     width: float
     turns: int
     v2: float
@@ -157,15 +157,15 @@ def are_level(curve, passage):  # type: ignore[no-untyped-def]
     for k in (low, after, high):
         prepare(curve, k, FAR | NEAR)
     lower, upper = (
-        rise_on(rows, low, RIGHT_TERMS, -passage.low_rest),
-        rise_on(rows, high, LEFT_TERMS, passage.high_rest),
+        rise_on(rows, low, RIGHT_TERMS, -passage.low_to_edge),
+        rise_on(rows, high, LEFT_TERMS, passage.high_from_edge),
     )
     between = rise_between(rows, after, high)
     return fabs(lower - (between + upper)) <= MAX_MISMATCH * max(fabs(lower), fabs(upper), fabs(between))
 
 
 @Inner
-def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
+def fill_half_v2_at_edges(curve, passage, half_v2_at_edges):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; return whether all values keep enough digits.
 
     They are computed from the nearer turning point. On a panel with a turning point, the value is that of the potential
@@ -184,24 +184,24 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
     if turns == NEITHER:
         peak = begin = 0.5 * passage.v2
     if turns != UPPER:
-        slacks[0] = potential_on(rows, k, passage.low_x) + begin
-        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, -passage.low_rest), neighbour(k, 1, count)
+        half_v2_at_edges[0] = potential_on(rows, k, passage.low_x) + begin
+        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, -passage.low_to_edge), neighbour(k, 1, count)
         at = after
         for j in range(1, middle + 1):
-            slacks[j] = slack - rise_between(rows, after, at)
-            peak, at = max(peak, slacks[j]), neighbour(at, 1, count)
-            enough &= slacks[j] >= MIN_CANCELLATION_RATIO * peak
+            half_v2_at_edges[j] = slack - rise_between(rows, after, at)
+            peak, at = max(peak, half_v2_at_edges[j]), neighbour(at, 1, count)
+            enough &= half_v2_at_edges[j] >= MIN_CANCELLATION_RATIO * peak
         if last > 0:
             peak = max(peak, slack)
         if turns != NEITHER:
             slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (2.0 * paths[k, HALF])
     if turns in (BOTH, UPPER):
-        top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_rest)
+        top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_from_edge)
         at = high
         for j in range(last, middle, -1):
-            slacks[j] = slack - rise_between(rows, high, at)
-            top, at = max(top, slacks[j]), neighbour(at, -1, count)
-            enough &= slacks[j] >= MIN_CANCELLATION_RATIO * top
+            half_v2_at_edges[j] = slack - rise_between(rows, high, at)
+            top, at = max(top, half_v2_at_edges[j]), neighbour(at, -1, count)
+            enough &= half_v2_at_edges[j] >= MIN_CANCELLATION_RATIO * top
         slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (2.0 * paths[high, HALF])
         slope, peak = min(slope, slope_above), max(peak, top)
     # Neither turning point may be next to an equilibrium.

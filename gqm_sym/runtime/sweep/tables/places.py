@@ -59,8 +59,8 @@ def edge_distance(table, one, other):  # type: ignore[no-untyped-def]
     if other <= count:
         return (edges[other] - edges[one]) + (lows[other] - lows[one])
     other -= count
-    rest = (edges[count] - edges[one]) + (lows[count] - lows[one])
-    return rest + ((edges[other] - edges[0]) + (lows[other] - lows[0]))
+    to_end = (edges[count] - edges[one]) + (lows[count] - lows[one])
+    return to_end + ((edges[other] - edges[0]) + (lows[other] - lows[0]))
 
 
 @Inlined
@@ -76,12 +76,12 @@ def from_right(x, near):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def way_between(table, lower, higher):  # type: ignore[no-untyped-def]
+def distance_between(table, lower, higher):  # type: ignore[no-untyped-def]
     """Return the distance from a place on a table to a higher one."""
     (i, x, near), (j, y, close) = lower, higher
     count, paths = table.edges.size - 1, table.paths
     if i == j:
-        way = from_right(x, near) - from_right(y, close) if x > 0.0 else from_left(y, close) - from_left(x, near)
-        return way * paths[i % count, HALF]
-    way = from_right(x, near) * paths[i % count, HALF] + from_left(y, close) * paths[j % count, HALF]
-    return way + edge_distance(table, i + 1, j)
+        distance = from_right(x, near) - from_right(y, close) if x > 0.0 else from_left(y, close) - from_left(x, near)
+        return distance * paths[i % count, HALF]
+    distance = from_right(x, near) * paths[i % count, HALF] + from_left(y, close) * paths[j % count, HALF]
+    return distance + edge_distance(table, i + 1, j)

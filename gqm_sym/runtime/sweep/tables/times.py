@@ -13,7 +13,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import cos, inverse_root, sin
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import hidden, on_stack
+from gqm_sym.runtime.compiled.registers import on_stack, opaque
 from gqm_sym.runtime.sweep.tables.layout import (
     DS_TERMS,
     FEW_NODES,
@@ -63,15 +63,15 @@ def fill_falls_from_turn(rows, k, end, sign, x, falls):  # type: ignore[no-untyp
     ``end`` contains the turning point and its distance from the edge on whose side the places are, both in units of
     half the panel; ``sign`` is 1 if the places lie above it. Divided differences are computed from the nearer edge.
     """
-    y, rest = end
+    y, to_edge = end
     inner, outer, edge = (RIGHT_TERMS, LEFT_TERMS, -1.0) if sign > 0.0 else (LEFT_TERMS, RIGHT_TERMS, 1.0)
-    n, q, gone = hidden(NODES), -sign * rest, y - edge
+    n, q, from_other_edge = opaque(NODES), -sign * to_edge, y - edge
     for i in range(n):
-        way = falls[i]
-        falls[i] = -sign * difference_from(rows, k, inner, q + way, q)
+        distance = falls[i]
+        falls[i] = -sign * difference_from(rows, k, inner, q + distance, q)
     if (x[0] + y < 0.0) != (sign < 0.0):
         for i in range(n):
-            fall = -sign * difference_from(rows, k, outer, gone, x[i] - edge)
+            fall = -sign * difference_from(rows, k, outer, from_other_edge, x[i] - edge)
             falls[i] = choose((x[i] + y < 0.0) != (sign < 0.0), fall, falls[i])
 
 
@@ -87,7 +87,7 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
     """
     rows, paths, last = curve.rows, curve.table.paths, passage.panels - 1
     k = (passage.first + j) % curve.levels.size
-    x, falls, half, n = place_buffer(), fall_buffer(), paths[k, HALF], hidden(NODES)
+    x, falls, half, n = place_buffer(), fall_buffer(), paths[k, HALF], opaque(NODES)
     if passage.turns == NEITHER:
         for i in range(n):
             x[i], falls[i], out[i] = u[i], slack - potential_on(rows, k, u[i]), half * half
@@ -98,13 +98,13 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
     else:
         sign, width = -1.0 if from_above else 1.0, passage.width
         on_panel, edge = j == (last if from_above else 0), LEFT_TERMS if sign > 0.0 else RIGHT_TERMS
-        end = (passage.high_x, passage.high_rest) if from_above else (passage.low_x, passage.low_rest)
+        end = (passage.high_x, passage.high_from_edge) if from_above else (passage.low_x, passage.low_to_edge)
         for i in range(n):
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
             near, far = width * s * s, width * c * c
             # V**2/2 is its value at a turning point or an edge plus the decrease of the potential from there.
-            way = near / half if on_panel else (near - gap) / half
-            x[i], falls[i] = (end[0] if on_panel else -sign) + sign * way, sign * way
+            distance = near / half if on_panel else (near - gap) / half
+            x[i], falls[i] = (end[0] if on_panel else -sign) + sign * distance, sign * distance
             out[i] = far * half if on_panel else near * far
         if on_panel:
             fill_falls_from_turn(rows, k, end, sign, x, falls)
@@ -128,7 +128,7 @@ def fill_falls_within(rows, k, passage, u, x, falls):  # type: ignore[no-untyped
         first = first * low + rows[k, MIDDLE_TERMS + j - 1]
         second = second * high + first
         terms[j - 2] = second
-    for i in range(hidden(NODES)):
+    for i in range(opaque(NODES)):
         s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
         x[i], falls[i] = low * c * c + high * s * s, 0.0
         for j in range(NODES - 2, -1, -1):
@@ -199,7 +199,7 @@ def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
     distance, total = slack - rows[k, MIDDLE], 0.0
     if distance > SAFETY * rows[k, FEW_REACH]:
         few = few_rates()
-        for i in range(hidden(FEW_NODES)):
+        for i in range(opaque(FEW_NODES)):
             few[i] = paths[k, FEW_WEIGHTS + i] * inverse_root(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
         for i in range(FEW_NODES):
             total += few[i]
@@ -207,7 +207,7 @@ def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
     if distance > SAFETY * rows[k, REACH]:
         prepare(curve, k, NEAR)
         rates = rates_buffer()
-        for i in range(hidden(NODES)):
+        for i in range(opaque(NODES)):
             rates[i] = paths[k, WEIGHTS + i] * inverse_root(2.0 * (slack - rows[k, POTENTIAL + i]))
         for i in range(NODES):
             total += rates[i]
@@ -222,7 +222,7 @@ def phase_of(below, above):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyped-def]
+def time_between(curve, passage, half_v2_at_edges, lower, upper):  # type: ignore[no-untyped-def]
     """Return the time that a body takes from one place of its orbit to a higher one; NaN if it is not accurate.
 
     ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
@@ -230,8 +230,8 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
     table, total, low, width = curve.table, 0.0, 0.0, passage.width
     paths, count, last = table.paths, curve.levels.size, passage.panels - 1
     first, end = passage.first + 1, passage.first + last
-    to_edge = passage.low_rest * paths[(first - 1) % count, HALF]
-    from_edge = passage.high_rest * paths[end % count, HALF]
+    to_edge = passage.low_to_edge * paths[(first - 1) % count, HALF]
+    from_edge = passage.high_from_edge * paths[end % count, HALF]
     right, after = 0.0, passage.first % count
     for j in range(passage.panels):
         k, after = after, neighbour(after, 1, count)
@@ -244,7 +244,7 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
             continue
         begins, ends = j == 0 or left <= lower[0], j == last or right >= upper[0]
         if not (begins or ends):
-            time = time_on_panel(curve, k, slacks[j])
+            time = time_on_panel(curve, k, half_v2_at_edges[j])
             if time == time:
                 total, error = two_sum(total, time)
                 low += error
@@ -253,18 +253,18 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
         if passage.turns == NEITHER:
             begin = (lower[0] - left) / half - 1.0 if begins else -1.0
             stop = (upper[0] - left) / half - 1.0 if ends else 1.0
-            part = time_on_part(curve, passage, j, False, slacks[j], left, begin, stop)
+            part = time_on_part(curve, passage, j, False, half_v2_at_edges[j], left, begin, stop)
         for side in range(2 if passage.turns != NEITHER else 0):
             from_above, is_middle = side == 1, passage.turns == BOTH and j == passage.middle
             if from_above != (j > passage.middle) and not (is_middle and last > 0):
                 continue
-            slack, gap, one, other = slacks[j], 0.0, lower, upper
+            slack, gap, one, other = half_v2_at_edges[j], 0.0, lower, upper
             from_one, from_other, beyond = begins, ends, to_edge
             if from_above:
                 one, other = (upper[1], upper[0]), (lower[1], lower[0])
                 from_one, from_other, beyond = ends, begins, from_edge
             if from_above and j < last:
-                slack, gap = slacks[j + 1], from_edge + edge_distance(table, first + j, end)
+                slack, gap = half_v2_at_edges[j + 1], from_edge + edge_distance(table, first + j, end)
             elif not from_above and j > 0:
                 gap = to_edge + edge_distance(table, first, first + j - 1)
             if gap > 0.0:
@@ -281,7 +281,7 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
 
 
 @Inner
-def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
+def travel_time(curve, orbit, passage, half_v2_at_edges, place):  # type: ignore[no-untyped-def]
     """Return the first time at which a body is at a place or, if that is NaN, the time of half a period, of a lap or
     until it leaves.
 
@@ -306,13 +306,13 @@ def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untype
     turn = end if orbit.direction > 0 else start
     time = 0.0
     # The time is that to the place, or to the end ahead and back to the place; the time of all laps before is added.
-    for stretch in range(1 if onwards and laps == 0.0 else 2):
+    for part_number in range(1 if onwards and laps == 0.0 else 2):
         first, last = here, there
         if not onwards:
-            first, last = (here if stretch == 0 else there), turn
-        elif stretch == 1:
+            first, last = (here if part_number == 0 else there), turn
+        elif part_number == 1:
             first, last = start, end
         lower, upper = (first, last) if first[0] < last[0] else (last, first)
-        part = time_between(curve, passage, slacks, lower, upper)
-        time += laps * part if onwards and stretch == 1 else part
+        part = time_between(curve, passage, half_v2_at_edges, lower, upper)
+        time += laps * part if onwards and part_number == 1 else part
     return time

@@ -9,7 +9,7 @@ from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
 from gqm_sym.runtime.sweep.orbit import NO_ENDS
 from gqm_sym.runtime.sweep.tables.layout import BASE, BASE_SIZE, HALF, INCREASE, LEFT_TERMS, NODES, RIGHT_TERMS, SPREAD
 from gqm_sym.runtime.sweep.tables.panel_forces import CONVEX_FROM, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
-from gqm_sym.runtime.sweep.tables.places import from_left, from_right, neighbour, way_between
+from gqm_sym.runtime.sweep.tables.places import distance_between, from_left, from_right, neighbour
 from gqm_sym.runtime.sweep.tables.potential import (
     difference_from,
     difference_on,
@@ -138,13 +138,15 @@ def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped
     k = index % count
     half, (start, at, near) = table.paths[k, HALF], launch
     if index == start:
-        edge, rest, way = LEFT_TERMS if at <= 0.0 else RIGHT_TERMS, near if at <= 0.0 else -near, x - at
+        edge, to_edge, distance = LEFT_TERMS if at <= 0.0 else RIGHT_TERMS, near if at <= 0.0 else -near, x - at
         for _ in range(LAST_STEPS):
-            y = rest + way
-            way += (0.5 * w0 - way * difference_from(rows, k, edge, rest, y)) / difference_from(rows, k, edge, y, y)
-        gap = from_left(at, near) + way
-        gap = gap if gap <= 1.0 else from_right(at, near) - way
-        return half * way, (index, at + way, gap)
+            y = to_edge + distance
+            distance += (0.5 * w0 - distance * difference_from(rows, k, edge, to_edge, y)) / difference_from(
+                rows, k, edge, y, y
+            )
+        gap = from_left(at, near) + distance
+        gap = gap if gap <= 1.0 else from_right(at, near) - distance
+        return half * distance, (index, at + distance, gap)
     gap, slack = 1.0 + direction * x, slack_at_edge(curve, launch, w0, index, direction)
     edge = LEFT_TERMS if direction > 0 else RIGHT_TERMS
     for _ in range(LAST_STEPS):
@@ -152,9 +154,9 @@ def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped
         gap += direction * (slack - rise_on(rows, k, edge, y)) / difference_from(rows, k, edge, y, y)
     if direction > 0:
         turn = index, gap - 1.0, gap if gap <= 1.0 else 2.0 - gap
-        return way_between(table, launch, turn), turn
+        return distance_between(table, launch, turn), turn
     turn = index, 1.0 - gap, gap if gap < 1.0 else 2.0 - gap
-    return -way_between(table, turn, launch), turn
+    return -distance_between(table, turn, launch), turn
 
 
 @Inner
@@ -169,13 +171,13 @@ def end_ahead(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
         half_v2 = 0.5 * w0 + rise_from_right(rows, start, x, near)
         if start < last:
             half_v2 = slack_at_edge(curve, launch, w0, last, 1) - rows[last, INCREASE]
-        offset = way_between(curve.table, launch, end)
+        offset = distance_between(curve.table, launch, end)
     else:
         end, k = (0, -1.0, 0.0), 0
         half_v2 = 0.5 * w0 + rise_from_left(rows, start, x, near)
         if start > 0:
             half_v2 = slack_at_edge(curve, launch, w0, 0, -1) + rows[0, INCREASE]
-        offset = -way_between(curve.table, end, launch)
+        offset = -distance_between(curve.table, end, launch)
     size = 0.5 * w0 + rows[start, BASE_SIZE] + rows[k, BASE_SIZE] + fabs(rows[k, INCREASE])
     certain = curve.ends != NO_ENDS and offset != 0.0 and half_v2 > MIN_LEAVING_SHARE * size
     return offset, end, 2.0 * half_v2 if certain else np.nan

@@ -1,4 +1,4 @@
-"""Divided differences of the elementary functions against mpmath with digits to spare."""
+"""Divided differences of the elementary functions agree with mpmath with digits to spare."""
 
 import math
 import random
@@ -16,22 +16,22 @@ from gqm_sym.runtime import vocabulary
 Real = Callable[[mpf], mpf]
 Points = tuple[float, float, float, float, float]
 
-# A few roundings each. Worst on 1000 triples of each row: 3.0 (rpow 0.99), else 2.1 (sinh).
+# The tolerance is a few roundings. Worst on 1000 triples of each row: 3.0 (rpow 0.99), otherwise 2.1 (sinh).
 FIRST_ULPS = 4.0
 # Worst on 1000 triples of each row but those below: 4.3 (tanh).
 SECOND_ULPS = 6.0
-# Just beyond their closed form, with f'' still small about 0, these two subtract first differences
-# near 1 whose last digits weigh more. Worst on 1000 triples: 13.8 (atan), 12.7 (asinh).
+# Just beyond their closed form, with f'' still small about 0, these two subtract first differences near 1 whose last
+# digits have more weight. Worst on 1000 triples: 13.8 (atan), 12.7 (asinh).
 INFLECTED_ULPS = 16.0
 INFLECTED = frozenset({"atan", "asinh"})
-# Worst measured: 1.8; at amplitude 2.8, near the barrier, 5.8: there rounding (y+b)/2 shows.
+# Worst measured: 1.8; at amplitude 2.8, near the barrier, 5.8, because of the rounding of (y+b)/2.
 PENDULUM_ULPS = 7.0
 
-# Where the divided differences live, and their names but for those that are for near points alone.
+# The modules of the divided differences, and the names in them except those for near points alone.
 HOME, SHAPE = "arithmetic.divided_differences", re.compile(r"divdiff[12]_[a-z]+$")
 
 TRIPLES = 150
-# What a second difference over a spread of 1e-60 may lose, the digits of a double, and to spare.
+# The number of digits that a second difference over a spread of 1e-60 may lose, those of a double, and some more.
 DIGITS = 240
 COINCIDENT = 1e-60
 NUDGE = mpf(10) ** -30
@@ -56,11 +56,11 @@ class Row:
 
     @property
     def slug(self) -> str:
-        """Name of the test."""
+        """Return the name of the test."""
         return self.name if self.exponent is None else f"{self.name}_{self.exponent}"
 
     def helper(self, order: int) -> Callable[..., float]:
-        """The function under test."""
+        """Return the function under test."""
         function = getattr(vocabulary, f"divdiff{order}_{self.name}")
         if self.exponent is None:
             return function
@@ -190,7 +190,7 @@ def spreads(source: random.Random) -> Iterator[float]:
 
 
 def triples(row: Row, count: int = TRIPLES) -> Iterator[Points]:
-    """Points in any order, some coincident, whose gaps hold digits that the points have lost."""
+    """Draw points in any order, some coincident, whose gaps have digits that the points have lost."""
     source = random.Random(row.slug)
     for spread in spreads(source):
         y = source.choice(row.places)
@@ -216,14 +216,14 @@ def triples(row: Row, count: int = TRIPLES) -> Iterator[Points]:
 
 
 def true_first(row: Row, x: mpf, y: mpf) -> mpf:
-    """f[x,y] by its definition; by the derivative where even 240 digits do not suffice."""
+    """Return f[x,y] by its definition, or by the derivative if even 240 digits do not suffice."""
     if abs(y - x) < COINCIDENT:
         return row.slope((x + y) / 2)
     return (row.f(y) - row.f(x)) / (y - x)
 
 
 def true_second(row: Row, *points: mpf) -> mpf:
-    """f[x,y,w] by its definition; by the second derivative where even 240 digits do not suffice."""
+    """Return f[x,y,w] by its definition, or by the second derivative if even 240 digits do not suffice."""
     a, b, c = sorted(points)
     if c - a < COINCIDENT:
         return row.bend((a + b + c) / 3) / 2
@@ -231,7 +231,7 @@ def true_second(row: Row, *points: mpf) -> mpf:
 
 
 def ulps(actual: float, true: mpf, scale: mpf) -> float:
-    """The error in units in the last place of ``scale``."""
+    """Return the error in units in the last place of ``scale``."""
     return float(abs(mpf(actual) - true) / mpf(np.spacing(float(scale)))) if true != actual else 0.0
 
 
@@ -245,7 +245,7 @@ def sensitivity(difference: Callable[..., mpf], *points: mpf) -> mpf:
 
 
 def first_error(row: Row, points: Points) -> float:
-    """The error of f[x,y] in ulps of it and of what rounding of the points does to it."""
+    """Return the error of f[x,y] in ulps of it and of the effect of rounding the points."""
     x, y, _w, h, _h2 = points
     exact = mpf(y) - mpf(h), mpf(y)
     true = true_first(row, *exact)
@@ -254,9 +254,9 @@ def first_error(row: Row, points: Points) -> float:
 
 
 def second_error(row: Row, points: Points) -> float:
-    """The error of f[x,y,w] in ulps of it, of f''/2 nearby if that is larger, and of rounding.
+    """Return the error of f[x,y,w] in ulps of it, of f''/2 nearby if that is larger, and of rounding.
 
-    Points far apart are held to the first differences over the spread, if these are less.
+    For points far apart the scale is that of the first differences over the spread, if that is smaller.
     """
     _x, y, _w, h1, h2 = points
     exact = mpf(y) - mpf(h1), mpf(y), mpf(y) + mpf(h2)
@@ -280,7 +280,7 @@ def test_first_difference_keeps_its_digits(row: Row) -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 def test_second_difference_keeps_its_digits(row: Row) -> None:
-    """f[x,y,w] holds to a few ulps at any spread and in any order of the points."""
+    """f[x,y,w] is right to a few ulps at any spread and in any order of the points."""
     with mp.workdps(DIGITS):
         error, points = max((second_error(row, points), points) for points in triples(row))
     assert error <= row.second_ulps, f"{row.slug}2{points}: {error:.1f} ulps"
@@ -288,7 +288,7 @@ def test_second_difference_keeps_its_digits(row: Row) -> None:
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 def test_coincident_points_give_derivatives(row: Row) -> None:
-    """f[x,x] = f'(x) and f[x,x,x] = f''(x)/2."""
+    """f[x,x] is f'(x), and f[x,x,x] is f''(x)/2."""
     for x in row.places:
         points = (x, x, x, 0.0, 0.0)
         with mp.workdps(DIGITS):
@@ -314,7 +314,7 @@ def test_order_of_points_does_not_matter(row: Row, spread: float) -> None:
 @pytest.mark.parametrize("amplitude", [1e-8, 1e-3, 0.3, 1.0, 2.0, 2.8])
 @pytest.mark.parametrize("turned", [False, True], ids=["about_0", "about_half_pi"])
 def test_pendulum_factorises(amplitude: float, turned: bool) -> None:
-    """cos[-b,y,b] = -sinc((y+b)/2) sinc((b-y)/2)/2: the pendulum's turning points divide out."""
+    """cos[-b,y,b] is -sinc((y+b)/2) sinc((b-y)/2)/2, so that the pendulum's turning points divide out."""
     bottom = math.pi / 2 if turned else 0.0
     for share in np.linspace(0.0, 1.0, 41):
         left, right = float(2 * amplitude * share), float(2 * amplitude * (1 - share))
@@ -340,7 +340,7 @@ def test_pendulum_factorises(amplitude: float, turned: bool) -> None:
     ],
 )
 def test_absolute_value(points: tuple[float, float, float], first: float, second: float) -> None:
-    """|u| has differences by its kink alone."""
+    """The second difference of |u| differs from zero only because of the kink."""
     x, y, w = points
     assert vocabulary.divdiff1_abs(x, y, y - x) == first
     assert vocabulary.divdiff2_abs(x, y, w, y - x, w - y) == pytest.approx(second, rel=1e-15, abs=0.0)
@@ -355,6 +355,6 @@ def test_every_function_has_both_orders() -> None:
 
 @pytest.mark.parametrize("name", ["log", "atanh", "acosh"])
 def test_pole_gives_infinity(name: str) -> None:
-    """At the end of a domain the slope is infinite, and nothing raises."""
+    """At the end of a domain the slope is infinite, and no error is raised."""
     end = {"log": 0.0}.get(name, 1.0)
     assert math.isinf(getattr(vocabulary, f"divdiff1_{name}")(end, end, 0.0))

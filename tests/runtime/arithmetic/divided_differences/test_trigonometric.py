@@ -1,4 +1,4 @@
-"""The parts into which sweeps split sines and cosines about the middle of an orbit, against mpmath."""
+"""The parts into which sweeps split sines and cosines about the middle of an orbit agree with mpmath."""
 
 import math
 import random
@@ -6,29 +6,29 @@ import random
 from mpmath import mp, mpf
 
 from gqm_sym.runtime.arithmetic.divided_differences.trigonometric import (
-    WIDE,
+    MAX_WAVE_SPAN,
     divdiff1_cos_in_square,
     divdiff1_sinc_in_square,
     sinc_near,
 )
 
-# Absolute: at most 1/2, 1/6 and 1 in size. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
+# The absolute tolerances of values up to 1/2, 1/6 and 1. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
 EVEN, ODD, SINC = 1.5e-16, 8e-17, 3e-16
 
 
 def pairs(count: int) -> list[tuple[float, float]]:
-    """Gaps to both ends of orbits of all sizes."""
+    """Draw gaps to both ends of orbits of all sizes."""
     draw = random.Random(4)
     found = []
     for _ in range(count):
-        h = min(10.0 ** draw.uniform(-8.0, math.log10(WIDE)), 0.999 * WIDE)
+        h = min(10.0 ** draw.uniform(-8.0, math.log10(MAX_WAVE_SPAN)), 0.999 * MAX_WAVE_SPAN)
         share = draw.choice((draw.random(), 10.0 ** -draw.uniform(0.0, 12.0)))
         found.append((2.0 * h * share, 2.0 * h * (1.0 - share)))
     return found
 
 
 def test_second_differences_about_the_middle() -> None:
-    """Cos and sin over -h, v, h, from the gaps alone."""
+    """Second differences of cos and sin over -h, v, h are right from the gaps alone."""
     for h1, h2 in pairs(2000):
         with mp.workdps(80):
             h, v = (mpf(h1) + mpf(h2)) / 2, (mpf(h1) - mpf(h2)) / 2
@@ -39,10 +39,13 @@ def test_second_differences_about_the_middle() -> None:
             assert abs(sinc_near(float(h)) - mp.sinc(mpf(float(h)))) <= SINC
 
 
-def test_beyond_it_says_so() -> None:
+def test_wider_than_a_turn_it_is_nan() -> None:
     """An orbit wider than a turn has no such form, and the result is NaN."""
-    assert math.isnan(divdiff1_cos_in_square(WIDE, 1.001 * WIDE))
+    assert math.isnan(divdiff1_cos_in_square(MAX_WAVE_SPAN, 1.001 * MAX_WAVE_SPAN))
     with mp.workdps(40):
-        h, v = (mpf(WIDE) + mpf(0.999 * WIDE)) / 2, (mpf(WIDE) - mpf(0.999 * WIDE)) / 2
+        h, v = (
+            (mpf(MAX_WAVE_SPAN) + mpf(0.999 * MAX_WAVE_SPAN)) / 2,
+            (mpf(MAX_WAVE_SPAN) - mpf(0.999 * MAX_WAVE_SPAN)) / 2,
+        )
         truth = (mp.cos(v) - mp.cos(h)) / (v**2 - h**2)
-        assert abs(divdiff1_cos_in_square(WIDE, 0.999 * WIDE) - truth) <= EVEN
+        assert abs(divdiff1_cos_in_square(MAX_WAVE_SPAN, 0.999 * MAX_WAVE_SPAN) - truth) <= EVEN

@@ -1,4 +1,4 @@
-"""Half periods along charts in double-double arithmetic against closed forms, formulas, and extended precision."""
+"""Half periods along charts in double-double arithmetic agree with closed forms, formulas, and extended precision."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,26 +13,26 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
-from gqm_sym.runtime.double_double.orbit_time import Bounded
+from gqm_sym.runtime.double_double.orbit_time import BoundedNumber
 from gqm_sym.runtime.launch.formulas import _chart_with
 from gqm_sym.runtime.motion import timing
 
 G = "9.81"
 DIGITS = 50
 
-# A double-double number has some 31 digits; a sum over many pieces fewer.
+# A double-double number has some 31 digits, and a sum over many pieces has fewer.
 USEFUL_ERROR = 1e-23
 
 
 def passage(motion: Any) -> ChartPassage:
-    """The orbit of a motion along a chart, found in double-double arithmetic."""
+    """Return the orbit of a motion along a chart, found in double-double arithmetic."""
     found = timing.passage_of(motion.problem, motion.kind, motion.direction, motion._offsets)
     assert found is not None
     return found
 
 
 def holds(motion: Any, truth: mpf) -> None:
-    """The duration is within its bound, and rounded correctly."""
+    """Return whether the duration is within its bound, and rounded correctly."""
     orbit = passage(motion).orbit
     assert orbit is not None
     duration = orbit.duration
@@ -43,7 +43,7 @@ def holds(motion: Any, truth: mpf) -> None:
 
 @pytest.fixture(scope="module")
 def module_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ModuleType]:
-    """A function that makes a module for motion under gravity along a curve."""
+    """Return a function that makes a module for motion under gravity along a curve."""
     folder: Path = tmp_path_factory.mktemp("passage")
     made: dict[str, ModuleType] = {}
 
@@ -57,12 +57,12 @@ def module_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Module
 
 @pytest.fixture(scope="module")
 def ring(module_for: Callable[..., ModuleType]) -> ModuleType:
-    """A pendulum's circle as x**2 + z**2 = 1, arc length from its lowest point."""
+    """Return a pendulum's circle as x**2 + z**2 = 1, with arc length from its lowest point."""
     return module_for(gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, "-1"), tangent=-1), "true_ring")
 
 
 def pendulum(angle: Any, speed: Any) -> mpf:
-    """Half period, or time of a round, of a pendulum of length 1 by Legendre's integral."""
+    """Return the half period, or the time of a round, of a pendulum of length 1 by Legendre's integral."""
     g = mpf(G)
     k2 = (mpf(speed) ** 2 + 4 * g * mp.sin(mpf(angle) / 2) ** 2) / (4 * g)
     return 2 * mp.ellipk(k2) / mp.sqrt(g) if k2 < 1 else 2 * mp.ellipk(1 / k2) / mp.sqrt(g * k2)
@@ -91,13 +91,13 @@ def test_a_launch_by_coordinates(ring: ModuleType) -> None:
         assert orbit is not None
         top = 2 * mp.asin(mp.sqrt(mp.sin(angle / 2) ** 2 + mpf(1) / 16 / mpf(G)))
         for bounded, truth in ((orbit.low, -top), (orbit.high, top)):
-            assert isinstance(bounded, Bounded)
+            assert isinstance(bounded, BoundedNumber)
             assert abs(mpf(bounded.high) + mpf(bounded.low) - truth) <= bounded.error <= 1e-26
         assert motion.turning_points == (float(top), float(-top))
 
 
 def test_times_on_the_way(ring: ModuleType) -> None:
-    """The time from the lower turning point to any phase angle, and to the launch, by elliptic integrals."""
+    """The times from the lower turning point to any phase angle, and to the launch, agree with elliptic integrals."""
     with mp.workdps(DIGITS):
         motion = ring.solve(lam0=0.25, v0=2.0)
         found = passage(motion)
@@ -133,13 +133,13 @@ def test_two_planes(height: float, side: int, module_for: Callable[..., ModuleTy
 @given(angle=st.floats(1e-2, 1.4))
 @settings(max_examples=25, deadline=None)
 def test_an_arc_between_lines(angle: float, module_for: Callable[..., ModuleType]) -> None:
-    """On an arc of a rail a body swings as a pendulum does; from the line beside it, it takes as much longer."""
+    """On an arc of a rail a body swings as a pendulum; the line beside it adds the time that the closed form gives."""
     rail = [gqm.line(length=2), gqm.arc(radius=1, angle="pi"), gqm.line(length=2)]
     module = module_for(gqm.Curve.piecewise(rail, start=(-1, 2), heading="-pi/2"), "true_rail")
     with mp.workdps(DIGITS):
         g, lam0 = mpf(G), float(2 + mp.pi / 2 - mpf(angle))
         holds(module.solve(lam0=lam0), pendulum(2 + mp.pi / 2 - mpf(lam0), 0))
-        height = mpf(angle)  # above the arc's ends
+        height = mpf(angle)  # above the ends of the arc
         on_line = module.solve(lam0=float(2 - height))
         w = 2 * g * (2 - mpf(float(2 - height)))
         k2 = (w + 2 * g) / (4 * g)
@@ -161,12 +161,12 @@ def test_a_spline(launch: dict[str, float], module_for: Callable[..., ModuleType
     assert found.offsets == pytest.approx(exact.offsets, rel=1e-14)
     assert found.edge_times is not None
     assert exact.edge_times is not None
-    # The edges of panels are doubles, and stand for places that differ by the chart's rounding.
+    # The edges of panels are doubles, so that places differ by the chart's rounding.
     assert np.abs(found.edge_times[0] - exact.edge_times[0]).max() <= 1e-15
 
 
 def test_a_curve_of_many_pieces(module_for: Callable[..., ModuleType]) -> None:
-    """A passage over more pieces than mpmath is asked for has the half period that the same curve has as a graph."""
+    """A passage over more pieces than mpmath would integrate has the half period of the same curve as a graph."""
     text = "x**2/200 + sin(9*x)/90"
     graph = module_for(gqm.Curve.graph(text, parameter="x"), "true_waves")
     implicit = module_for(gqm.Curve.implicit(f"z - ({text})", start=(0, 0)), "true_waves_implicit")
@@ -198,7 +198,7 @@ def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -
     alone = [module.solve(*launch[:1], g=launch[1], m=launch[2]).half_period for launch in zip(lam0, g, m, strict=True)]
     assert (np.abs(swept.values - alone) <= 2.0 * 2.0**-52 * np.array(alone)).all()
     assert _chart_with.cache_info().misses == before + 1
-    # Two shapes are two charts.
+    # Two shapes have two charts.
     half = module.sweep("half_period", np.repeat([0.5, 1.0], 20), g=g, R=np.repeat([0.5, 1.0], 20)).values
     assert half[:20] * np.sqrt(g[:20]) == pytest.approx(half[0] * np.sqrt(g[0]), rel=2e-15)
     assert half[20:] * np.sqrt(g[20:]) == pytest.approx(half[0] * np.sqrt(2 * g[0]), rel=2e-15)
@@ -222,12 +222,14 @@ def test_the_bound_along_a_track_of_scattered_points(
 
 @pytest.mark.parametrize("g", [0.4, 1.62, 9.81])
 def test_swings_too_small_for_doubles_along_a_chart(g: float, ring: ModuleType) -> None:
-    """Doubles have the bottom 1e-16 off, and the bound did not say so where no extended precision was asked."""
+    """In doubles the bottom has an error of 1e-16, which the bound did not include if no extended precision was
+    requested.
+    """
     for lam0 in np.geomspace(1e-8, 1e-6, 41).tolist():
         motion = ring.solve(lam0, g=g)
         state = motion.state(1.0)
         with mp.workdps(40):
-            # To the third order in the amplitude.
+            # The reference is right to the third order in the amplitude.
             size, omega = mpf(lam0), mp.sqrt(mpf(g))
             place = size * mp.cos(omega * (1 - size**2 / 16)) + size**3 / 192 * (mp.cos(omega) - mp.cos(3 * omega))
             assert abs(state.lam - place) <= state.error + size**5

@@ -1,4 +1,4 @@
-"""Rails in space against helices, a 30-digit solution of the frame's equations, planar rails and pendulums."""
+"""Rails in space agree with helices, a 30-digit solution of the frame's equations, planar rails and pendulums."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,8 @@ import gqm_sym as gqm
 from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, ParameterError
 from gqm_sym.specfile import read_spec
 
-# Roundings of coordinates, as a share of the largest; half periods of closed rails, in units in the last place.
+# The tolerances: roundings of coordinates, as a share of the largest, and half periods of closed rails, in units in the
+# last place.
 ROUNDING = 4e-16
 MAX_ULPS = 2.0
 
@@ -24,12 +25,12 @@ START, ANGLES = (1, 2, 3), ("1/2", "1/4", "1/3")
 
 
 def polynomial(coefficients: tuple[str, ...]) -> str:
-    """The text of a polynomial in s."""
+    """Return the text of a polynomial in s."""
     return " + ".join(f"({value})*s**{power}" for power, value in enumerate(coefficients))
 
 
 def frame_truth(places: list[Any]) -> list[Any]:
-    """Coordinates and the frame on a transition, from the equations of that."""
+    """Return coordinates and the frame on a transition, from the equations of the frame."""
     heading, climb, roll = mpf(1) / 2, mpf(1) / 4, mpf(1) / 3
     ahead = mp.matrix([mp.cos(climb) * mp.cos(heading), mp.cos(climb) * mp.sin(heading), mp.sin(climb)])
     level = mp.matrix([-mp.sin(heading), mp.cos(heading), 0])
@@ -52,7 +53,7 @@ def frame_truth(places: list[Any]) -> list[Any]:
 
 
 def test_transition(tmp_path: Path) -> None:
-    """Rates of degree 5: coordinates, tangents and the lean are those of the frame's equations in 25 digits."""
+    """With rates of degree 5, coordinates, tangents and the roll are those of the frame's equations in 25 digits."""
     rates = {"yaw": polynomial(YAW), "pitch": polynomial(PITCH), "roll": polynomial(ROLL)}
     module = built(tmp_path, "bent", [gqm.transition(length=3, **rates)], start=START, heading=ANGLES, roll="pieces")
     chart = chart_of(module)
@@ -72,7 +73,7 @@ def test_transition(tmp_path: Path) -> None:
 
 
 def test_helix(tmp_path: Path) -> None:
-    """Constant curvature and torsion are a helix, many turns long."""
+    """Constant curvature and torsion give a helix, many turns long."""
     radius, rise = 2.0, 0.75
     square = radius**2 + rise**2
     rates = {"yaw": "R/(R**2 + c**2)", "roll": "-c/(R**2 + c**2)"}
@@ -102,7 +103,7 @@ def test_loads_on_riders(tmp_path: Path) -> None:
 
 
 def test_a_loop_has_no_level(tmp_path: Path) -> None:
-    """Where the tangent is vertical there is no angle that the frame leans by; steep climbs have one."""
+    """Where the tangent is vertical the frame has no roll angle; on steep climbs it has one."""
     loop = gqm.transition(length=8, pitch="1/2")
     module = built(tmp_path, "loop", [gqm.line(length=1), loop], start=(0, 0, 0), roll="pieces")
     with pytest.raises(DeclarationError, match=r"piece 2 \(transition\): its tangent is vertical"):
@@ -116,8 +117,8 @@ def test_a_loop_has_no_level(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("radius", "amplitude"), [(1, 1.25), (5, 2.0), (2, 0.125)])
-def test_tilted_circle(tmp_path: Path, radius: float, amplitude: float) -> None:
-    """A circle that leans by 30 degrees closes, and is a pendulum under half of gravity."""
+def test_a_tilted_circle(tmp_path: Path, radius: float, amplitude: float) -> None:
+    """A circle tilted by 30 degrees closes, and is a pendulum under half of gravity."""
     ring = [gqm.transition(length="2*pi*R", yaw="1/R")]
     module = built(tmp_path, "ring", ring, closed=True, heading=(0, 0, "pi/6"))
     launch = radius * (np.pi - amplitude)
@@ -144,7 +145,9 @@ def test_planar_rail_is_the_case_without_y(tmp_path: Path) -> None:
 
 
 def test_curves_with_formulas(tmp_path: Path) -> None:
-    """A helix by its formulas, and one by rates that goes on from it, are one helix; where they do not meet is said."""
+    """A helix by its formulas and its continuation by rates are one helix; if they do not meet, the message says
+    where.
+    """
     helix = gqm.families.helix(R=2, c="3/4", domain=(0, 3))
     rest = gqm.transition(length=5, yaw="2/(4 + 9/16)", roll="-3/4/(4 + 9/16)")
     module = built(tmp_path, "joined", [helix, rest])
@@ -160,7 +163,7 @@ def test_curves_with_formulas(tmp_path: Path) -> None:
 
 
 def test_in_a_curve_file(tmp_path: Path) -> None:
-    """A transition is a piece of a curve file, with three coordinates and angles at the start."""
+    """A transition may be a piece in a curve file, with three coordinates and angles at the start."""
     file = tmp_path / "rail.yaml"
     file.write_text(
         "name: rail\ncurve:\n  pieces:\n    pieces:\n    - line: {length: 2}\n"
@@ -212,7 +215,7 @@ def test_refused(kind: type[GQMError], declare: Any, message: str) -> None:
 
 
 def test_refused_when_made(tmp_path: Path) -> None:
-    """Lengths that are not positive, turns without end, and rails that do not close are told when they are known."""
+    """Lengths that are not positive, turns without end, and rails that do not close are refused when they are known."""
     pieces = [gqm.transition(length="a", pitch="q"), gqm.arc(radius="R", angle="b"), LINE]
     module = built(tmp_path, "bad", pieces, closed=True)
     good = {"a": 1, "q": 0.1, "R": 2, "b": 1}

@@ -1,4 +1,6 @@
-"""Small motions about an equilibrium that is not at 0, against the same about one that is; on a chart, by formulas."""
+"""Small motions about an equilibrium away from 0 agree with those about one at 0, and on a chart with those on
+formulas.
+"""
 
 import math
 import random
@@ -19,7 +21,7 @@ LAWS = {
     "viscous": gqm.Gravity() + gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"}),
     "drag": gqm.Gravity() + gqm.QuadraticDrag(b="1/10"),
 }
-# Each shape with its equilibrium at 0, and elsewhere.
+# A row has a shape with its equilibrium at 0, and the same elsewhere.
 SHAPES: dict[str, tuple[Any, Any, str]] = {
     "pendulum": (
         gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"),
@@ -37,14 +39,14 @@ SHAPES: dict[str, tuple[Any, Any, str]] = {
         "1",
     ),
 }
-# Relative error of the times of turns; worst measured: 1.4e-15, of the viscous law.
+# The relative tolerance of times of turns. Worst measured: 1.4e-15 (viscous law).
 TURN_TIMES = 2e-15
 Pairs = Callable[[str, str], tuple[ModuleType, ModuleType]]
 
 
 @pytest.fixture(scope="module")
 def pairs(tmp_path_factory: pytest.TempPathFactory) -> Pairs:
-    """The modules of a shape with a law, built once."""
+    """Return the modules of a shape with a law, built once."""
     folder: Path = tmp_path_factory.mktemp("frames")
     built: dict[tuple[str, str], tuple[ModuleType, ModuleType]] = {}
 
@@ -64,7 +66,9 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Pairs:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/2", "-1e-3", "1e-5", "-1e-9", "1e-13"])
 def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: Pairs) -> None:
-    """Places lie within the sum of the bounds, also at late times, and speeds and turns do accordingly."""
+    """Places of both swings agree within the sum of the bounds, also at late times; speeds and turns agree
+    accordingly.
+    """
     centred, elsewhere = pairs(shape, law)
     e = SHAPES[shape][2]
     true, motion = centred.solve(lam0), elsewhere.solve(f"{lam0} + ({e})")
@@ -84,7 +88,8 @@ def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: P
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/10", "-1e-3", "1e-6", "-1e-9", "1e-13", "-1e-16", "1e-19"])
 def test_a_body_departs_from_any_hilltop_alike(lam0: str, law: str, pairs: Pairs) -> None:
-    """However near it is launched: none could be followed from 1e-9, bounds failed at 1e-6, from 1e-20 it fell wrongly.
+    """A body launched however near to a hilltop departs in the right way: from 1e-9 none could be followed, bounds
+    failed at 1e-6, and from 1e-20 it fell wrongly.
 
     The curves run in opposite directions.
     """
@@ -102,7 +107,8 @@ def test_a_body_departs_from_any_hilltop_alike(lam0: str, law: str, pairs: Pairs
 
 
 def test_rest_on_a_hilltop(pairs: Pairs) -> None:
-    """By exact text a body stays on it, from the double next to it it falls, and what is nearer than that is refused.
+    """A body launched on a hilltop by exact text stays, from the double next to it it falls, and what is nearer is
+    refused.
 
     All of these were refused with "could not be followed".
     """
@@ -120,7 +126,9 @@ def test_rest_on_a_hilltop(pairs: Pairs) -> None:
 
 @pytest.mark.parametrize("where", [0, 1])
 def test_a_swing_that_has_died_away_stays(where: int, pairs: Pairs) -> None:
-    """At the equilibrium, within the bound: V**2 leaves the range of doubles, or the place has no digits."""
+    """A swing that has died away stays at the equilibrium within the bound, where V**2 or the place has no digits
+    left.
+    """
     motion = pairs("pendulum", "viscous")[where].solve("1/2 - pi/2" if where else "1/2")
     assert motion.t_end == math.inf
     late = motion.state([30.0, 2000.0, 1e9])
@@ -134,7 +142,7 @@ def test_a_swing_that_has_died_away_stays(where: int, pairs: Pairs) -> None:
 
 @pytest.mark.parametrize("exponent", [9, 15, 16, 17, 20, 30])
 def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """About 1 the half period is that of small oscillations, also where both turning points are the same double."""
+    """About 1 the half period is that of small oscillations, also if both turning points are the same double."""
     curve = gqm.Curve.graph("(x - 1)**2/2 + (x - 1)**3/10", parameter="x")
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="bowl", folder=tmp_path_factory.getbasetemp() / "bowl")
     motion = module.solve(f"1 + 1e-{exponent}")
@@ -145,12 +153,14 @@ def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.Te
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("exponent", [100, 115, 117, 140, 150])
 def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, law: str, pairs: Pairs) -> None:
-    """It is a number, and holds: below 1e-110 a body is known to stay within its swing (it was NaN below 1e-116)."""
+    """The bound is a number and holds: below 1e-110 a body is known to stay within its swing (the bound was NaN below
+    1e-116).
+    """
     lam0, t = 10.0**-exponent, np.array([0.0, 0.1, 1.0, 3.0, 20.0])
     motion, larger = (pairs("pendulum", law)[0].solve(start, t_max=40) for start in (f"1e-{exponent}", "1e-60"))
     bounds = np.asarray(motion.error_bound(t))
     assert np.all((bounds > 0.0) & (bounds <= 2.5 * lam0))
-    # Such small swings are proportional to each other, but for what drag takes of the larger one.
+    # Such small swings are proportional to each other, except for the drag on the larger one.
     ratio = 1e60 * lam0
     allowed = bounds + ratio * np.asarray(larger.error_bound(t)) + 1e-15 * lam0
     assert np.all(np.abs(np.asarray(motion.lam(t)) - ratio * np.asarray(larger.lam(t))) <= allowed)
@@ -158,14 +168,14 @@ def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, 
 
 @pytest.fixture(scope="module")
 def repelled(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A level line that a spring pushes a body from, with viscous resistance."""
+    """Return a level line on which a spring repels a body, with viscous resistance."""
     level = gqm.Curve.graph("0*x", parameter="x", domain=(None, None))
     force = gqm.Potential("-k*(x - h)**2/2") + LAWS["viscous"]
     return gqm.build(gqm.derive(level, force), name="repelled", folder=tmp_path_factory.mktemp("repelled"))
 
 
 def assert_departs(module: ModuleType, launch: dict[str, Any], useful: float) -> None:
-    """Two exponentials, from launch until the body is far from the hilltop."""
+    """Check that places are the sum of two exponentials, from launch until the body is far from the hilltop."""
     motion, sense = module.solve(**launch), launch.get("direction", 1)
     with mp.workdps(40):
         h, k, c = (mpf(launch[name]) for name in ("h", "k", "c"))
@@ -185,34 +195,36 @@ def assert_departs(module: ModuleType, launch: dict[str, Any], useful: float) ->
 def test_the_rounding_of_the_force_on_a_hilltop_is_charged(
     h: float, away: float, k: float, c: float, repelled: ModuleType
 ) -> None:
-    """The force is a difference of a place and the hilltop, and places lay up to 2.2 bounds away."""
+    """The bound includes the rounding of the force, a difference of the place and the hilltop (places were up to 2.2
+    bounds off).
+    """
     assert_departs(repelled, {"lam0": h + away, "h": h, "k": k, "c": c}, 1e-9)
 
 
 @pytest.mark.parametrize(
     ("lam0", "v0", "direction", "h", "k", "c"),
     [
-        # It turned below the noise of V**2, and was taken to stay there: bounds were NaN.
+        # The body turned below the noise of V**2, and was taken to stay there: bounds were NaN.
         ("-0.0867479117080234", 0.00015122745205837793, -1, -0.08680920764520268, 6.0869, 0.00198),
         ("-10.76013231434322748237478", 4.243898578878686e-17, 1, -10.760132314343227, 78.776, 0.0878),
-        # It turned within the last digit of the hilltop, and was taken to stay there, with a bound of 1e-17.
+        # The body turned within the last digit of the hilltop, and was taken to stay there, with a bound of 1e-17.
         ("0.02417403986204569313377977", 2.931476132824515e-20, -1, 0.024174039862045693, 1.0811, 4.7809),
         ("60.49656240641458281075578", 7.68221402805137e-17, 1, 60.49656240641458, 32.388, 9.0299),
-        # The rounding of the force was charged after the turn only.
+        # The rounding of the force was included after the turn only.
         ("-41.710671021825114", 8.332599366366813e-06, -1, -41.71069236634652, 0.1524, 0.005118386811700331),
     ],
 )
 def test_a_body_that_nearly_reaches_a_hilltop(
     lam0: str, v0: float, direction: int, h: float, k: float, c: float, repelled: ModuleType
 ) -> None:
-    """Slowed down by the hill it turns, however near to the top, and departs."""
+    """A body slowed down by the hill turns, however near to the top, and departs."""
     start = {"lam0": lam0 if len(lam0) > 24 else float(lam0), "v0": v0, "direction": direction}
     assert_departs(repelled, {**start, "h": h, "k": k, "c": c}, 1e-5)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_random_launches_next_to_a_hilltop(seed: int, repelled: ModuleType) -> None:
-    """Bounds hold and are never NaN, at rest or just not fast enough for the top."""
+    """Bounds hold and are never NaN, for launches at rest or slightly too slow for the top."""
     draw = random.Random(seed)
     h, k, c = draw.choice((1, -1)) * 10 ** draw.uniform(-2, 2), 10 ** draw.uniform(-1, 2), 10 ** draw.uniform(-3, 1)
     lam0 = h + draw.choice((1, -1)) * 10 ** draw.uniform(-12, -3) * abs(h)
@@ -223,14 +235,14 @@ def test_random_launches_next_to_a_hilltop(seed: int, repelled: ModuleType) -> N
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A ring without formulas, whose chart begins and ends at its lowest point, with a viscous law."""
+    """Return a ring without formulas, whose chart begins and ends at its lowest point, with a viscous law."""
     model = gqm.derive(gqm.Curve.implicit("x**2 + (z - 1)**2 - 1", start=(0, 0)), LAWS["viscous"])
     return gqm.build(model, name="viscous_ring", folder=tmp_path_factory.mktemp("ring"))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_small_swings_where_a_chart_begins(seed: int, ring: ModuleType) -> None:
-    """Down to a picometre the body swings like a damped spring: a swing in five was refused, or ended on its way."""
+    """Down to a picometre the body swings like a damped spring (one swing in five was refused, or ended on its way)."""
     draw = random.Random(seed)
     lam0, c = draw.choice((1, -1)) * 10 ** draw.uniform(-12, -4), 10 ** draw.uniform(-3, 0.5)
     motion = ring.solve(lam0, c=c)

@@ -1,4 +1,4 @@
-"""Forces that take energy away on curves with joints: stitched planes against closed forms, and rails."""
+"""Motions with losses on curves with joints agree with closed forms on stitched planes, and are followed on rails."""
 
 import math
 from itertools import pairwise
@@ -19,7 +19,7 @@ TRACKS: dict[str, list[Any]] = {
     "level": [(0, 2), (2, 0), (3, 0), (4, 3)],
 }
 LAUNCHES = 16
-# Of times, against the whole; of places.
+# The tolerances of times, relative to the whole, and of places.
 TIMES, PLACES = 1e-13, 2e-13
 CORNER = math.sqrt(2.0)
 Long = np.longdouble
@@ -27,7 +27,7 @@ Long = np.longdouble
 
 @pytest.fixture(scope="module", params=TRACKS)
 def track(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[ModuleType, Any]:
-    """A module for planes with friction and drag, and their points."""
+    """Return a module for planes with friction and drag, and their points."""
     points = TRACKS[request.param]
     force = gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag()
     model = gqm.derive(gqm.Curve.sampled(points, kind="linear"), force)
@@ -35,10 +35,10 @@ def track(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 def slide(points: Any, lam0: float, v0: float, way: int, mu: float) -> tuple[Any, str]:
-    """Motion with friction alone: rows of time, place, speed, acceleration and direction; and what ends it.
+    """Return rows of time, place, speed, acceleration and direction of a motion with friction alone, and what ends it.
 
     On each plane the acceleration is constant, and at corners the speed is kept. Offsets from both ends of the plane
-    are kept, for a body comes to rest on a corner.
+    are kept, because a body may come to rest on a corner.
     """
     steps = [(Long(b[0] - a[0]), Long(b[1] - a[1])) for a, b in pairwise(points)]
     lengths = [np.sqrt(x * x + z * z) for x, z in steps]
@@ -75,7 +75,7 @@ def slide(points: Any, lam0: float, v0: float, way: int, mu: float) -> tuple[Any
 
 
 def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
-    """Random launches come to rest, on planes and on corners, when and where closed forms say."""
+    """Random launches come to rest, on planes and on corners, at the times and places of closed forms."""
     module, points = track
     rng = np.random.default_rng(7)
     high = sum(math.dist(a, b) for a, b in pairwise(points))
@@ -97,7 +97,9 @@ def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
 
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_drag_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
-    """Random launches with drag are followed, and energy is only lost; with friction as well to their end."""
+    """Random launches with drag are followed and only lose energy; with friction as well they are followed to their
+    end.
+    """
     module, points = track
     rng = np.random.default_rng(11)
     high = sum(math.dist(a, b) for a, b in pairwise(points))
@@ -115,7 +117,9 @@ def test_drag_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
 
 
 def test_rest_on_a_corner(tmp_path: Path) -> None:
-    """Between planes that rise both ways a body stays, whatever the friction; from a ridge it leaves as asked."""
+    """Between planes that rise on both sides a body stays, whatever the friction; it leaves a ridge in the requested
+    direction.
+    """
     curve = gqm.Curve.sampled([(0, 1), (1, 0), (2, 1), (3, 0)], kind="linear")
     rough = gqm.build(gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction()), name="rough", folder=tmp_path)
     smooth = gqm.build(gqm.derive(curve, gqm.Gravity()), name="smooth", folder=tmp_path)

@@ -1,4 +1,4 @@
-"""Polynomials on a panel: their tables against exact integrals, and changes of sign that are never missed."""
+"""Tables of polynomials on a panel agree with exact integrals, and no change of sign is missed."""
 
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from numpy.polynomial import chebyshev, legendre
 
 import generated.cubic_coulomb as cubic_coulomb
-from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
+from gqm_sym.runtime.compiled.registers import LANES, borrowed, copied, on_stack, over_rows
 from gqm_sym.runtime.legs import driver
 from gqm_sym.runtime.legs.leg_reading import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 from gqm_sym.runtime.legs.panels.polynomials import (
@@ -28,13 +28,15 @@ from gqm_sym.runtime.legs.panels.polynomials import (
 )
 from gqm_sym.runtime.legs.panels.resolution import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
 
-# Roundings of as many products, of size 1.
+# The tolerance is the rounding of as many products of size 1.
 TABLE = 1e-15
 NOISE = 1e-15
 
 
 def test_tables() -> None:
-    """Means of every power up to the degree, from the panel's start to each node; and coefficients."""
+    """The means of every power up to the degree, from the panel's start to each node, and the coefficients are
+    right.
+    """
     stops = np.append(SHARES, 1.0)
     with mp.workdps(30):
         exact = [mp.sin(mp.pi * (j + mpf("0.5")) / (2 * COUNT)) ** 2 for j in range(COUNT)]
@@ -50,7 +52,9 @@ def test_tables() -> None:
 
 
 def test_sums_in_registers() -> None:
-    """Products with the tables, and the span of a panel's values, are those of numpy, wherever in an array they lie."""
+    """Products with the tables, and the extent of a panel's values, are those of numpy, wherever in an array they
+    lie.
+    """
     values = np.random.default_rng(3).normal(size=3 * WIDE)
     out = np.zeros(2 * WIDE)
     _sums(values, out)
@@ -71,7 +75,7 @@ def _span(values):  # type: ignore[no-untyped-def]
 
 
 def test_integrals_in_legendre_polynomials() -> None:
-    """Powers from values at the nodes: the function, and its integral from the panel's start."""
+    """For powers, values at the nodes give the function and its integral from the panel's start."""
     x = 2.0 * SHARES - 1.0
     at = np.linspace(-1.0, 1.0, 7)
     for n in range(COUNT):
@@ -81,14 +85,14 @@ def test_integrals_in_legendre_polynomials() -> None:
 
 
 def _series(roots: list[float]) -> np.ndarray:
-    """Chebyshev coefficients of the polynomial with these roots, its largest one 1."""
+    """Return Chebyshev coefficients of the polynomial with these roots, the largest of which is 1."""
     c = chebyshev.chebfromroots(roots)
     return np.pad(c, (0, COUNT - len(c))) / np.abs(c).max()
 
 
 @given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=7))
 def test_the_first_root_is_found(roots: list[float]) -> None:
-    """Of roots well apart the first one inside is found; without one there is no change."""
+    """Of well separated roots the first one inside is found; without a root there is no change."""
     roots = sorted(roots)
     assume(min([b - a for a, b in pairwise(roots)], default=1.0) >= 1e-2)
     assume(all(abs(abs(root) - 1.0) >= 1e-6 for root in roots))
@@ -113,7 +117,7 @@ def test_close_roots_are_not_missed(gap: float) -> None:
 
 
 def test_zero_touched_is_no_change() -> None:
-    """A double root touches zero: no change, but reported; what is zero throughout has no sign."""
+    """At a double root there is no change, but it is reported; a function that is zero throughout has no sign."""
     x, before, touch = first_change(_series([0.3, 0.3]), 1, NOISE)
     assert (x, before) == (2.0, 1)
     assert touch == pytest.approx(0.3, abs=1e-6)
@@ -121,7 +125,7 @@ def test_zero_touched_is_no_change() -> None:
 
 
 def test_a_triple_root_is_a_change() -> None:
-    """Flat as it is there, the sign changes."""
+    """At a triple root the sign changes, although the function is flat there."""
     x, before, _ = first_change(_series([0.3, 0.3, 0.3]), 0, NOISE)
     assert before == -1
     assert x == pytest.approx(0.3, abs=2e-5)
@@ -145,7 +149,7 @@ def _in_registers(line, other, c):  # type: ignore[no-untyped-def]
     _weighed(line, 5, 40, WIDTH + 9, c)
     _root(line, 70, 5)
     room = _room()
-    _copy(room, 3, uncounted(line), 70)
+    _copy(room, 3, borrowed(line), 70)
     _copy(other, 1, room, 3)
 
 
@@ -166,14 +170,14 @@ def test_rows_in_registers() -> None:
 
 @pytest.mark.parametrize("worst", [1e-300, 3e-17, 4.1e-9, 0.02, 0.5, 1.0, 7.0, 1e5])
 def test_how_much_wider_a_panel_may_be(worst: float) -> None:
-    """A root to a few per cent, and never more than the most."""
+    """The estimated width is the root to a few per cent, and never more than the limit."""
     exact = min(SAFETY_FACTOR * worst ** (-1.0 / DEGREES) / DECREASE, MAX_GROWTH)
     assert growth(worst) == pytest.approx(exact, rel=0.065)
     assert growth(worst) <= MAX_GROWTH
 
 
 def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A leg of more panels than a record has room for is followed once more, to the same digits."""
+    """A leg of more panels than a record has room for is followed once more, with the same digits."""
     times = np.linspace(0.0, 3.0, 40)
     expected = cubic_coulomb.solve(-1.0, 6.2088).lam(times)
     monkeypatch.setattr(driver, "FEW_PANELS", 1)
@@ -182,13 +186,15 @@ def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("distance", [0.3, 1.0, 4.0])
 def test_how_far_a_panel_may_reach_toward_a_turn(distance: float) -> None:
-    """Toward a turn the pace of time is the inverse root of what is left: how wide the panel, and the next, may be.
+    """Towards a turn the time rate is the inverse root of the remaining distance, which limits this panel's width and
+    the next one's.
 
-    The estimate is made on a panel of width 1; by it coefficients fall as they should, to a tenth a degree.
+    The estimate is made on a panel of width 1; with the estimated width coefficients decrease as they should, to a
+    tenth for each degree.
     """
 
     def middle(width: float, gap: float) -> float:
-        """Coefficients in the middle on a panel from which a root is as far ahead of its end as ``gap``."""
+        """Return coefficients in the middle on a panel with a root at the distance ``gap`` beyond its end."""
         c = TO_COEFFICIENTS @ (1.0 / np.sqrt(gap + width * (1.0 - SHARES)))
         return float(np.abs(c[14:17]).max() / np.abs(c).max())
 

@@ -1,4 +1,4 @@
-"""Legs from turn to turn as one polynomial, against closed forms with 28 digits."""
+"""Legs from turn to turn as one polynomial agree with closed forms with 28 digits."""
 
 from functools import partial
 from itertools import pairwise
@@ -13,7 +13,7 @@ import generated.circle_coulomb
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS
 from gqm_sym.runtime.legs.runs import whole_leg
 
-# Tables are rounded numbers, and so are sums with them.
+# The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
 
 
@@ -22,7 +22,7 @@ def _power(n: int, phi: mpf) -> mpf:
 
 
 def test_tables() -> None:
-    """The tables are those of integrals of powers; V**2 = y**n - y**(n + 1) is one that vanishes at both turns."""
+    """The tables are those of integrals of powers; V**2 = y**n - y**(n + 1) vanishes at both turns."""
     y, k = SHARES, np.arange(1, whole_leg.TERMS)
     for n in range(1, 16):
         force = n * y ** (n - 1) - (n + 1) * y**n
@@ -50,7 +50,7 @@ class Pendulum:
         self.mu, self.g = mpf(mu), mpf("9.81")
 
     def v2(self, start: mpf) -> Any:
-        """V**2 on the leg from rest at an angle: W' = -2 g sin - k (W + g cos) with k = 2 mu v."""
+        """Return V**2 on the leg from rest at an angle, by W' = -2 g sin - k (W + g cos) with k = 2 mu v."""
         k = 2 * self.mu * (-1 if start > 0 else 1)
         b = -3 * k * self.g / (1 + k * k)
         a = 2 * self.g + k * b
@@ -58,7 +58,7 @@ class Pendulum:
         return lambda x: a * mp.cos(x) + b * mp.sin(x) + c * mp.exp(-k * x)
 
     def turns(self, start: float) -> list[mpf]:
-        """The launch and all turning points, by Newton's method on V**2 over the distance from the last one."""
+        """Return the launch and all turning points, by Newton's method on V**2 over the distance from the last one."""
         places = [mpf(start)]
         while abs(mp.tan(places[-1])) > self.mu:
             here, w = places[-1], self.v2(places[-1])
@@ -71,7 +71,7 @@ class Pendulum:
         return places
 
     def time(self, start: mpf, stop: mpf, x: mpf) -> mpf:
-        """The time from one turn to a place on the way to the next one, with the ends' roots substituted away."""
+        """Return the time from one turn to a place before the next, with the roots at both ends substituted away."""
         w, middle, half = self.v2(start), (start + stop) / 2, (stop - start) / 2
         phi = mp.acos(min(max((middle - x) / half, -1), 1))
         return mp.quad(
@@ -83,7 +83,9 @@ class Pendulum:
 
 @pytest.mark.parametrize(("start", "mu"), [(1.4, 0.05), (-0.8, 0.04), (0.03, 0.004), (1.1, 0.2)])
 def test_a_pendulum_with_friction(start: float, mu: float) -> None:
-    """Where it rests and when, the legs, and the places on the first and on the last of them."""
+    """The place and the time of rest, the legs, and places on the first and the last of them agree with the closed
+    form.
+    """
     module: ModuleType = generated.circle_coulomb
     swept = {
         q: float(module.sweep(q, [start], 0.0, mu=mu, mu_static=mu, L=1).values[0])

@@ -1,4 +1,4 @@
-"""Derivatives of motions with losses against closed forms in mpmath."""
+"""Derivatives of motions with losses agree with closed forms in mpmath."""
 
 from collections.abc import Callable, Mapping
 from types import ModuleType
@@ -17,12 +17,12 @@ Launch = Mapping[str, str]
 Build = Callable[..., ModuleType]
 STATES = ("lam", "s", "x", "z", "v", "normal_force")
 
-# The largest error of a derivative: relative to it, or to the largest one at any of the times.
+# The largest error of a derivative, relative to it or to the largest one at any of the times.
 TOLERANCE = 1e-13
 
 
 def derivative(truth: Callable[..., Any], launch: Launch, name: str, digits: int = 60) -> list[Any]:
-    """The derivatives of numbers that follow from a launch, by differences; at v0 = 0 for greater speeds."""
+    """Return the derivatives of numbers that follow from a launch, by differences; at v0 = 0 for greater speeds."""
     with mp.workdps(digits):
         at = {key: mpf(value) for key, value in launch.items()}
         step = mpf(10) ** (-digits // 3)
@@ -32,14 +32,16 @@ def derivative(truth: Callable[..., Any], launch: Launch, name: str, digits: int
 
 
 def assert_close(found: Any, wanted: Any, what: Any) -> None:
-    """All derivatives by one variable are right, as a share of the largest of them, or of 1 in SI units."""
+    """Check that all derivatives with respect to one variable are right, relative to the largest of them or to 1 in SI
+    units.
+    """
     wanted = np.array([float(value) for value in wanted])
     error = np.abs(np.asarray(found) - wanted).max()
     assert error <= TOLERANCE * max(np.abs(wanted).max(), 1.0), (what, error, wanted)
 
 
 def assert_states(motion: Any, times: Any, truth: Callable[..., Any], launch: Launch, fields: tuple[str, ...]) -> None:
-    """The derivatives of fields of states are those of ``truth(t, **launch)``, which gives these fields."""
+    """Check that derivatives of fields of states are those of ``truth(t, **launch)``, which gives these fields."""
     found = motion.sensitivity(times, list(launch))
     for k, name in enumerate(launch):
         rows = np.array([[float(d) for d in derivative(lambda **at: truth(mpf(t), **at), launch, name)] for t in times])  # noqa: B023
@@ -48,7 +50,7 @@ def assert_states(motion: Any, times: Any, truth: Callable[..., Any], launch: La
 
 
 class RoughSpring:
-    """A spring with dry friction: half swings about +-mu g/k, each ``(begin, centre, amplitude, phase)``."""
+    """A spring with dry friction, with half swings about +-mu g/k, each ``(begin, centre, amplitude, phase)``."""
 
     def __init__(self, lam0: mpf, v0: mpf, k: mpf, mu: mpf, g: mpf, direction: int = 1) -> None:
         self.rate, shift = mp.sqrt(k), mu * g / k
@@ -68,7 +70,7 @@ class RoughSpring:
         self.end = time
 
     def at(self, t: mpf) -> list[mpf]:
-        """Place and velocity."""
+        """Return place and velocity."""
         begin, centre, amplitude, phase = next(s for s in reversed(self.swings) if s[0] <= t)
         angle = self.rate * (t - begin) + phase
         return [centre + amplitude * mp.cos(angle), -amplitude * self.rate * mp.sin(angle)]
@@ -82,14 +84,14 @@ ROUGH = {"lam0": "0.3", "v0": "1.7", "k": "7", "mu": "0.05", "g": "9.81"}
     [({}, 1), ({}, -1), ({"v0": "1e-7"}, -1), ({"v0": "1e-6"}, 1), ({"v0": "0"}, 1), ({"v0": "0"}, -1)],
 )
 def test_a_spring_with_dry_friction(build: Build, changed: Launch, direction: int) -> None:
-    """States at any time, turning points, where the body comes to rest and when."""
+    """States at any time, turning points, the place of rest and its time have the right derivatives."""
     module = build("changing_spring", gqm.Curve.graph("0*x"), gqm.Potential("k*x**2/2") + gqm.CoulombFriction())
     launch = {**ROUGH, **changed}
     motion = module.solve(**launch, direction=direction)
     start = RoughSpring(**{k: mpf(v) for k, v in launch.items()}, direction=direction)
     times = float(start.end) * np.array([0.01, 0.05, 0.2, 0.37, 0.55, 0.77, 0.93, 0.9999])
     assert_states(motion, times, lambda t, **at: RoughSpring(**at, direction=direction).at(t), launch, ("lam", "v"))
-    # At the last two turns the margins are of the same size where both are on one side.
+    # At the last two turns the margins are of equal size, and both on one side.
     margins = [float(start.rate**2 * abs(place) / (mpf(launch["mu"]) * mpf("9.81"))) - 1.0 for place in start.turns]
     nearest = motion.nearest_switch
     assert abs(nearest.margin) == pytest.approx(np.abs(margins).min(), rel=1e-12)
@@ -118,7 +120,7 @@ class Damped:
         self.cosine, self.sine = lam0, (v0 + self.decay * lam0) / self.rate
 
     def at(self, t: mpf) -> list[mpf]:
-        """Place and velocity."""
+        """Return place and velocity."""
         a, b, shrinks = self.cosine, self.sine, mp.exp(-self.decay * t)
         cosine, sine = mp.cos(self.rate * t), mp.sin(self.rate * t)
         place = shrinks * (a * cosine + b * sine)
@@ -129,7 +131,7 @@ class Damped:
     "launch", [{"lam0": "0.8", "v0": "0"}, {"lam0": "-0.4", "v0": "2"}, {"lam0": "0.3", "v0": "1e-4"}]
 )
 def test_a_law_that_is_not_linear(build: Build, launch: Launch) -> None:
-    """A resistance that grows with the speed itself: states over forty turns."""
+    """With a resistance that grows with the speed itself, states have the right derivatives over forty turns."""
     force = gqm.Potential("k*x**2/2") + gqm.Kernel.law("-c*direction*sqrt(W)")
     module = build("changing_damper", gqm.Curve.graph("0*x"), force)
     launch = {**launch, "k": "3", "c": "0.06"}
@@ -139,12 +141,14 @@ def test_a_law_that_is_not_linear(build: Build, launch: Launch) -> None:
 
 
 def test_the_papers_second_example() -> None:
-    """The turn on a cubic track with friction, which is passed with N of either sign (22 digits, by differences)."""
+    """The turn on a cubic track with friction, passed with N of either sign, has the right derivatives (22 digits, by
+    differences).
+    """
     motion = load(str(ROOT / "generated" / "cubic_coulomb.py"), "cubic_coulomb").solve("-1", "6.2088", mu="1/10")
     found = motion.gradient("turning_points", ("mu", "v0"))
     assert found["mu"][0] == pytest.approx(-1.370490175291658727794, rel=1e-14)
     assert found["v0"][0] == pytest.approx(0.1812676943574192802416, rel=1e-14)
-    # Where N changes its sign: the change of the place at the time of that, less what the change of the time makes.
+    # At a change of the sign of N, this is the change of the place less the effect of the change of the time.
     event = next(event for event in motion.events if event.kind == "contact-sign")
     there = motion.sensitivity(event.t, ("mu", "v0"))
     with mp.workdps(30):
@@ -159,7 +163,7 @@ def test_the_papers_second_example() -> None:
 
 
 def falling(lam0: mpf, v0: mpf, L: mpf, mu: mpf, g: mpf, m: mpf, **_: mpf) -> Any:
-    """V**2 on a rough ring by the angle from its lowest point, for N > 0 and growing angles; and N."""
+    """Return V**2 on a rough ring by the angle from its lowest point, for N > 0 and growing angles, and N."""
     b = -6 * mu * g * L / (1 + 4 * mu**2)
     a = 2 * g * L + 2 * mu * b
     start = v0**2 - a * mp.cos(lam0) - b * mp.sin(lam0)
@@ -174,7 +178,9 @@ RING = {"lam0": "-0.9", "v0": "5.6", "L": "1.1", "mu": "0.05", "g": "9.81", "m":
 
 
 def test_where_contact_is_lost() -> None:
-    """A bead on a rough ring that can only push inwards: when it lifts off, and its extremes before."""
+    """A bead on a rough ring that can only push inwards lifts off at a time with the right derivatives, and so are its
+    extremes before.
+    """
     motion = load(str(ROOT / "generated" / "circle_coulomb.py"), "circle_coulomb").solve(**RING, contact="above")
     assert motion.legs[-1].end == "liftoff"
     place, peak = motion.legs[-1].lam_end, motion.normal_force_max.lam
@@ -199,7 +205,7 @@ def test_where_contact_is_lost() -> None:
 
 
 def test_the_end_of_an_inclined_plane(build: Build) -> None:
-    """A block thrown up a rough plane slides back to the end of it, which is a parameter."""
+    """A block thrown up a rough plane slides back to the end of the plane, which is a parameter."""
     curve = gqm.Curve.graph("a*x", domain=("-d", "9"))
     module = build("changing_plane", curve, gqm.CoulombFriction())
     launch = {"lam0": "0.2", "v0": "3", "a": "0.6", "d": "0.7", "mu": "0.2", "g": "9.81"}
@@ -220,7 +226,9 @@ def test_the_end_of_an_inclined_plane(build: Build) -> None:
 
 
 def test_small_swings_beside_zero() -> None:
-    """They are followed by distances from their equilibrium, and agree with those about an equilibrium at 0."""
+    """Small swings beside zero are followed by distances from their equilibrium, and agree with those about one at
+    0.
+    """
     beside, about = (load(str(ROOT / "generated" / f"{name}.py"), name) for name in ("ellipse_drag", "circle_drag"))
     lam0, times = 1e-6 - np.pi / 2, np.linspace(0.0, 20.0, 9)[1:]
     with mp.workdps(40):
@@ -233,14 +241,14 @@ def test_small_swings_beside_zero() -> None:
 
 
 def test_all_fields_over_laps() -> None:
-    """A bead that goes round with drag: its law does not depend on how the place of the ring is counted."""
+    """A bead goes round with drag, and its law does not depend on how places on the ring are counted."""
     module = load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag")
     motion, times = module.solve(0.3, 30, L="1.25", b="0.02"), np.array([0.01, 0.4, 1.3, 2.9, 6.0])
     found, state, n = motion.sensitivity(times), motion.state(times), module.PARAMETERS
     assert state.lam.max() > 25.0
     rows = {name: k for k, name in enumerate(found.wrt)}
     assert found.wrt == ("lam0", "v0", *n)
-    # In units of length L, and with t sqrt(g/L) for the time, there is nothing but b L/m and v0/sqrt(g L).
+    # In units of length L and of time sqrt(L/g), the motion depends on b L/m and v0/sqrt(g L) only.
     mass, drag, length, gravity = (rows[name] for name in ("m", "b", "L", "g"))
     np.testing.assert_allclose(found.lam[mass] * 1.0, -found.lam[drag] * 0.02, rtol=1e-12)
     rates = state.v / 1.25
@@ -268,14 +276,16 @@ def test_all_fields_over_laps() -> None:
     ],
 )
 def test_what_has_no_gradient(launch: Any, quantity: str, error: type[Exception], text: str) -> None:
-    """One clear error each."""
+    """Each answer without a gradient gives one clear error."""
     motion = load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag").solve(1, **launch)
     with pytest.raises(error, match=text):
         motion.gradient(quantity)
 
 
 def test_ends_that_do_not_move() -> None:
-    """The horizon does not, nor the least speed of a body that turns; and no times have no changes."""
+    """The horizon does not move, nor does the least speed of a body that turns, and for no times there are no
+    changes.
+    """
     module = load(str(ROOT / "generated" / "circle_coulomb.py"), "circle_coulomb")
     assert module.solve(1).sensitivity(np.empty((0, 2)), "L").normal_force.shape == (1, 0, 2)
     assert module.solve(1, t_max="0.2").gradient("t_end", ("L", "mu")) == {"L": 0.0, "mu": 0.0}

@@ -1,4 +1,4 @@
-"""Derivatives of states against the variational equations in time, carried through turns and changes of contact."""
+"""Derivatives of states agree with the variational equations in time, carried through turns and changes of contact."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,13 +16,15 @@ from scipy.integrate import solve_ivp
 from gqm_sym.loading import load
 
 LAM, V = sp.symbols("lam V", real=True)
-# The integrator's own errors; those of derivatives grow with the number of events.
+# The tolerances are the integrator's own errors; those of derivatives grow with the number of events.
 RTOL, ATOL, TOLERANCE = 1e-13, 1e-15, 2e-11
 
 
 @dataclass(frozen=True)
 class Track:
-    """Coordinates, and the acceleration along the track beside gravity and friction: ``resistance(V, kappa)``."""
+    """Coordinates, and the acceleration along the track in addition to gravity and friction: ``resistance(V,
+    kappa)``.
+    """
 
     x: Any
     z: Any
@@ -81,7 +83,9 @@ TRACKS = {
 
 @cache
 def equations(name: str) -> Any:
-    """For each pair of signs of V and N, what lam, V and their derivatives do; and the acceleration and N."""
+    """Return, for each pair of signs of V and N, the rates of lam, V and their derivatives; and the acceleration and
+    N.
+    """
     track = TRACKS[name]
     symbols = [sp.Symbol(n, positive=True) for n in track.names.split()]
     p = {s.name: s for s in symbols}
@@ -103,7 +107,7 @@ def equations(name: str) -> Any:
 
 
 def integrated(name: str, launch: dict[str, float], times: Any) -> Any:
-    """The derivatives of lam and V at times: rows for parameters, lam0 and v0."""
+    """Return the derivatives of lam and V at times: rows for parameters, lam0 and v0."""
     track, forms = TRACKS[name], equations(name)
     values = [launch[n] for n in track.names.split()]
     n = len(values)
@@ -150,7 +154,7 @@ def integrated(name: str, launch: dict[str, float], times: Any) -> Any:
 @settings(max_examples=2, deadline=None)
 @given(data=st.data())
 def test_states_follow_the_variational_equations(name: str, data: Any) -> None:
-    """Random launches on tracks with all kinds of losses, through turns and changes of contact."""
+    """Random launches on tracks with all kinds of losses follow the equations through turns and changes of contact."""
     track, module = TRACKS[name], load(str(ROOT / "generated" / f"{name}.py"), name)
     launch = {key: data.draw(st.floats(*ends)) for key, ends in track.ranges.items()}
     motion = module.solve(**launch)

@@ -1,4 +1,6 @@
-"""Derivatives of motions with losses along charts: against the circle as a formula, and closed forms on a rail."""
+"""Derivatives of motions with losses along charts agree with the circle as a formula, and with closed forms on a
+rail.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,13 +16,13 @@ import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
-# The goal for derivatives through legs, as a share of the largest of an array.
+# The tolerance of derivatives over several legs, relative to the largest of an array.
 TOLERANCE = 1e-13
 
 
 @pytest.fixture(scope="module")
 def ring(generated_folder: Path) -> ModuleType:
-    """A rough circle as an implicit curve, in arc length from the bottom."""
+    """Return a rough circle as an implicit curve, in arc length from the bottom."""
     curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
     force = gqm.Gravity() + gqm.CoulombFriction(mu="3/20", mu_static="1/5")
     return gqm.build(gqm.derive(curve, force), name="rough_ring", folder=generated_folder)
@@ -28,7 +30,9 @@ def ring(generated_folder: Path) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def rail(generated_folder: Path) -> ModuleType:
-    """A line down, an arc and a line up, with friction: the curvature jumps between them, and so does the force."""
+    """Return a line down, an arc and a line up, with friction; the curvature jumps between them, and so does the
+    force.
+    """
     pieces = [gqm.line(length="p"), gqm.arc(radius="r", angle="6/5"), gqm.line(length=3)]
     curve = gqm.Curve.piecewise(pieces, heading="-h", parameters={"p": 2, "r": "3/2", "h": "3/10"})
     model = gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction(mu="1/2"))
@@ -52,7 +56,7 @@ def test_states_on_a_circle(arc: float, radius: float, v0: float, times: tuple[f
     found, wanted = one.sensitivity(np.array(times)), other.sensitivity(np.array(times))
 
     def on_circle(name: str, by: Callable[[str], Any]) -> Any:
-        """The derivative at a given arc length of launch, from those at a given angle of it."""
+        """Return the derivative at a given arc length of launch, from those at a given angle of launch."""
         if name == "R":
             return by("L") - arc / radius**2 * by("lam0")
         return by("lam0") / radius if name == "lam0" else by(name)
@@ -72,7 +76,7 @@ def test_states_on_a_circle(arc: float, radius: float, v0: float, times: tuple[f
 
 
 def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> tuple[Any, Any, Any]:
-    """The turn on the line up, the place of rest on the arc, and the contact force where the arc begins.
+    """Return the turn on the line up, the place of rest on the arc, and the contact force at the start of the arc.
 
     On each piece dW/ds = -2 g sin(theta) - 2 v mu (g cos(theta) + W/radius), with the closed form of the arc.
     """
@@ -80,7 +84,7 @@ def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> t
     force = g * mp.cos(h) + w / r
 
     def potential(theta: Any, v: int) -> Any:
-        """A solution on the arc, so that W less it is an exponential of -2 v mu theta."""
+        """Return a solution on the arc, so that W less it is an exponential of -2 v mu theta."""
         k = 2 * v * mu
         return 2 * g * r * ((1 - k * v * mu) * mp.cos(theta) - (k + v * mu) * mp.sin(theta)) / (1 + k * k)
 
@@ -90,7 +94,7 @@ def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> t
     w = 2 * g * (mp.sin(end) - mu * mp.cos(end)) * up
 
     def left(theta: Any) -> Any:
-        """W on the way back."""
+        """Return W on the way back."""
         return potential(theta, -1) + (w - potential(end, -1)) * mp.exp(2 * mu * (theta - end))
 
     rest = mp.findroot(left, (-mpf(1) / 5, end / 2), solver="anderson")
@@ -98,7 +102,9 @@ def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> t
 
 
 def test_jumps_of_the_force(rail: ModuleType) -> None:
-    """Turning points, the place of rest and the largest force, by launch, force and shape of the rail."""
+    """Turning points, the place of rest and the largest force have the right derivatives by launch, force and shape of
+    the rail.
+    """
     launch = {"lam0": "1/2", "v0": "9", "p": "2", "r": "3/2", "h": "3/10", "g": "981/100", "mu": "1/2"}
     motion = rail.solve(**launch)
     turns, rest, force = (motion.gradient(q) for q in ("turning_points", "rest_position", "normal_force_max"))
@@ -117,7 +123,7 @@ def test_jumps_of_the_force(rail: ModuleType) -> None:
 
 
 def on_a_slope(lam0: Any, v0: Any, g: Any, mu: Any, t: Any) -> tuple[Any, Any]:
-    """Place and velocity of a body that is thrown up a slope of 3:4, stops and slides down."""
+    """Return place and velocity of a body that is thrown up a slope of 3:4, stops and slides down."""
     rise, hold = g * mpf("0.6"), mu * g * mpf("0.8")
     up, stop = rise + hold, v0 / (rise + hold)
     if t < stop:
@@ -127,7 +133,7 @@ def on_a_slope(lam0: Any, v0: Any, g: Any, mu: Any, t: Any) -> tuple[Any, Any]:
 
 
 def test_a_track_through_points(generated_folder: Path) -> None:
-    """Points on a straight line, whose spline is the line: friction up and down a slope."""
+    """Points on a straight line have the line as their spline, with friction up and down a slope."""
     points = [(0.8 * s, 0.6 * s) for s in (0.0, 0.7, 1.9, 3.0, 4.4, 5.5, 7.0, 8.0)]
     model = gqm.derive(gqm.Curve.sampled(points), gqm.Gravity() + gqm.CoulombFriction(mu="1/4"))
     module = gqm.build(model, name="rough_slope", folder=generated_folder)
@@ -148,12 +154,12 @@ def test_a_track_through_points(generated_folder: Path) -> None:
         wanted = {"lam0": 1, "v0": exact["v0"] / up, "g": -(exact["v0"] ** 2) / (2 * up * exact["g"])}
         for name, value in wanted.items():
             assert abs(turn[name][0] - value) <= TOLERANCE, name
-        # It passes 2.5 on its way up, with v**2 = v0**2 - 2 up d.
+        # The body passes 2.5 on its way up, with v**2 = v0**2 - 2 up d.
         assert abs(slopes["lam0"] + 1 / mp.sqrt(exact["v0"] ** 2 - up)) <= TOLERANCE
 
 
 def test_points_in_space_have_none(generated_folder: Path) -> None:
-    """They are known in doubles only, which one error says."""
+    """Points in space are known in doubles only, which one error says."""
     points = [(float(k), 3.0 * np.sin(k / 3.0), 8.0 - 0.4 * k) for k in range(8)]
     model = gqm.derive(gqm.Curve.sampled(points), gqm.Gravity() + gqm.QuadraticDrag(b="1/100"))
     slide = gqm.build(model, name="chute_in_space", folder=generated_folder).solve(0, v0=3)

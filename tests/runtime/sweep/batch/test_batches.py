@@ -1,4 +1,4 @@
-"""Orbits in batches: which are answered, that none jumps a barrier, and that the times are those of single motions."""
+"""Batches answer the right orbits with the times of single motions, and no orbit jumps a barrier."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,7 +32,7 @@ def answered(
     mirrors: tuple[float, float] = (np.nan, 0.0),
     monotone: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Answer launches by batches alone; nothing is said of symmetry, if not by ``mirrors``."""
+    """Answer launches by batches alone; the symmetry is unknown unless ``mirrors`` gives it."""
     known = (*domain, mirrors[0], np.nan, mirrors[1])
     columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
     n = max(column.size for column in columns)
@@ -45,7 +45,7 @@ def answered(
 
 
 CIRCLE = (-np.inf, np.inf, 2 * np.pi)
-# What may be said of a circle's symmetry: nothing, its axes, and that heights between them only rise or only fall.
+# The symmetry of a circle may be given in three ways: not at all, its axes, and that heights between them are monotone.
 SAID: dict[str, dict[str, Any]] = {
     "nothing": {},
     "axes": {"mirrors": (0.0, np.pi)},
@@ -56,7 +56,7 @@ SAID: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("count", [1, 7, 8, 131])
 def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, module_of: ModuleOf) -> None:
-    """Whatever the number of launches: half periods of all, within a few last places."""
+    """The half periods of any number of launches are answered within a few last places."""
     amplitude = np.linspace(0.01, 2.6, count)
     p = [1.0, 9.81, 1.0]
     out, status = answered(
@@ -69,18 +69,18 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
-# So many of 300 launches are left to be solved one by one where nothing is said of symmetry: they go downhill, far up
-# the other side, and bounds of the slope over the whole way do not prove that nothing stops them before.
+# So many of 300 launches are left to be solved singly if no symmetry is given: they go downhill and far up the other
+# side, and bounds of the slope do not prove that nothing stops them before.
 UNPROVED = {1: 50, -1: 49}
 
-# Amplitudes from which on times are left to double-double arithmetic.
+# From these amplitudes on, times are left to double-double arithmetic.
 NEAR_TOP = 2.6
 
 
 @pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("way", [1, -1])
-def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of: ModuleOf) -> None:
-    """Launched with any speed from anywhere, on any turn of the circle: the same turning points and times."""
+def test_a_known_symmetry_changes_nothing(way: int, said: str, module_of: ModuleOf) -> None:
+    """Launches with any speed from anywhere on any turn of the circle have the same turning points and times."""
     rng = np.random.default_rng(11)
     lowest = 2 * np.pi * rng.integers(-3, 4, 300)
     place, reach = rng.uniform(-1.5, 1.5, 300), rng.uniform(1.6, 2.8, 300)
@@ -105,7 +105,7 @@ def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of
 @pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("way", [1, -1])
 def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
-    """Launched fast from anywhere: loop times, both ways; turning points there are none."""
+    """Loop times of fast launches are right in both directions, and there are no turning points."""
     places = np.linspace(-3.0, 3.0, 13)
     v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
     p = [1.0, 9.81, 1.0]
@@ -113,7 +113,7 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     assert (status == quantities.ANSWERED).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
-    # Speeds are rounded, and the loop time follows the energy they mean.
+    # Speeds are rounded, and the loop time is that of the energy that they mean.
     assert out[:, 0] == pytest.approx(truth, rel=2e-15)
     ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.TURNING_POINTS, **SAID[said])
     assert (ends[1] == quantities.NOT_PERIODIC).all()
@@ -123,7 +123,7 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("turns", [0, 1, -2, 50])
 def test_small_swings_on_any_turn(turns: int, module_of: ModuleOf) -> None:
-    """Released at rest near any axis: its place is known to more digits than a double has, or is found."""
+    """Near any axis the place of release is known to more digits than a double has, or is found."""
     amplitude = 10.0 ** np.linspace(-4.0, 0.4, 40)
     lam0 = 2 * np.pi * turns + amplitude
     swept = module_of("circle").sweep("half_period", lam0, L=1).values
@@ -135,7 +135,7 @@ def test_small_swings_on_any_turn(turns: int, module_of: ModuleOf) -> None:
 
 
 def test_barriers_are_not_jumped(tmp_path: Path) -> None:
-    """On a track of hills every orbit keeps to its own valley, however narrow the hill beside it."""
+    """On a track of hills every orbit stays in its own valley, however narrow the next hill."""
     curve = gqm.Curve.graph("x**2/4 + 3*exp(-(x - 1)**2/w**2)", parameter="x", parameters={"w": 1})
     hills = gqm.build(gqm.derive(curve, gqm.Gravity()), name="hills_in_batches", folder=tmp_path)
     rng = np.random.default_rng(5)
@@ -156,7 +156,9 @@ def test_barriers_are_not_jumped(tmp_path: Path) -> None:
 
 
 def test_wells_within_wells(module_of: ModuleOf) -> None:
-    """In a double well the outer orbits are their own mirror images, and the inner ones are not: both, side by side."""
+    """In a double well the outer orbits are their own mirror images, and the inner ones are not; both may be in one
+    batch.
+    """
     well = module_of("double_well")
     height = np.random.default_rng(3).uniform(-0.24, 1.0, 300)  # of lam**4 - lam**2
     height = height[np.abs(height) > 0.02]
@@ -171,7 +173,7 @@ def test_wells_within_wells(module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("strength", [1e-8, 1e8])
 def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
-    """Under another gravity the same swings are answered and the same are left, those next to the top."""
+    """Under another gravity the same swings are answered, and the same are left, those next to the top."""
     lam0 = np.linspace(0.1, np.pi - 0.01, 40)
     one, other = (
         answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, asked=quantities.HALF_PERIOD)
@@ -184,7 +186,7 @@ def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
 
 @pytest.mark.parametrize("said", SAID)
 def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
-    """Launches at the top, next to it, and what is not a number."""
+    """Launches at the top, next to it, and with NaN are left."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
     p = [1.0, 9.81, 1.0]
     out, status = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
@@ -193,7 +195,7 @@ def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
 
 
 def test_released_beside_the_top(module_of: ModuleOf) -> None:
-    """It swings nearly all the way round and back, and does not go round."""
+    """A body released beside the top swings nearly all the way round and back, and does not go round."""
     beside = 10.0 ** -np.arange(1.0, 13.0)
     swept = module_of("circle").sweep("half_period", np.pi - beside, L=1)
     with mp.workdps(40):
@@ -203,12 +205,14 @@ def test_released_beside_the_top(module_of: ModuleOf) -> None:
             assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
-# Half periods of batches: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods of batches is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
 
 def test_half_periods_on_a_curve_of_several_waves(tmp_path: Path) -> None:
-    """Far from zero too: to the last places those of solving, which are correctly rounded, and most are in batches."""
+    """Also far from zero, half periods agree to the last places with `solve`, which rounds correctly, and most are in
+    batches.
+    """
     curve = gqm.Curve.polar("cos(4*t)", parameter="t", period="2*pi")
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="several_waves", folder=tmp_path)
     wells = [(4.1, 4.6), (-2.2, -1.7), (0.3, 0.6)]
@@ -220,7 +224,7 @@ def test_half_periods_on_a_curve_of_several_waves(tmp_path: Path) -> None:
 
 
 def test_wells_about_neighbouring_axes_differ(tmp_path: Path) -> None:
-    """Swings about both poles of a circle, also of the centre of a rolling body: each has the time of its own well."""
+    """Swings about both poles of a circle, also of a rolling body's centre, have the time of their own well."""
     law = gqm.Potential("G*z - k*z**2") + gqm.Rolling(radius="rho")
     module = gqm.build(gqm.derive(gqm.families.circle(L="1"), law), name="two_poles", folder=tmp_path)
     size, reach = 0.75, np.array([0.05, 0.4, 0.9])

@@ -1,4 +1,4 @@
-"""Sweeps along curves without formulas: against closed forms, quadrature of the definition, and motions solved."""
+"""Sweeps along curves without formulas agree with closed forms, quadrature of the definition, and single motions."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,37 +16,37 @@ from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 with mp.workdps(40):
     G = mpf("9.81")
 
-# Half periods: twice the distance from 1 to the next double, relative.
+# The tolerance of half periods is twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
 
-# Times and loads on a rail whose parts are given in doubles, relative.
+# The relative tolerance of times and loads on a rail whose parts are given in doubles.
 ROUNDING = 2e-15
 
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A ring of radius 1 as an implicit curve; arc length is the angle from its lowest place."""
+    """Return a ring of radius 1 as an implicit curve; arc length is the angle from its lowest place."""
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_ring", folder=tmp_path_factory.mktemp("ring"))
 
 
 @pytest.fixture(scope="module")
 def bend(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """Two inclines at 45 degrees, tangent to an arc between them."""
+    """Return two inclines at 45 degrees, tangent to an arc between them."""
     pieces = [gqm.line(length=3), gqm.arc(radius="R", angle="pi/2"), gqm.line(length=3)]
     return built(tmp_path_factory.mktemp("bend"), "bend", pieces, start=(0, 0), heading="-pi/4")
 
 
 @pytest.fixture(scope="module")
 def track(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """A spline of degree 5 through 61 points."""
+    """Return a spline of degree 5 through 61 points."""
     x = np.linspace(-2, 2, 61)
     curve = gqm.Curve.sampled(np.column_stack([x, 0.5 * x * x + 0.01 * np.cos(3 * x)]))
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="measured", folder=tmp_path_factory.mktemp("measured"))
 
 
 def _half_period_on_bend(distance: float, radius: float) -> tuple[mpf, mpf]:
-    """Half period of a body released on an incline so far from the arc, and V**2 in the middle of the arc."""
+    """Return the half period of a body released at a distance from the arc, and V**2 in the middle of the arc."""
     with mp.workdps(30):
         d, r, root = mpf(distance), mpf(radius), mp.sqrt(2) / 2
         fall = 2 * G * d * root
@@ -56,7 +56,7 @@ def _half_period_on_bend(distance: float, radius: float) -> tuple[mpf, mpf]:
 
 
 def test_half_periods_on_a_ring(ring: ModuleType) -> None:
-    """As the pendulum's closed form has them, and the same times round the ring."""
+    """Half periods on a ring agree with the pendulum's closed form, and so do times of rounds."""
     amplitude = np.random.default_rng(3).uniform(1e-3, 2.5, 100)
     swept = ring.sweep("half_period", amplitude)
     assert swept.route_counts() == {"single": 100}
@@ -70,7 +70,9 @@ def test_half_periods_on_a_ring(ring: ModuleType) -> None:
 
 
 def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
-    """Panels begin where the curvature jumps; places on both inclines are passed when uniform acceleration says."""
+    """Panels begin where the curvature jumps; places on both inclines are passed at the times of uniform
+    acceleration.
+    """
     places = np.random.default_rng(4).uniform(0.05, 2.9, 60)
     radius = np.where(np.arange(60) % 2, 1.0, 0.25)  # two curves in one sweep
     half, ends = bend.sweep("half_period", places, R=radius), bend.sweep("turning_points", places, R=radius)
@@ -86,12 +88,12 @@ def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
 
 
 def _time_round_a_quarter(g: mpf, drop: mpf) -> mpf:
-    """The time for a quarter of a circle of radius 3, from a wall on which the body has fallen so far to the floor."""
+    """Return the time for a quarter of a circle of radius 3, after a given fall along a wall, to the floor."""
     return mp.quad(lambda angle: 3 / mp.sqrt(2 * g * (drop + 3 * mp.sin(angle))), [0, mp.pi / 4, mp.pi / 2])
 
 
 def test_a_turning_point_beside_a_joint(bend: ModuleType) -> None:
-    """Next to it V**2 has a branch point on the panel behind the joint, which slows the series of dt/dphi down."""
+    """Next to the joint V**2 has a branch point on the panel behind it, which slows the convergence of dt/dphi."""
     places = np.array([2.9, 2.99, 2.996, 2.9996, 2.99999, 2.999999, 2.9999999, 2.99999998])
     swept = bend.sweep("half_period", places, R=3)
     assert swept.route_counts() == {"single": len(places)}
@@ -103,7 +105,7 @@ def test_a_turning_point_beside_a_joint(bend: ModuleType) -> None:
 
 
 def test_bodies_that_run_off_the_end(tmp_path: Path) -> None:
-    """Down a wall, round a quarter of a circle and along the floor, or up the wall and over its top."""
+    """Bodies run down a wall, through a quarter of a circle and along the floor, or up the wall and over its top."""
     pieces = [gqm.line(length=1), gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4)]
     module = built(tmp_path, "wall", pieces, start=(0, 0), heading="-pi/2")
     rng, count = np.random.default_rng(8), 40
@@ -146,7 +148,7 @@ def test_bodies_that_run_off_the_end(tmp_path: Path) -> None:
 
 
 def test_extremes_on_a_rail_with_joints(bend: ModuleType) -> None:
-    """N jumps where the arc begins: its least is on the inclines, its largest in the middle of the arc."""
+    """N jumps where the arc begins; its smallest value is on the inclines, and its largest in the middle of the arc."""
     places = np.linspace(0.05, 2.9, 25)
     largest, least = bend.sweep("normal_force_max", places, R=1), bend.sweep("normal_force_min", places, R=1)
     fastest = bend.sweep("v_max", places, R=1)
@@ -159,7 +161,7 @@ def test_extremes_on_a_rail_with_joints(bend: ModuleType) -> None:
 
 
 def test_extremes_and_arrivals_on_a_ring(ring: ModuleType) -> None:
-    """Whirling in both directions: N = 3 g cos(s) - 2 g + V0**2, and arrivals by the incomplete elliptic integral."""
+    """In both directions N is 3 g cos(s) - 2 g + V0**2, and arrivals agree with the incomplete elliptic integral."""
     for lam0, sense, ahead in ((0.3, 1, 9.0), (-2.0, -1, 3.1), (3.0, 1, 0.4)):
         w0 = 9.0**2 - 2 * float(G) * (1 - np.cos(lam0))
         launch = (lam0, np.sqrt(w0), sense)
@@ -176,7 +178,9 @@ def test_extremes_and_arrivals_on_a_ring(ring: ModuleType) -> None:
 
 @pytest.mark.parametrize("implicit", [True, False])
 def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of: Callable[[str], ModuleType]) -> None:
-    """Thrown up inside a ring it leaves where 3 cos(s) = 2 - V0**2/g; slower it swings, and faster it stays."""
+    """Thrown up inside a ring a body leaves where 3 cos(s) = 2 - V0**2/g; a slower one swings, and a faster one
+    stays.
+    """
     share = np.array([1.0, 2.2, 3.0, 4.9, 5.1])  # V0**2 as a multiple of g
     speed = np.sqrt(share * float(G))
     sweep = ring.sweep if implicit else lambda *args, **given: module_of("circle").sweep(*args, L=1, **given)
@@ -198,7 +202,7 @@ def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of:
 
 
 def test_rolling_in_a_hoop(tmp_path: Path) -> None:
-    """The centre of a ball swings as a pendulum of length L - rho and inertia 1 + beta; one too large is refused."""
+    """The centre of a ball swings as a pendulum of length L - rho and inertia 1 + beta; a ball too large is refused."""
     model = gqm.derive(gqm.families.circle(L="L"), gqm.Gravity() + gqm.Rolling(beta="2/5", radius="rho"))
     module = gqm.build(model, name="hoop", folder=tmp_path)
     amplitude, radius = np.linspace(0.1, 2.5, 12), np.linspace(0.05, 0.5, 12)
@@ -212,7 +216,7 @@ def test_rolling_in_a_hoop(tmp_path: Path) -> None:
 
 
 def test_fastest_place_beside_the_launch(tmp_path: Path) -> None:
-    """Going round an ellipse from beside its lowest place, a ball is fastest behind its launch, as energy has it."""
+    """On an ellipse a ball launched beside the lowest place is fastest behind its launch, as its energy says."""
     ellipse = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
     force = gqm.Gravity() + gqm.Rolling(beta="2/5", radius="rho")
     module = gqm.build(gqm.derive(ellipse, force), name="ellipse_ball", folder=tmp_path)
@@ -225,13 +229,13 @@ def test_fastest_place_beside_the_launch(tmp_path: Path) -> None:
 
 
 def test_a_place_far_away_does_not_stop_a_sweep(module_of: Callable[[str], ModuleType]) -> None:
-    """Where doubles no longer tell places apart there is no answer; the other launches have theirs."""
+    """Where doubles do not resolve places there is no answer; the other launches have theirs."""
     swept = module_of("circle").sweep("half_period", [1e17, 1e15, 0.5], L=1)
     assert np.isnan(swept.values).tolist() == [True, True, False]
 
 
 def test_parameters_of_every_launch(bend: ModuleType) -> None:
-    """Every launch has its own parameters; one set gives no rail, and only that launch is refused."""
+    """Every launch has its own parameters; if one set gives no rail, only that launch is refused."""
     mass, radius = np.linspace(1.0, 20.0, 12), np.where(np.arange(12) == 5, -1.0, 0.5)
     swept, good = bend.sweep("half_period", 1.0, m=mass, R=radius), np.arange(12) != 5
     assert np.array_equal(swept.values[good], np.full(11, bend.sweep("half_period", 1.0, R=0.5).values))
@@ -240,7 +244,7 @@ def test_parameters_of_every_launch(bend: ModuleType) -> None:
 
 @pytest.mark.parametrize("kind", ["rail", "implicit", "sampled"])
 def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None:
-    """Each launch with its own g, Omega and m is answered as `solve` does it, from one table, alone or with others."""
+    """Launches with their own g, Omega and m are answered as by `solve`, from one table, alone or with others."""
     x = np.linspace(-2, 2, 41)
     curve = {
         "rail": gqm.Curve.piecewise(
@@ -270,9 +274,9 @@ def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None
 
 
 def _largest_force(k: mpf, x0: float, z0: float) -> mpf:
-    """The largest N on x**4 + z**4 - x*z/5 = 1 about its lower side, after a start from rest at (x0, z0).
+    """Return the largest N on x**4 + z**4 - x*z/5 = 1 about its lower side, after a start from rest at (x0, z0).
 
-    Besides gravity a spring of stiffness k pulls a body of 1 kg towards (1, 2).
+    In addition to gravity a spring of stiffness k pulls a body of 1 kg towards (1, 2).
     """
 
     def negative_slope(x: mpf) -> mpf:
@@ -292,7 +296,7 @@ def _largest_force(k: mpf, x0: float, z0: float) -> mpf:
 
 
 def test_the_largest_force_on_a_small_swing(tmp_path: Path) -> None:
-    """Where the samples of a panel are far from the peak, parabolas follow it."""
+    """If the samples of a panel are far from the peak, parabolas follow it."""
     curve = gqm.Curve.implicit("x**4+z**4-x*z/5-1", start=(0, -1))
     force = gqm.Gravity() + gqm.Potential("k*((x-1)**2+(z-2)**2)/2")
     module = gqm.build(gqm.derive(curve, force), name="pulled", folder=tmp_path)
@@ -306,7 +310,9 @@ def test_the_largest_force_on_a_small_swing(tmp_path: Path) -> None:
 
 
 def _half_period_in_a_flat_well(lam0: float, a: mpf, b: mpf) -> mpf:
-    """After a start from rest at such an arc length from the lowest place of (x/a)**4 + (z/b)**4 = 1."""
+    """Return the half period after a start from rest at an arc length from the lowest place of (x/a)**4 + (z/b)**4 =
+    1.
+    """
 
     def height(x: mpf) -> mpf:
         return (1 - (x / a) ** 4) ** mpf("0.25")
@@ -324,7 +330,7 @@ def _half_period_in_a_flat_well(lam0: float, a: mpf, b: mpf) -> mpf:
 
 
 def test_small_swings_in_a_flat_well(tmp_path: Path) -> None:
-    """There V**2 grows as the fourth power of the amplitude, which is far below what a panel spreads over."""
+    """V**2 grows as the fourth power of the amplitude, and is far below its range on a panel."""
     curve = gqm.Curve.implicit("(x/a)**4 + (z/b)**4 - 1", start=(0, "-b"))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="flat_well", folder=tmp_path)
     size, places = {"a": 3.211745185445401, "b": 0.9}, np.array([4e-3, 0.0068, 0.01, 0.0214, 0.1, 0.5])
@@ -361,7 +367,9 @@ def test_small_swings_beside_an_edge_of_a_piece(tmp_path: Path) -> None:
 
 
 def test_the_largest_speed_of_small_swings(tmp_path: Path) -> None:
-    """On the loop of a strophoid, r = -a*cos(2*t)/cos(t) in polar coordinates about its node."""
+    """On the loop of a strophoid, r = -a*cos(2*t)/cos(t) in polar coordinates about its node, the largest speed is
+    right.
+    """
     curve = gqm.Curve.implicit("x**2*(a - z) - z**2*(a + z)", start=("-a/(2*sqrt(3))", "-a/2"), tangent=-1)
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="swings_on_a_strophoid", folder=tmp_path)
     with mp.workdps(30):
@@ -385,7 +393,7 @@ def test_the_largest_speed_of_small_swings(tmp_path: Path) -> None:
 
 
 def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
-    """As `solve` gives them from extended precision, over dozens of pieces."""
+    """Half periods over dozens of pieces agree with `solve`, which uses extended precision."""
     rng, bottom = np.random.default_rng(6), track.equilibria()[0].lam
     places = np.append(rng.uniform(3.3, 4.8, 16), bottom + 10.0 ** rng.uniform(-5, -1, 8))
     swept = track.sweep("half_period", places)
@@ -396,7 +404,7 @@ def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
 
 
 def test_a_launch_from_rest_at_an_edge_of_a_panel(tmp_path: Path) -> None:
-    """The body comes to the bottom after half of half a period, from either side; the table has edges at all 1/16."""
+    """The body reaches the bottom after a quarter of a period, from either side; the table has edges at all 1/16."""
     curve = gqm.Curve.graph("x**2", parameter="x", domain=(-2, 2))
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="launch_at_edge", folder=tmp_path)
     places = np.array([-1.25, -0.5, 0.5, 1.0, 1.25])

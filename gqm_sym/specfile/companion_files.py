@@ -14,7 +14,7 @@ LINE_LIMIT = 200
 _BETWEEN = re.compile(r"\s*[,;\t]\s*|\s+")
 
 
-def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
+def companion_path(name: str, folder: Path, *, wanted: str) -> Path:
     """Return the path of a file in a folder or in one of its subfolders.
 
     Parameters
@@ -47,11 +47,11 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     return path
 
 
-def read_beside(name: str, folder: Path, *, wanted: str) -> str:
+def read_companion(name: str, folder: Path, *, wanted: str) -> str:
     """Return the text of a plain file in a folder, at most 32 MiB in UTF-8. The parameters are those of
-    `path_beside`.
+    `companion_path`.
     """
-    path = path_beside(name, folder, wanted=wanted)
+    path = companion_path(name, folder, wanted=wanted)
     try:
         # The file is opened before it is examined, without waiting for a pipe, so that the examined file is read.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
