@@ -87,10 +87,10 @@ def _rail(lowering: Lowering) -> ChartIR:
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
-    maker, segment, exact = ("SpaceRail", _segment_in_space, False) if rail.in_space else ("Rail", _segment, True)
+    maker, segment = ("SpaceRail", _segment_in_space) if rail.in_space else ("Rail", _segment)
     functions = tuple(segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
-    known = zip(curves, functions, strict=True) if exact else ()
-    formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in known)
+    known = zip(curves, functions, strict=True)
+    formulas = tuple(_exact_segment(lowering, curve, f.name, in_space=rail.in_space) for curve, f in known)
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))
     doc = "The start of the rail, then the numbers of each piece."
     numbers = lowering.exact_function("rail", doc, given)
@@ -154,14 +154,14 @@ def _function_of_segment(lowering: Lowering, curve: Curve, name: str, what: str,
     return replace(function, signature="SEGMENT")
 
 
-def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
+def _exact_segment(lowering: Lowering, curve: Curve, name: str, *, in_space: bool) -> ExactIR:
     """Return the function for the coordinates of such a piece and their derivatives, over a namespace of operations."""
-    place = curve.parameter
-    rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
+    place, named = curve.parameter, "x, y, z" if in_space else "x, z"
+    rows = (curve.x, curve.y, curve.z) if in_space else (curve.x, curve.z)
+    rows = (*rows, *(differentiate(row, place) for row in rows))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
-    return lowering.exact_function(
-        name, "x, z and their derivatives with respect to its own parameter.", outputs, (lowering.place,)
-    )
+    doc = f"{named} and their derivatives with respect to its own parameter."
+    return lowering.exact_function(name, doc, outputs, (lowering.place,))
 
 
 MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {

@@ -10,7 +10,7 @@ from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import DIRECTION
-from gqm_sym.sympy_charts import chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE, chart_x, chart_z
 
 FORWARDS = {DIRECTION: sympy.S.One}
 """In functions without this argument, contact forces that depend on the sign of ds/dt are those of forward motions."""
@@ -58,15 +58,18 @@ class Lowering:
         return {call: Symbol(f"_p{count}", real=True) for count, call in enumerate(outermost)}
 
     @property
-    def coordinates(self) -> tuple[Symbol, Symbol]:
-        """The symbols of x and z in formulas of the plane."""
-        return self.names.symbol("x"), self.names.symbol("z")
+    def coordinates(self) -> tuple[Symbol, ...]:
+        """The symbols of x and z, or of x, y and z in space, in formulas by coordinates."""
+        return tuple(map(self.names.symbol, "xyz" if self.model.curve.in_space else "xz"))
 
-    def in_plane(self, form: Expr) -> Expr:
+    def by_coordinates(self, form: Expr) -> Expr:
         """Return a form of a charted curve in terms of the coordinates of the body's path, as far as it depends on
         these.
         """
-        model, (x, z), radius = self.model, self.coordinates, self.model.force.radius
+        model, radius = self.model, self.model.force.radius
+        if model.curve.in_space:
+            return form.xreplace({f(self.place): x for f, x in zip(SPACE, self.coordinates, strict=True)})
+        x, z = self.coordinates
         of_curve = {chart_x(self.place): x + radius * model.dzds, chart_z(self.place): z - radius * model.dxds}
         found = form.xreplace(of_curve)
         return sympy.expand(found) if radius and self.place in found.free_symbols else found

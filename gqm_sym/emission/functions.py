@@ -2,9 +2,9 @@
 call.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from sympy import Expr, Function, Symbol
 
@@ -62,25 +62,50 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
     return _together([(name, f"{p}[{i}]") for name, i in parameters])
 
 
-def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str]]:
-    """Return a function that reads values of charts at its places from the last rows of ``out``, and the lines that
-    fill these rows.
+class _ChartReading(NamedTuple):
+    """A function that reads values of charts from rows, which are filled before its loops.
 
-    The third result is the names of the charts that these lines read.
+    Attributes
+    ----------
+    function
+        The function.
+    lines
+        The lines that fill the rows; none if the function reads no chart.
+    charts
+        The names of the charts that these lines read.
+    in_out
+        Whether the rows are those of ``out``. Otherwise they are those of a buffer, because ``out`` has too few.
+    """
 
-    Neighbouring places often share a piece of the chart, which is then searched for only once. If ``out`` has too few
-    rows, another array takes its place. Without a chart the function is returned unchanged.
+    function: FunctionIR
+    lines: Sequence[str] = ()
+    charts: Collection[str] = ()
+    in_out: bool = False
+
+    @property
+    def calls(self) -> set[str]:
+        """The names that the lines call."""
+        if not self.lines:
+            return set()
+        return {"chart_rows"} if self.in_out else {"chart_rows", "spare_rows"}
+
+
+def _read_together(function: FunctionIR) -> _ChartReading:
+    """Let a function read values of charts at its places from rows, the last ones of ``out`` if it has enough.
+
+    Neighbouring places often share a piece of the chart, which is then searched for only once.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
     heads = {head: (chart, row) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
     places = {c.args[0].name for v in values for c in v.atoms(*heads) if c.args[0].is_Symbol}
     if len(places) != 1 or not places <= given.keys():
-        return function, [], set()
+        return _ChartReading(function)
     place = Symbol(places.pop(), real=True)
     used = [head for head in heads if any(v.has(head(place)) for v in values)]
     out, last, lines = function.arguments[-1], len(function.outputs), []
-    if len(used) > last:
+    in_out = len(used) <= last
+    if not in_out:
         out, last = "_spare", len(used)
         lines.append(f"{out} = spare_rows({last}, {function.arguments[0]})")
     first = last - len(used)
@@ -101,7 +126,7 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
         end += len(found)
         filled = out if end == last else f"{out}[:{end}]"
         lines.append(f"chart_rows({chart}, {found}, {given[place.name].args[0]}, {filled})")
-    return replace(function, inside=(*rows, *kept), outputs=outputs), lines, set(charts)
+    return _ChartReading(replace(function, inside=(*rows, *kept), outputs=outputs), lines, charts, in_out)
 
 
 def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:
@@ -134,7 +159,8 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
 
     ``charts`` are the names of the charts that follow the run-time parameters (`ChartIR`).
     """
-    function, filled, read = _read_together(function)
+    reading = _read_together(function)
+    function = reading.function
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
     index = "_i" if "i" in taken else "i"
     printer = CodePrinter(index)
@@ -142,16 +168,15 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
     before = [_views(function)]
     before += _unpacked(function.parameters, function.arguments[-2])
     before += _statements(function.before, printer)
-    # Rows of a chart that stand in ``out`` are overwritten by one loop, before another could read them.
-    whole = bool(filled) and not any("spare_rows" in line for line in filled)
+    # The first of several loops would overwrite rows of a chart in ``out`` before another could read them.
+    one_loop = [(range(len(function.outputs)), function.inside)]
     loops = []
-    for rows, assignments in [(range(len(function.outputs)), function.inside)] if whole else _divided(function):
+    for rows, assignments in one_loop if reading.in_out else _divided(function):
         lines = _statements(assignments, printer)
         loops.append([*lines, *(f"{out}[{k}, {index}] = {printer.doprint(function.outputs[k])}" for k in rows)])
-    if filled:
-        printer.used |= {name for name in ("chart_rows", "spare_rows") if any(f"{name}(" in line for line in filled)}
-        printer.charts |= read
-    before = [*_chart_view(function, printer, charts), *before, *filled]
+    printer.used |= reading.calls
+    printer.charts |= set(reading.charts)
+    before = [*_chart_view(function, printer, charts), *before, *reading.lines]
     fields = {
         "name": function.name,
         "signature": function.signature,

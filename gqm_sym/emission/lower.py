@@ -243,15 +243,13 @@ class _ModelLowering(Lowering):
         """Return the effective potential and its gradient in terms of coordinates; nothing if it depends on more than
         these.
         """
-        if self.model.curve.in_space:  # known in doubles only
-            return ()
-        x, z = self.coordinates
-        potential = self.in_plane(self.model.effective_potential)
+        places, potential = self.coordinates, self.by_coordinates(self.model.effective_potential)
         if self.place in potential.free_symbols:
             return ()
-        outputs = (potential, differentiate(potential, x), differentiate(potential, z))
-        doc = "U, so that V**2 + 2*U is constant, and its derivatives with respect to x and z (paper, eq. 13)."
-        return (self.exact_function("effective_potential", doc, outputs, (x, z)),)
+        outputs = (potential, *(differentiate(potential, coordinate) for coordinate in places))
+        named = "x, y and z" if self.model.curve.in_space else "x and z"
+        doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
+        return (self.exact_function("effective_potential", doc, outputs, places),)
 
     def domain(self) -> ExactIR:
         """Return the formula for the range of the curve's parameter."""

@@ -71,14 +71,14 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
     return SeparatedIR(
         function=function,
         factors=factors,
-        parts=_parts_in_plane(lowering, tuple(potential)),
+        parts=_parts_by_coordinates(lowering, tuple(potential)),
         potentials=len(potential),
     )
 
 
-def _parts_in_plane(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR | None:
+def _parts_by_coordinates(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR | None:
     """Return the potential's parts in terms of coordinates; None if they depend on more than these."""
-    plane = tuple(map(lowering.in_plane, parts))
-    if any(lowering.place in part.free_symbols for part in plane):
+    forms = tuple(map(lowering.by_coordinates, parts))
+    if any(lowering.place in form.free_symbols for form in forms):
         return None
-    return lowering.exact_function("parts", "Parts of U, by coordinates.", plane, lowering.coordinates)
+    return lowering.exact_function("parts", "Parts of U, by coordinates.", forms, lowering.coordinates)

@@ -258,7 +258,10 @@ class SeparatedTerms(NamedTuple):
 
 
 class ExactPotential(NamedTuple):
-    """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives with respect to x and z."""
+    """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives with respect to x and z.
+
+    In space it is ``f(op, x, y, z, p)``, with the derivatives with respect to x, y and z.
+    """
 
     effective_potential: Callable[..., Any]
 

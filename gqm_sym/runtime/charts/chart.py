@@ -322,7 +322,13 @@ def assemble(
 
 
 def assemble_in_space(
-    edges: Array, anchors: Array, derivatives: Sequence[Array], *, period: float = 0.0, breaks: Any = ()
+    edges: Array,
+    anchors: Array,
+    derivatives: Sequence[Array],
+    *,
+    period: float = 0.0,
+    breaks: Any = (),
+    origins: Any = (),
 ) -> "SpaceChart":
     """Assemble the chart of a track in space from a chart of each coordinate, in which that coordinate is the height.
 
@@ -335,7 +341,7 @@ def assemble_in_space(
         their digits.
     derivatives : three (n, d, TERMS) arrays
         Their first three derivatives with respect to arc length at the nodes.
-    period, breaks
+    period, breaks, origins
         As `Chart` has them.
     """
     left = np.asarray(anchors, dtype=np.float64)
@@ -346,6 +352,7 @@ def assemble_in_space(
         high=float(edges[-1]),
         period=float(period),
         breaks=np.asarray(breaks, dtype=np.float64),
+        origins=np.asarray(origins, dtype=np.float64).reshape(-1, 3),
         banked=len(blocks) > 3,
     )
 

@@ -59,7 +59,7 @@ class Sampled:
     closed : bool
         Whether the track continues from the last point to the first. The first point is not repeated.
     in_space : bool
-        Whether the points have three coordinates. Such a track is known in doubles only.
+        Whether the points have three coordinates.
     banked : bool
         Whether points in space have a roll angle, in radians.
     """
@@ -80,7 +80,9 @@ class Sampled:
         return _made(self)[0]
 
     def is_exact(self, chart: Chart) -> bool:
-        """Return whether the track lies in the plane of x and z, where its polynomials are known exactly."""
+        """Return whether the track lies in the plane of x and z; one in space is known to the digits of double-double
+        arithmetic.
+        """
         return not self.in_space
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
@@ -109,7 +111,7 @@ class Sampled:
             return TruePieces(chart, lambda k: sample_plane(corners[k], corners[(k + 1) % count], nodes))
         t, c = spline.t, np.ascontiguousarray(spline.c)
         places = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
-        return TruePieces(chart, lambda k: sample_spline(t, c, places[k], nodes))
+        return TruePieces(chart, lambda k: sample_spline(t, c, places[k], nodes), in_space=self.in_space)
 
 
 @entry(SAMPLES(VECTOR, VECTOR, MATRIX))
@@ -134,15 +136,17 @@ def sample_spline(t, c, place, nodes):  # type: ignore[no-untyped-def]
     begins and ends.
     """
     k, begin, end = place
-    samples, terms = np.empty((2, 2, NODES_OF_PIECES)), np.empty((DEGREE + 1, 2))
+    dimension = min(c.shape[1], ROLL)
+    samples, terms = np.empty((dimension, 2, NODES_OF_PIECES)), np.empty((DEGREE + 1, 2))
     width, width_low = two_sum(0.5 * end, -0.5 * begin)
     for i in range(NODES_OF_PIECES):
         share, share_low = add(nodes[0, i], nodes[1, i], 1.0, 0.0)
         at, at_low = multiply(width, width_low, share, share_low)
         at, at_low = add(at, at_low, begin, 0.0)
-        for row in range(2):
+        for row in range(dimension):
+            column = row if dimension == 2 else (0, 2, 1)[row]
             for j in range(DEGREE + 1):
-                terms[j, 0], terms[j, 1] = c[k - DEGREE + j, row], 0.0
+                terms[j, 0], terms[j, 1] = c[k - DEGREE + j, column], 0.0
             for order in range(1, DEGREE + 1):
                 for j in range(DEGREE, order - 1, -1):
                     left = t[k - DEGREE + j]
@@ -227,8 +231,9 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     terms = _polynomials(points, knots, closed)
     terms[:, :, 0] += rates * knots[:-1, None]
     terms[:, :, 1] += rates
+    spline = _interpolated(points, knots, closed)
     if points.shape[1] > 2:
-        return _in_space(knots, terms, closed), None
+        return _in_space(knots, terms, spline, closed), spline
     pieces = rectify(lambda left, offsets: _evaluate(knots, terms, left, offsets), knots, where="sampled")
     edges, turn = summed(pieces.lengths), 0.0
     if closed:
@@ -236,12 +241,16 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     # The fifth derivative jumps at the points; on panels across them, the coefficients would stop decreasing at 1e-7 of
     # the integrand.
     breaks = edges[:-1] if closed else edges[1:-1]
-    spline = _interpolated(points, knots, closed)
-    parts = np.searchsorted(spline.t, pieces.places.mean(axis=1), side="right") - 1
-    return _assembled(pieces, parts, edges, turn, closed, breaks, ()), spline
+    return _assembled(pieces, _intervals(spline, pieces.places), edges, turn, closed, breaks, ()), spline
 
 
-def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
+def _intervals(spline: Any, places: Array) -> Indices:
+    """Return the index of the first knot of the spline's interval on which each piece lies."""
+    found: Indices = np.searchsorted(spline.t, places.mean(axis=1), side="right") - 1
+    return found
+
+
+def _in_space(knots: Array, terms: Array, spline: Any, closed: bool) -> Chart:
     """Return the chart of a spline in space, perhaps with a roll angle behind its coordinates."""
 
     def rows(left: Array, offsets: Array) -> Array:
@@ -277,6 +286,7 @@ def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
         derivatives,
         period=edges[-1] if closed else 0.0,
         breaks=edges[:-1] if closed else edges[1:-1],
+        origins=np.column_stack([_intervals(spline, found.places), found.places]),
     )
     return replace(chart, from_points=True)
 

@@ -28,7 +28,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
-from gqm_sym.runtime.double_double.recording import bind, record_in_plane
+from gqm_sym.runtime.double_double.recording import bind, record_by_coordinates
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
 # The largest distance of a start point from the curve, as a share of its larger coordinate; a nearer point is moved
@@ -161,10 +161,10 @@ class Traced:
         return Zeros(self, context, p)
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
-        """Return the curve in double-double arithmetic; None if F is too long a formula."""
+        """Return the curve in double-double arithmetic; None if F is too long a formula, or not smooth."""
         from mpmath.ctx_mp import MPContext
 
-        formulas = bind(record_in_plane(self.level, len(p)), p)
+        formulas = bind(record_by_coordinates(self.level, len(p)), p) if self.is_exact(chart) else None
         if formulas is None:
             return None
         context = MPContext()

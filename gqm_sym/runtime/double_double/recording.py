@@ -45,8 +45,8 @@ class Tape(NamedTuple):
     registers : tuple of int
         The positions in the work space of the registers of the first run-time parameter, the place, the effective
         potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative if there is none). For a
-        function of the plane (`record_in_plane`): the first run-time parameter, x (z follows), the function, its
-        derivatives with respect to x and z, and nothing.
+        function of coordinates (`record_by_coordinates`): the first run-time parameter, x (z and y follow), the
+        function, and its derivatives with respect to x, z and y (negative in a plane).
     """
 
     operations: NDArray[np.int64]
@@ -341,24 +341,31 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
 
 
 @lru_cache(maxsize=64)
-def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded | None:
-    """Return the tape of a function ``f(op, x, z, p)`` that gives a value and its derivatives with respect to x and z.
+def record_by_coordinates(function: Callable[..., Any], parameters: int, dimension: int = 2) -> Recorded | None:
+    """Return the tape of a function ``f(op, x, z, p)``, or ``f(op, x, y, z, p)`` in space, that gives a value and its
+    derivatives with respect to the coordinates.
 
     It is None if it is too long.
     """
-    op = _Recorder(parameters, coordinates=2)
-    value, *slopes = map(op.register, function(op, *op.places, op.values))
-    return op.finished((value,), slopes)
+    op = _Recorder(parameters, dimension)
+    value, *slopes = map(op.register, function(op, *_in_order(op.places), op.values))
+    by_x, by_z, *by_y = _in_order(slopes)
+    return op.finished((value,), (by_x, by_z), *by_y)
+
+
+def _in_order(coordinates: Sequence[Any]) -> Sequence[Any]:
+    """Return x, z and y as x, y and z, and conversely; x and z stay as they are."""
+    return coordinates if len(coordinates) == 2 else [coordinates[k] for k in (0, 2, 1)]
 
 
 @lru_cache(maxsize=64)
-def record_values_in_plane(function: Callable[..., Any], parameters: int, count: int) -> Recorded | None:
-    """Return the tape of the first values that a function ``f(op, x, z, p)`` gives; None if it is too long.
+def record_values(function: Callable[..., Any], parameters: int, count: int, dimension: int) -> Recorded | None:
+    """Return the tape of the first values that a function of coordinates gives; None if it is too long.
 
     Its registers are those of the first run-time parameter, of x and of these values; the rest are empty.
     """
-    op = _Recorder(parameters, coordinates=2)
-    found = function(op, *op.places, op.values)
+    op = _Recorder(parameters, dimension)
+    found = function(op, *_in_order(op.places), op.values)
     values = found if isinstance(found, tuple) else (found,)
     return op.finished([op.register(value) for value in values[:count]], ())
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from gqm_sym.runtime.charts.double_double.pieces import TruePieces
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.double_double.recording import BoundTape, record, record_in_plane
+from gqm_sym.runtime.double_double.recording import BoundTape, record, record_by_coordinates
 from gqm_sym.runtime.double_double.recording import bind as bind_tape
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
@@ -109,7 +109,7 @@ class Problem:
             return None
         if p.true_pieces is None:
             chart = self.formulas.charted(p)
-            p.true_pieces = (maker.is_exact(chart) and true_pieces_of(maker, p, chart)) or False
+            p.true_pieces = true_pieces_of(maker, p, chart) or False
         return p.true_pieces or None
 
     @property
@@ -145,7 +145,8 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
         if isinstance(exact, ExactFormulas) and domain is not None:
             found = record(exact, domain, len(p))
         elif isinstance(exact, ExactPotential):
-            found = record_in_plane(exact.effective_potential, len(p))
+            dimension = 2 if formulas.path_in_space is None else 3
+            found = record_by_coordinates(exact.effective_potential, len(p), dimension)
         p.tape = bind_tape(found, p) or False
     return p.tape or None
 

@@ -111,7 +111,8 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
             f"lam0: {place.text} is so many laps away that doubles cannot tell places apart; the curve repeats after "
             f"{domain.period!r}"
         )
-    return Launch(place, speed, direction, contact, horizon, point_place)
+    # This avoids the constructor of a named tuple, which is slow.
+    return tuple.__new__(Launch, (place, speed, direction, contact, horizon, point_place))
 
 
 def _read_direction(given: Any) -> int:

@@ -160,6 +160,11 @@ def _conditions(problem: Problem) -> Conditions:
     return known
 
 
+def turned(record: Array, before: Array | None) -> Run:
+    """Return a run to a turn. Each launch has one, so this avoids the constructor of a named tuple, which is slow."""
+    return tuple.__new__(Run, (record, END_TURN, END_NAMES[END_TURN], None, before, None))
+
+
 class Driver:
     """A body that is driven by some more legs at each request.
 
@@ -173,17 +178,10 @@ class Driver:
     Attributes
     ----------
     problem : Problem
-    dissipation : Dissipation
-        The forces on the body.
-    track : Track
-        The curve.
     runs : list of Run
         The runs so far that have not been removed from this list.
     body : array
         The lines of the body (`legs.body`); the first one is its present state.
-    at : list of float
-        That line in terms of the curve parameter, also while the body is followed by its distance from an equilibrium;
-        empty before the first leg.
     ending : str
         The name of the end of the motion; empty as long as there is none.
     last_swing : float
@@ -200,58 +198,80 @@ class Driver:
     launch_error: float | None = None
     _last_record: Array = np.empty(0)
     _frame: Frame | None = None
+    _is_launched = False
+    # The place of a body that is followed by its distance from an equilibrium.
+    _place_in_frame = 0.0
+    # The number of panels for which a record has space, if it is not that of the conditions.
+    _space = 0
 
     def __init__(self, problem: Problem, horizon: float) -> None:
-        launch = problem.launch
-        self.problem = problem
-        self.dissipation, self.track, self._parameters, self._passes, self._space, lines = _conditions(problem)
+        launch, self.problem, self._horizon = problem.launch, problem, horizon
+        self._conditions = conditions = _conditions(problem)
         self.runs: list[Run] = []
-        self.at: list[float] = []
-        self._horizon = horizon
-        self.body = body = lines.copy()
+        self.body = body = conditions.lines.copy()
         body[0, LAM0], body[0, PREFERRED], body[0, V2] = launch.lam0.value, launch.direction, problem.w0
         if horizon < inf:
             body[0, HORIZON] = horizon
 
     @property
+    def dissipation(self) -> Dissipation:
+        """The forces on the body."""
+        return self._conditions.dissipation
+
+    @property
+    def track(self) -> Track:
+        """The curve."""
+        return self._conditions.track
+
+    @property
+    def place(self) -> float:
+        """The place of the body, within one lap."""
+        return self.number(PLACE) if self._frame is None else self._place_in_frame
+
+    @property
     def reached(self) -> float:
         """The place up to which the body has been driven."""
-        place: float = self.at[PLACE] + self.at[LAPS] * self.problem.period
-        return place
+        return self.place + self.number(LAPS) * self.problem.period
 
     @property
     def elapsed(self) -> float:
         """The time in s up to which the body has been driven."""
-        elapsed: float = self.at[ELAPSED]
-        return elapsed
+        return self.number(ELAPSED)
+
+    def number(self, at: int) -> float:
+        """Return one of the numbers of the body (`legs.body`)."""
+        number: float = self.body.item(at)
+        return number
 
     @property
     def is_endless(self) -> bool:
         """Whether so many legs have been followed that no end of the motion is searched for any more."""
-        turns, pauses = self.at[TURNS], self.at[PAUSES]
-        return bool(pauses >= MAX_PAUSES or turns > MAX_TURNS or (turns and not self.at[MAY_REST]))
+        number = self.body.item
+        turns = number(TURNS)
+        return bool((turns and not number(MAY_REST)) or turns > MAX_TURNS or number(PAUSES) >= MAX_PAUSES)
 
     def go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        if self.at and self.at[PANEL_COUNT] >= MAX_STORED:
+        number = self.body.item
+        if number(PANEL_COUNT) >= MAX_STORED:
             if self._force_cancels(self._last_record):
                 raise self._lost(self._last_record)
             raise BudgetError(
-                f"motion: {self.at[PANEL_COUNT]:.0f} pieces of legs reach t = {self.elapsed!r} only; "
+                f"motion: {number(PANEL_COUNT):.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         what, records = self._followed()
-        frame, at = self._frame, self.body[0].tolist()
-        if not at[DIRECTION] and not at[TURNS]:
+        if what != END_TURN and not number(DIRECTION) and not number(TURNS):
             return  # the body stays where it is
-        self.at, count = at, int(at[VALUE]) or 1
-        self._last_record = records[count - 1]
-        before = self.body[1 : 1 + count].copy() if self._passes and frame is None else [None] * count
-        is_plain = what == END_TURN and frame is None and not at[STATUS]
-        for k in range(count if is_plain else count - 1):
-            self.runs.append(Run(records[k], END_TURN, END_NAMES[END_TURN], None, before[k]))
-        if not is_plain:
-            self._end_run(what, self._last_record, before[-1])
+        count = 1 if len(records) == 1 else int(number(VALUE))
+        before = self.body[1 : 1 + count].copy() if self._conditions.passes and self._frame is None else [None] * count
+        for k in range(count - 1):
+            self.runs.append(turned(records[k], before[k]))
+        self._last_record = last = records[count - 1]
+        if what == END_TURN and self._frame is None and not number(STATUS):
+            self.runs.append(turned(last, before[-1]))
+        else:
+            self._end_run(what, last, before[-1])
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
@@ -261,7 +281,7 @@ class Driver:
         space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))
-            what = drive_along(self.track, self.dissipation, self._parameters, RUN_AGAIN, body, record)
+            what = drive_along(self.track, self.dissipation, self._conditions.parameters, RUN_AGAIN, body, record)
             # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
             left = abs(float(run.record[END] - record[0, END]))
             if what in PASSED or (what == END_PAUSE and left <= ULP * self.problem.period):
@@ -279,7 +299,7 @@ class Driver:
         problem, frame = self.problem, self._frame
         if frame is not None:
             frame.move(record, 1)
-            self.at[PLACE] = float(record[END])
+            self._place_in_frame = float(record[END])
         heading, leaves_frame = int(record[HEADING]), frame is not None and what == END_LIMIT
         if leaves_frame:
             self._leave_frame(record)
@@ -293,11 +313,11 @@ class Driver:
         if what == END_TOO_MANY_PANELS or (what == END_TOO_NARROW and name != "cusp" and self._force_cancels(record)):
             raise self._lost(record)
         self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
-        if self.at[ENDING]:
+        if self.number(ENDING):
             self.ending = name
         if what == END_OVERFLOW:
             raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self.at[PLACE]!r}; "
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self.place!r}; "
                 "give a shorter t_max"
             )
 
@@ -305,12 +325,16 @@ class Driver:
         """Return the code for the end of the last of the next legs (`advance`), and an array that begins with their
         records.
         """
-        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
+        dissipation, track, parameters, _, space, _ = self._conditions
+        legs, question = 1, FIRST_LEGS
+        if self._is_launched:
+            legs, question = LEGS_PER_CALL if self._horizon < inf else 1, LEGS
+        self._is_launched = True
         while True:
             frame = self._frame
-            records = np.empty((legs if frame is None else 1, self._space * COLUMNS))
+            records = np.empty((legs if frame is None else 1, (self._space or space) * COLUMNS))
             if frame is None:
-                what = drive_along(self.track, self.dissipation, self._parameters, question, self.body, records)
+                what = drive_along(track, dissipation, parameters, question, self.body, records)
             else:
                 what = drive_along(SMOOTH, frame.dissipation, frame.p[None], question, self.body, records)
             if what == END_NEAR_EQUILIBRIUM:
@@ -321,7 +345,7 @@ class Driver:
             elif self.body[0, VALUE]:
                 return END_TURN, records
             else:
-                legs, self._space = 1, 4 * self._space
+                legs, self._space = 1, 4 * (self._space or space)
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Decide whether a run has come so close to an equilibrium that the motion ends there, or is followed in a
@@ -334,7 +358,7 @@ class Driver:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame:
             turns_nearby = what == END_TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
-            creeps = what == END_PAUSE and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
+            creeps = what == END_PAUSE and self.number(STEP) <= CREEPING_SHARE * self.number(FIRST_STEP)
             if turns_nearby or creeps:
                 self._enter_frame()
 
@@ -414,7 +438,7 @@ class Driver:
             line[PLACE] = 0.0  # the body stays there
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame = frame
+        self._frame, self._place_in_frame = frame, place
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
 
@@ -439,7 +463,6 @@ class Driver:
         line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period
         line[FIRST_STEP], line[REACH] = step, domain.period or step
-        self.at = line.tolist()
 
     def _cusp_ahead(self, record: Array, heading: int) -> float:
         """Return the place of a cusp close ahead of the end of a run; the time to it is less than a rounding of the

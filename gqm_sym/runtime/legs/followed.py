@@ -12,7 +12,7 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import DIRECTION, PLACE, TURNS
+from gqm_sym.runtime.legs.body import DIRECTION, TURNS
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
@@ -27,15 +27,14 @@ class FollowedMotion(Motion):
     """A motion that loses energy, followed as far as required; `DissipativeMotion` answers the questions about it."""
 
     _whole: Trajectory | None = None
-    # The number of runs that `_look_ahead` computes of a motion for which it finds no end; 0 as long as that is not
-    # known.
-    _beginning = 0
+    _known_beginning = 0
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "dissipative", problem.launch.direction)
         self._driver = Driver(problem, self._horizon)
-        self._go_on()
-        self.direction = int(self._driver.runs[0].record[HEADING]) if self._driver.runs else 0
+        self._driver.go_on()
+        if problem.w0 == 0.0:
+            self.direction = int(self._driver.runs[0].record[HEADING]) if self._driver.runs else 0
 
     # -- what `Motion` needs ------------------------------------------------------------------
 
@@ -65,7 +64,7 @@ class FollowedMotion(Motion):
         if driver.ending == "asymptote" and not driver.last_swing and t > self._pieces[-1].t_stop[0]:
             raise SolutionError(
                 f"t = {t!r}: by then the body is closer to the equilibrium at "
-                f"{self.problem.formulas.parameter} = {driver.at[PLACE]!r} than doubles can tell"
+                f"{self.problem.formulas.parameter} = {driver.place!r} than doubles can tell"
             )
 
     def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
@@ -94,7 +93,7 @@ class FollowedMotion(Motion):
             found = passages(trajectory.segments[done:], trajectory, lam, low)
             done = len(trajectory.segments)
             # A body that has turned at two points reaches no place outside of them any more.
-            settled = driver.at[TURNS] >= (1.0 if self.problem.w0 == 0.0 else 2.0)
+            settled = driver.number(TURNS) >= (1.0 if self.problem.w0 == 0.0 else 2.0)
             if found or driver.ending or settled or driver.elapsed >= self._horizon:
                 return found
             self._go_on()
@@ -137,12 +136,20 @@ class FollowedMotion(Motion):
         ends = self._driver.ending not in ("", "asymptote")
         return min(self._horizon, self._driver.elapsed if ends else inf)
 
+    @property
+    def _beginning(self) -> int:
+        """The number of runs that `_look_ahead` computes of a motion for which it finds no end; 0 as long as that is
+        not known.
+        """
+        driver = self._driver
+        if not self._known_beginning and self._horizon == inf and not driver.ending and driver.is_endless:
+            self._known_beginning = len(self._all_runs)
+        return self._known_beginning
+
     def _go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        driver = self._driver
-        driver.go_on()
-        if self._horizon == inf and not self._beginning and driver.at and not driver.ending and driver.is_endless:
-            self._beginning = len(self._all_runs)
+        self._known_beginning = self._beginning  # before it can change
+        self._driver.go_on()
 
     def _follow(self, reach: float) -> None:
         """Compute legs up to a time in s, and up to the horizon if there is one."""
@@ -170,10 +177,10 @@ class FollowedMotion(Motion):
         for run in self._driver.runs:
             parts = self._driver.with_panels(run)
             if len(self._layout.runs) + len(runs) < self._beginning:
-                self._beginning += len(parts) - 1
+                self._known_beginning += len(parts) - 1
             runs += parts
         self._driver.runs = runs
 
     def _is_ahead(self, places: Array) -> bool:
         """Return whether one of the places lies ahead of the part that has been computed."""
-        return bool(np.any((places - self._driver.reached) * self._driver.at[DIRECTION] > 0.0))
+        return bool(np.any((places - self._driver.reached) * self._driver.number(DIRECTION) > 0.0))

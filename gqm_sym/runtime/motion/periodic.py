@@ -68,7 +68,9 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
-        if self.problem.true_pieces is None or self.problem.tape is None or self.problem.formulas.rolling_radius:
+        formulas = self.problem.formulas
+        is_planar = formulas.path_in_space is None and not formulas.rolling_radius
+        if not is_planar or self.problem.true_pieces is None or self.problem.tape is None:
             raise without_formulas()
         passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
         if passage is None:

@@ -207,7 +207,7 @@ def tabulated(
 ) -> CurveTable:
     """Return the table of a chart; it is made once for the same parameters, which are followed by functions of them."""
     chart, true = chart_with(maker, values), None
-    if exact_parts is not None and maker.is_exact(chart):
+    if exact_parts is not None:
         p = tuple(read_number(value, where="p") for value in values)
         try:
             pieces = true_pieces_of(maker, p[:parameters], chart)

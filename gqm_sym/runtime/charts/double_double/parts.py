@@ -1,4 +1,4 @@
-"""Divided differences of functions of the plane along a chart, in arc length and from double-double arithmetic."""
+"""Divided differences of functions of coordinates along a chart, in arc length and from double-double arithmetic."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -24,11 +24,11 @@ from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.quadrature import TAPE
-from gqm_sym.runtime.double_double.recording import NOWHERE, bind, record_values_in_plane
+from gqm_sym.runtime.double_double.recording import NOWHERE, bind, record_values
 
 
 class TrueParts(NamedTuple):
-    """Functions of the plane along a curve.
+    """Functions of the coordinates along a curve.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ def fill_values(parts, number, n, u, values):  # type: ignore[no-untyped-def]
     address, operations, ends, _ = parts.tape
     points = stacked_points()
     fill_path(parts.curve, number, n, u, points)
-    fill_registers(parts.tape, parts.work, n, points, 0.0)
+    fill_registers(parts.curve, parts.tape, parts.work, n, points, 0.0)
     call_interpreter(address, operations, ends[0], ends[1], parts.work, n)
     for row in range(parts.values.size):
         for i in range(n):
@@ -131,13 +131,13 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
 def parts_along(
     pieces: TruePieces, function: Callable[..., Any], count: int, p: Sequence[Number], offset: Pair = ZERO
 ) -> TrueParts | None:
-    """Return the first functions that ``function(op, x, z, p)`` gives, along a curve; None if their formulas are too
-    long.
+    """Return the first functions that ``function(op, x, z, p)`` gives, or ``function(op, x, y, z, p)`` in space, along
+    a curve; None if their formulas are too long.
 
-    ``offset`` is the distance of the body's path to the left of the curve (`TrueCurve`); x and z are coordinates of
+    ``offset`` is the distance of the body's path to the left of the curve (`TrueCurve`); the coordinates are those of
     that path.
     """
-    found = bind(record_values_in_plane(function, len(p), count), p)
+    found = bind(record_values(function, len(p), count, pieces.curve.terms.shape[1] // 2), p)
     if found is None:
         return None
     pieces.make(0, len(pieces.curve.counts) - 1)

@@ -1,4 +1,4 @@
-"""The curve behind a chart in double-double arithmetic: polynomials of its coordinates, one pair for each piece.
+"""The curve behind a chart in double-double arithmetic: polynomials of its coordinates on each piece.
 
 A chart is accurate to the rounding of doubles. Here the coordinates of the curve itself are sampled on each piece of
 the chart, in a parameter u in [-1, 1] that the kind of the curve chooses, and a polynomial of degree 31 goes through
@@ -50,11 +50,15 @@ MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives with respect to u, two doubles each.
-# `offset_path.fill_path` adds the length of the path over that of the curve.
-X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
+# Columns of the points that `fill_points` fills: x, z and their derivatives with respect to u, two doubles each; then
+# the length of the path over that of the curve, which `offset_path.fill_path` adds; and y with its derivative, for a
+# curve in space.
+X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE, Y, Y_LOW, DY, DY_LOW = range(0, 13 * RULE, RULE)
 
-stacked_points, stacked_places = on_stack(9 * RULE), on_stack(2 * RULE)
+# The rows of the terms of a curve in space: two for each coordinate, in the order x, z, y.
+ROWS_IN_SPACE = 6
+
+stacked_points, stacked_places = on_stack(13 * RULE), on_stack(2 * RULE)
 
 
 class TrueCurve(NamedTuple):
@@ -62,8 +66,8 @@ class TrueCurve(NamedTuple):
 
     Attributes
     ----------
-    terms : (n, 4, NODES) array
-        Powers of u for x and z, the high doubles of each before the low ones.
+    terms : (n, 4, NODES) or (n, ROWS_IN_SPACE, NODES) array
+        Powers of u for x and z, and for y if the curve is in space, the high doubles of each before the low ones.
     counts : (n, 2) array of int
         The number of powers that need two doubles, and the number of all powers.
     errors : (n, 2) array
@@ -125,6 +129,12 @@ def unshared(curve):  # type: ignore[no-untyped-def]
     )
 
 
+@Inlined
+def is_in_space(curve):  # type: ignore[no-untyped-def]
+    """Return whether a curve has a third coordinate, y."""
+    return curve.terms.shape[1] == ROWS_IN_SPACE
+
+
 @Inner
 def piece_of(curve, number):  # type: ignore[no-untyped-def]
     """Return the index of a piece; on a closed curve the numbers continue beyond the last piece."""
@@ -136,9 +146,10 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
     """Fill the points at the places ``u`` (the high doubles, then the low ones) on a piece."""
     k = piece_of(curve, number)
     precise, count = curve.counts[k, 0], curve.counts[k, 1]
-    for row in range(2):
-        value, value_low = points[X + 2 * row * RULE :], points[X_LOW + 2 * row * RULE :]
-        slope, slope_low = points[DX + 2 * row * RULE :], points[DX_LOW + 2 * row * RULE :]
+    for row in range(curve.terms.shape[1] // 2):
+        first, second = (X + 2 * row * RULE, DX + 2 * row * RULE) if row < 2 else (Y, DY)
+        value, value_low = points[first:], points[first + RULE :]
+        slope, slope_low = points[second:], points[second + RULE :]
         for i in range(n):
             value[i], value_low[i], slope[i], slope_low[i] = 0.0, 0.0, 0.0, 0.0
         for j in range(count - 1, precise - 1, -1):
@@ -153,6 +164,18 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
                 slope[i], slope_low[i] = sloppy_add(s, s_low, value[i], value_low[i])
                 s, s_low = multiply(value[i], value_low[i], u[i], u[RULE + i])
                 value[i], value_low[i] = sloppy_add(s, s_low, term, term_low)
+
+
+@Inlined
+def squared_rate(curve, points, i):  # type: ignore[no-untyped-def]
+    """Return the square of the derivative of arc length with respect to u at a point, as two doubles."""
+    s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
+    t, t_low = multiply(points[DZ + i], points[DZ_LOW + i], points[DZ + i], points[DZ_LOW + i])
+    s, s_low = sloppy_add(s, s_low, t, t_low)
+    if is_in_space(curve):
+        t, t_low = multiply(points[DY + i], points[DY_LOW + i], points[DY + i], points[DY_LOW + i])
+        s, s_low = sloppy_add(s, s_low, t, t_low)
+    return s, s_low
 
 
 @Inner
@@ -170,10 +193,7 @@ def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
     fill_points(curve, number, RULE, u, points)
     total, low, one, two = 0.0, 0.0, 0.0, 0.0
     for i in range(RULE):
-        s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
-        t, t_low = multiply(points[DZ + i], points[DZ_LOW + i], points[DZ + i], points[DZ_LOW + i])
-        s, s_low = sloppy_add(s, s_low, t, t_low)
-        s, s_low = square_root(s, s_low)
+        s, s_low = square_root(*squared_rate(curve, points, i))
         s, s_low = multiply(s, s_low, rule[2, i], rule[3, i])
         total, low = add(total, low, s, s_low)
         one += curve.tails[0, i] * s
@@ -191,7 +211,7 @@ def speed_at(curve, number, place):  # type: ignore[no-untyped-def]
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = place
     fill_points(curve, number, 1, u, points)
-    return sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
+    return sqrt(squared_rate(curve, points, 0)[0])
 
 
 @Inner
@@ -241,7 +261,9 @@ def arc_between(curve, number, place, other, to):  # type: ignore[no-untyped-def
 
 @Inner
 def foot(curve, number, place, point):  # type: ignore[no-untyped-def]
-    """Return the place on a piece, near a place on it, where the perpendicular from a point meets the curve."""
+    """Return the place on a piece of a planar curve, near a place on it, where the perpendicular from a point meets the
+    curve.
+    """
     x, x_low, z, z_low = point
     u, points = stacked_places(), stacked_points()
     for _ in range(MAX_STEPS):
@@ -295,15 +317,16 @@ def fill_piece(curve, k, samples, error, fit, powers):  # type: ignore[no-untype
         The curve.
     k : int
         The piece.
-    samples : (2, 2, NODES) array
-        x and z at the Chebyshev points: the high doubles of each, then the low ones.
+    samples : (d, 2, NODES) array
+        x and z, and y in space, at the Chebyshev points: the high doubles of each, then the low ones.
     error : float
         A bound on their errors.
     fit, powers : arrays
         The matrices that map values to Chebyshev coefficients, and these to coefficients of powers.
     """
     terms, series, count, rounding = curve.terms[k], np.zeros((2, NODES)), 2, error
-    for row in range(2):
+    dimension = samples.shape[0]
+    for row in range(dimension):
         first, first_low, size = samples[row, 0, 0], samples[row, 1, 0], 0.0
         for j in range(NODES):
             high, low = 0.0, 0.0
@@ -324,8 +347,9 @@ def fill_piece(curve, k, samples, error, fit, powers):  # type: ignore[no-untype
                 part, part_low = multiply(series[0, j], series[1, j], powers[j, i], 0.0)
                 high, low = add(high, low, part, part_low)
             terms[2 * row, i], terms[2 * row + 1, i] = high, low
-    enough, precise = MAX_DOUBLE_SHARE * (fabs(terms[0, 1]) + fabs(terms[2, 1])), count
-    while precise > 2 and max(fabs(terms[0, precise - 1]), fabs(terms[2, precise - 1])) <= enough:
+    high_terms = np.abs(terms[: 2 * dimension : 2])
+    enough, precise = MAX_DOUBLE_SHARE * high_terms[:, 1].sum(), count
+    while precise > 2 and high_terms[:, precise - 1].max() <= enough:
         precise -= 1
     curve.counts[k, 0], curve.counts[k, 1] = precise, count
     curve.errors[k, 0], curve.errors[k, 1] = rounding, NODES * rounding
@@ -353,8 +377,8 @@ def chebyshev_fit() -> Array:
     return _tables()[1]
 
 
-# The coordinates of one piece at the Chebyshev points as an array (2, 2, NODES), and a bound on their errors; and its
-# type in compiled code.
+# The coordinates of one piece at the Chebyshev points as an array (d, 2, NODES), in the order x, z, y, and a bound on
+# their errors; and its type in compiled code.
 Samples = tuple[Array, float]
 SAMPLES = types.Tuple((types.float64[:, :, ::1], REAL))
 
@@ -371,15 +395,22 @@ class TruePieces:
     start : tuple of float, optional
         x and z of the start point, two doubles each, near the left edge of the piece that begins at arc length 0; None
         if it is that edge.
+    in_space : bool
+        Whether the curve has a third coordinate.
     """
 
     def __init__(
-        self, chart: Chart, sample: Callable[[int], Samples], start: tuple[float, float, float, float] | None = None
+        self,
+        chart: Chart,
+        sample: Callable[[int], Samples],
+        start: tuple[float, float, float, float] | None = None,
+        *,
+        in_space: bool = False,
     ) -> None:
         count = chart.edges.size - 1
         self._sample, self._point, self._tables = sample, start, _tables()
         self.curve = TrueCurve(
-            np.zeros((count, 4, NODES)),
+            np.zeros((count, ROWS_IN_SPACE if in_space else 4, NODES)),
             np.zeros((count, 2), dtype=np.int64),
             np.zeros((count, 2)),
             np.full((count, 3), nan),

@@ -7,14 +7,20 @@ from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
     DX_LOW,
+    DY,
+    DY_LOW,
     DZ,
     DZ_LOW,
     SHARE,
     X_LOW,
+    Y_LOW,
     Z_LOW,
     X,
+    Y,
     Z,
+    is_in_space,
     piece_of,
+    squared_rate,
     stacked_places,
     stacked_points,
 )
@@ -38,13 +44,16 @@ class Path(NamedTuple):
 
 
 @Inner
-def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def]
-    """Fill the registers of the coordinates from points."""
+def fill_registers(curve, tape, work, n, points, error):  # type: ignore[no-untyped-def]
+    """Fill the registers of the coordinates from points of a curve."""
     place = tape[3][1]
     for i in range(n):
         x, z = place + i, place + ROW + i
         work[x], work[x + LOW], work[x + ERROR] = points[X + i], points[X_LOW + i], error
         work[z], work[z + LOW], work[z + ERROR] = points[Z + i], points[Z_LOW + i], error
+        if is_in_space(curve):
+            y = z + ROW
+            work[y], work[y + LOW], work[y + ERROR] = points[Y + i], points[Y_LOW + i], error
 
 
 @Inner
@@ -59,13 +68,16 @@ def energy_at(path, number, place):  # type: ignore[no-untyped-def]
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = place
     error, _ = fill_path(curve, number, 1, u, points)
-    fill_registers(tape, work, 1, points, error)
+    fill_registers(curve, tape, work, 1, points, error)
     call_interpreter(address, operations, parts[0], parts[2], work, 1)
-    value, by_x, by_z = registers[2], registers[3], registers[4]
+    _, _, value, by_x, by_z, by_y = registers
     s, s_low = multiply(work[by_x], work[by_x + LOW], points[DX], points[DX_LOW])
     t, t_low = multiply(work[by_z], work[by_z + LOW], points[DZ], points[DZ_LOW])
     slope = add(s, s_low, t, t_low)
-    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ]) / fabs(points[SHARE])
+    if is_in_space(curve):
+        t, t_low = multiply(work[by_y], work[by_y + LOW], points[DY], points[DY_LOW])
+        slope = add(slope[0], slope[1], t, t_low)
+    speed = sqrt(squared_rate(curve, points, 0)[0]) / fabs(points[SHARE])
     return (work[value], work[value + LOW], work[value + ERROR]), slope, speed
 
 

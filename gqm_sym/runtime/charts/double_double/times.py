@@ -12,10 +12,7 @@ import numpy as np
 
 from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
-    DX,
-    DX_LOW,
-    DZ,
-    DZ_LOW,
+    squared_rate,
     stacked_places,
     stacked_points,
 )
@@ -77,15 +74,13 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     width = add(right[0], right[1], -left[0], -left[1])
     fill_places(curve, left, width, spread, u, factors)
     error, rate_error = fill_path(curve, number, RULE, u, points)
-    fill_registers(tape, work, RULE, points, error)
+    fill_registers(curve, tape, work, RULE, points, error)
     call_interpreter(address, operations, parts[0], parts[1], work, RULE)
     potential = work[registers[2] : registers[2] + ROW]
     from_turn, q, shift, rate = spread[0] != 0.0 and left[0] == 0.0, 1.0, level[3], 0.0
     for i in range(RULE):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
-        s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
-        t, t_low = multiply(points[DZ + i], points[DZ_LOW + i], points[DZ + i], points[DZ_LOW + i])
-        s, s_low = add(s, s_low, t, t_low)
+        s, s_low = squared_rate(curve, points, i)
         t, t_low = divide(0.5 * s, 0.5 * s_low, half, half_low)
         t, t_low = square_root(t, t_low)
         rate = t

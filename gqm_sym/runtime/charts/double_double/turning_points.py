@@ -68,7 +68,8 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
     curve : TrueCurve
         The curve.
     tape : (address, operations, parts, registers)
-        The address of the interpreter, and the potential as a function of the plane (`recording.record_in_plane`).
+        The address of the interpreter, and the potential by coordinates
+        (`recording.record_by_coordinates`).
     work, p
         As for `orbit_time.orbit_time`.
     launch : tuple of float

@@ -11,7 +11,7 @@ integrals of t, keep these digits as two doubles each.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from math import ceil, comb, cos, sin
+from math import ceil, comb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,15 +22,19 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, divided, summed
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, assemble_in_space
+from gqm_sym.runtime.charts.double_double.pieces import TruePieces
 from gqm_sym.runtime.charts.rail import MAX_MISMATCH, MAX_TOTAL_TURN
+from gqm_sym.runtime.charts.space.true_rail import (
+    PIECE_NUMBERS,
+    POWERS,
+    TrueRail,
+    level_frame,
+    rates_of,
+    starting_frame,
+)
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-
-# The coefficients of each of the three rates of a transition, in powers of the distance from its beginning.
-POWERS = 6
-# The numbers that define each piece: the length of a transition, followed by the coefficients of its rates.
-PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
 
 # The frame turns by less than MAX_TURN over RADIUS times the length of a part, also where distances are complex: terms
 # of its series on the part fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
@@ -41,6 +45,9 @@ RADIUS, MAX_TURN, TERMS = 4.0, 2.0, 36
 REFINEMENTS, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
 # The matrix that maps values at the nodes to those of the derivative.
 DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
+
+# The largest number of pieces of a chart for which the rail is computed in double-double arithmetic, in about a second.
+MAX_TRUE_PIECES = 10_000
 
 # Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these with respect to
 # arc length.
@@ -57,12 +64,14 @@ class Pose(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """The n pieces of the chart of one part of the rail: their lengths, coordinates at left edges, and t, t', t'' at
-    nodes.
+    """The n pieces of the chart of one part of the rail: where they begin and end in the part's own parameter, their
+    lengths, coordinates at left edges, and t, t', t'' at nodes.
 
-    The coordinates are followed by the roll angle of a banked rail.
+    The coordinates are followed by the roll angle of a banked rail. The parameter of a curve with formulas is the share
+    of its range; that of other parts counts the pieces.
     """
 
+    places: Array
     lengths: Array
     anchors: Long
     slopes: Array
@@ -85,6 +94,8 @@ class SpaceRail:
         Whether the start is given; otherwise the first piece is a curve, which has a place of its own.
     segments : tuple of int
         Addresses of the compiled functions of the curves among the pieces, in order.
+    formulas
+        The same curves as ``f(op, lam, p)``: x, y, z and their derivatives.
     closed : bool
         Whether the end is joined to the start.
     banked : bool
@@ -97,6 +108,7 @@ class SpaceRail:
     pieces: tuple[str, ...]
     placed: bool
     segments: tuple[int, ...] = ()
+    formulas: tuple[Callable[..., Any], ...] = ()
     closed: bool = False
     banked: bool = False
     shaped_by: tuple[int, ...] | None = None
@@ -112,7 +124,8 @@ class SpaceRail:
             If pieces do not meet, a closed rail does not close, or the frame of a banked one has no roll angle.
         """
         numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
-        pose = _start(*(float(number) for number in islice(numbers, 6))) if self.placed else None
+        given_start = np.array([float(number) for number in islice(numbers, 6 * self.placed)], dtype=np.longdouble)
+        pose = _start(given_start) if self.placed else None
         start, parts, joints = pose, [], [0.0]
         for count, kind in enumerate(self.pieces, start=1):
             where = f"piecewise: piece {count} ({kind})"
@@ -142,7 +155,8 @@ class SpaceRail:
                     f"{float(pose.roll_angle)!r} rad at its end, and {float(start.roll_angle)!r} rad at its start"
                 )
                 raise DeclarationError(f"piecewise: closed: the rail leans by {roll_angles}; let it roll back")
-        lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        places, lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        which = np.repeat(np.arange(len(parts)), [part.lengths.size for part in parts])
         edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
         return assemble_in_space(
             edges,
@@ -151,30 +165,29 @@ class SpaceRail:
             period=edges[-1] if self.closed else 0.0,
             # Breaks are edges of the chart, to the last bit.
             breaks=edges[np.abs(edges[:, None] - np.array(inner)).argmin(axis=0)] if inner else (),
+            origins=np.column_stack([which, places]),
         )
 
     def is_exact(self, chart: Chart) -> bool:
-        """Return False: the rail is known in doubles only."""
+        """Return False: the rail is known to the digits of double-double arithmetic."""
         return False
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Any:
-        """Return None, because the rail is known in doubles only."""
+        """Return None, because the rail is known to the digits of double-double arithmetic only."""
         return None
 
-    def true_pieces(self, p: Sequence[Number], chart: Chart) -> Any:
-        """Return None, because the rail is known in doubles only."""
-        return None
+    def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
+        """Return the rail in double-double arithmetic; None if it has too many pieces for that."""
+        if chart.edges.size > MAX_TRUE_PIECES:
+            return None
+        rail = TrueRail(self.pieces, self.placed, self.numbers, self.formulas, p, chart)
+        return TruePieces(chart, rail.sample, in_space=True)
 
 
-def _start(x: float, y: float, z: float, heading: float, climb: float, roll: float) -> Pose:
-    """Return the start of a rail, whose frame leans to the left by the roll angle."""
-    cosine, sine, level, rise = cos(heading), sin(heading), cos(climb), sin(climb)
-    ahead = np.array([level * cosine, level * sine, rise], dtype=np.longdouble)
-    left = np.array([-sine, cosine, 0.0], dtype=np.longdouble)
-    up = np.array([-rise * cosine, -rise * sine, level], dtype=np.longdouble)
-    roll_sine, roll_cosine = sin(roll), cos(roll)
-    frame = np.stack([ahead, roll_cosine * left - roll_sine * up, roll_cosine * up + roll_sine * left])
-    return Pose(np.array([x, y, z], dtype=np.longdouble), frame, np.longdouble(roll))
+def _start(numbers: Long) -> Pose:
+    """Return the start of a rail, given by x, y and z, heading, climb and roll."""
+    frame = np.array(starting_frame(np.cos, np.sin, *numbers[3:]), dtype=np.longdouble)
+    return Pose(numbers[:3], frame, numbers[5])
 
 
 def _check_joint(end: Pose, begin: Pose, length: float, who: str, whom: str) -> None:
@@ -189,11 +202,8 @@ def _check_joint(end: Pose, begin: Pose, length: float, who: str, whom: str) -> 
         )
 
 
-def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
-    """Return the length of a piece, and the coefficients of yaw, pitch and roll in rows.
-
-    Arcs and clothoids turn by pitch, as a rail in a plane does.
-    """
+def _rates(kind: str, given: list[float], where: str) -> tuple[Long, Long]:
+    """Return the length of a piece, and the coefficients of yaw, pitch and roll in rows."""
     size, other = ("radius", "angle") if kind == "arc" else ("length", "rate")
     if not (np.isfinite(given[0]) and given[0] > 0.0):
         raise ParameterError(f"{where}: {size}: must be positive, got {given[0]!r}")
@@ -202,20 +212,14 @@ def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
             raise ParameterError(f"{where}: {other}: must be finite, got {value!r}")
     if kind == "arc" and given[1] == 0.0:
         raise ParameterError(f"{where}: angle: must not be zero; positive turns up, negative down")
-    rates, length = np.zeros((3, POWERS), dtype=np.longdouble), given[0]
-    match kind:
-        case "arc":
-            radius, angle = given
-            length = radius * abs(angle)
-            rates[1, 0] = np.copysign(1.0, angle) / np.longdouble(radius)
-        case "clothoid":
-            rates[1, 0], rates[1, 1] = given[1], (np.longdouble(given[2]) - given[1]) / length
-        case "transition":
-            rates[:] = np.array(given[1:]).reshape(3, POWERS)
+    length, terms = rates_of(kind, np.array(given, dtype=np.longdouble))
+    rates = np.zeros((3, POWERS), dtype=np.longdouble)
+    for row, own in zip(rates, terms, strict=True):
+        row[: len(own)] = own
     return length, rates
 
 
-def _piece(length: float, rates: Long, pose: Pose, where: str, banked: bool) -> tuple[Pieces, Pose]:
+def _piece(length: Long, rates: Long, pose: Pose, where: str, banked: bool) -> tuple[Pieces, Pose]:
     """Return a piece with given rates, in enough parts to resolve its roll angle too, and its right end."""
     for finer in REFINEMENTS if banked else REFINEMENTS[:1]:
         pieces, end, spin, end_roll = _turned(length, rates, pose, where, finer)
@@ -233,9 +237,9 @@ def _piece(length: float, rates: Long, pose: Pose, where: str, banked: bool) -> 
         if np.abs(half * (slopes @ FIT[-2:].T)).max() <= MAX_TAIL and off <= MAX_MISMATCH:
             bends = slopes @ DERIVATIVE / half
             rows = (slopes, bends, bends @ DERIVATIVE / half)
-            known = (np.append(row, roll[:, None], axis=1) for row, roll in zip(pieces[2:], rows, strict=True))
+            known = (np.append(row, roll[:, None], axis=1) for row, roll in zip(pieces[3:], rows, strict=True))
             anchors = np.column_stack([pieces.anchors, roll_angles[:-1]])
-            return Pieces(pieces.lengths, anchors, *known), end._replace(roll_angle=roll_angles[-1])
+            return Pieces(pieces.places, pieces.lengths, anchors, *known), end._replace(roll_angle=roll_angles[-1])
     else:
         raise DeclarationError(
             f"{where}: its tangent is vertical, or nearly so, where there is no level to measure a roll angle from; "
@@ -244,13 +248,13 @@ def _piece(length: float, rates: Long, pose: Pose, where: str, banked: bool) -> 
     return pieces, end
 
 
-def _turned(length: float, rates: Long, pose: Pose, where: str, finer: int) -> tuple[Pieces, Pose, Array, Long]:
+def _turned(length: Long, rates: Long, pose: Pose, where: str, finer: int) -> tuple[Pieces, Pose, Array, Long]:
     """Return a piece with given rates, its right end, the roll rate at the nodes, and the roll angles at the ends of
     its parts.
     """
     orders = np.arange(POWERS)
     sizes = np.sqrt((rates.astype(np.float64) ** 2).sum(axis=0))
-    turned = float((sizes * length ** (orders + 1)).sum())
+    turned = float((sizes * float(length) ** (orders + 1)).sum())
     if not turned <= MAX_TOTAL_TURN:
         raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
     count, scaled = 1, _on_parts(length, rates, 1)
@@ -287,13 +291,15 @@ def _turned(length: float, rates: Long, pose: Pose, where: str, finer: int) -> t
     bends = yaw * side + pitch * up
     changes = (more_yaw + pitch * roll) * side + (more_pitch - yaw * roll) * up - (yaw**2 + pitch**2) * ahead
     rows = (np.moveaxis(row, 2, 1).astype(np.float64) for row in (ahead, bends, changes))
-    pieces = Pieces(np.full(count, float(step)), places[:-1], *rows)
+    shares_passed = np.arange(count, dtype=np.float64)
+    own = np.stack([shares_passed, shares_passed + 1.0], axis=1)
+    pieces = Pieces(own, np.full(count, float(step)), places[:-1], *rows)
     across, along = -frames[1:, 0, 1], frames[1:, 0, 0]
     left, upright = (frames[1:, row, 0] * across + frames[1:, row, 1] * along for row in (1, 2))
     return pieces, Pose(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
 
 
-def _on_parts(length: float, rates: Long, count: int) -> Long:
+def _on_parts(length: Long, rates: Long, count: int) -> Long:
     """Return the rates on equal parts of a piece: for each part their coefficients in powers of its share passed."""
     step = np.longdouble(length) / count
     left = step * np.arange(count)
@@ -325,15 +331,8 @@ def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Piece
 
     found = divided(rows, np.array([low, high]), 3, where=where)
     at_ends = rows(np.array([low, high]), np.zeros((2, 1)))[:, :, 0].T
-    begin, end = (Pose(row[:3].astype(np.longdouble), _level(row[4:7])) for row in at_ends)
+    begin, end = (Pose(row[:3], np.array(level_frame(np.hypot, row[4:7]))) for row in at_ends.astype(np.longdouble))
     values = np.moveaxis(found.at_nodes, 0, 1)
     anchors = found.at_edges[:3].T.astype(np.longdouble)
-    return Pieces(found.lengths, anchors, values[:, :3], values[:, 3:6], values[:, 6:]), begin, end
-
-
-def _level(tangent: Array) -> Long:
-    """Return the frame of a tangent without roll; for a vertical tangent, the frame with l along y."""
-    ahead = tangent.astype(np.longdouble)
-    width = np.hypot(ahead[0], ahead[1])
-    left = np.array([-ahead[1] / width, ahead[0] / width, 0.0]) if width > MAX_MISMATCH else np.array([0.0, 1.0, 0.0])
-    return np.stack([ahead, left, np.cross(ahead, left)])
+    shares = (found.places - low) / (high - low)
+    return Pieces(shares, found.lengths, anchors, values[:, :3], values[:, 3:6], values[:, 6:]), begin, end

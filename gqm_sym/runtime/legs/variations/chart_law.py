@@ -38,7 +38,7 @@ class ChartLaw(Law):
         formulas = problem.formulas
         maker, chart = formulas.chart, formulas.charted(problem.p)
         assert maker is not None
-        pieces = true_pieces_of(maker, problem.p, chart) if maker.is_exact(chart) else None
+        pieces = true_pieces_of(maker, problem.p, chart)
         if not isinstance(formulas.exact, ExactChartLaw) or pieces is None:
             raise without_formulas()
         self._forces = ChartForces(formulas.exact, self.count, self.mass, shaping_of(formulas))
