@@ -99,7 +99,7 @@ def forces() -> Iterator[str]:
     yield "| `implicit` | those of `F` | a curve F(x, z) = 0 through a start point |"
     for family in FAMILIES.values():
         note = f"; {family.note}" if family.note else ""
-        yield f"| `{family.name}` | `{', '.join(family.takes)}` | {_cell(family.title + note)} |"
+        yield f"| `{family.name}` | `{', '.join(family.argument_names)}` | {_cell(family.title + note)} |"
     yield from ("", "Their closed forms are on the pages of the [families](../families/index.md).")
 
 

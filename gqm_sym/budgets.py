@@ -2,7 +2,7 @@
 
 Processor time is measured and not the time of the clock, so that nothing is refused because a machine is busy. The time
 of garbage collections does not count, so that nothing is refused because a program is large. Work in a stage calls
-`spend` often; its callers need not know of budgets, and stages may be nested.
+`check_budget` often; its callers need not know of budgets, and stages may be nested.
 """
 
 import gc
@@ -86,7 +86,7 @@ def outside_budgets() -> Iterator[None]:
             around = around.around
 
 
-def spend() -> None:
+def check_budget() -> None:
     """End the stage if its time, or that of an enclosing stage, is used up.
 
     Raises

@@ -79,7 +79,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
     title = escape(f"{spec.name}: {model.title}" if model.title else spec.name)
     parts = [
         f"<h1>{title}</h1>",
-        _facts(summary(motion)),
+        _table_of_facts(summary(motion)),
         "<h2>The motion</h2>",
         *_figures(motion),
         *_riders(motion),
@@ -93,7 +93,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
         _parameters(spec, motion),
         "<h2>Input</h2>",
         f"<pre>{escape(text)}</pre>",
-        _facts(_provenance(motion)),
+        _table_of_facts(_provenance(motion)),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en" xmlns="http://www.w3.org/1999/xhtml">\n<head>\n<meta charset="utf-8"/>\n'
@@ -102,7 +102,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
     )
 
 
-def _facts(rows: Iterable[tuple[str, object]]) -> str:
+def _table_of_facts(rows: Iterable[tuple[str, object]]) -> str:
     lines = "".join(f"<tr><th>{escape(label)}</th><td>{escape(str(value))}</td></tr>" for label, value in rows)
     return f"<table><tbody>{lines}</tbody></table>"
 
@@ -177,10 +177,10 @@ def _power(base: str, exponent: str) -> str:
 def _mathml(form: sp.Basic) -> str:
     # XML does not have the named entities of HTML.
     text: str = sp.mathml(form, printer="presentation")
-    return re.sub(r"&[A-Za-z]\w+;", lambda found: _character(found[0]), _unfenced(text))
+    return re.sub(r"&[A-Za-z]\w+;", lambda found: _character(found[0]), _with_written_parentheses(text))
 
 
-def _unfenced(text: str) -> str:
+def _with_written_parentheses(text: str) -> str:
     """Write parentheses as characters, because SymPy before 1.14 uses an element for them that browsers no longer
     draw.
     """

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from gqm_sym import budgets
-from gqm_sym.budgets import budget, outside_budgets, spend
+from gqm_sym.budgets import budget, check_budget, outside_budgets
 from gqm_sym.errors import BudgetError
 
 
 def _work(steps: int) -> None:
     for _ in range(steps):
-        spend()
+        check_budget()
 
 
 def test_without_a_budget_nothing_ends() -> None:
@@ -41,7 +41,7 @@ def test_collecting_garbage_does_not_count() -> None:
     begin = time.thread_time()
     with budget("reading", 0.005, "-"), budget("parsing", 0.005, "-"):
         gc.collect()
-        spend()
+        check_budget()
         taken = time.thread_time() - begin
     assert taken > 0.005
     assert len(many) == 1_000_000
@@ -69,7 +69,7 @@ def test_the_stack_is_part_of_it() -> None:
 def _take(seconds: float) -> None:
     end = time.thread_time() + seconds
     while time.thread_time() < end:
-        spend()
+        check_budget()
 
 
 def _stages() -> None:
@@ -77,8 +77,8 @@ def _stages() -> None:
         with budget("inner", 0.05, "-"):
             with outside_budgets():
                 _take(0.1)
-            spend()
-        spend()
+            check_budget()
+        check_budget()
         _take(0.1)
 
 

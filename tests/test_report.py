@@ -8,7 +8,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.cli import tool
-from gqm_sym.report import _formulas, _unfenced
+from gqm_sym.report import _formulas, _with_written_parentheses
 from gqm_sym.runtime.launch.kinds import LOADS
 
 HTML, SVG, MATH = (
@@ -113,7 +113,7 @@ def test_parentheses_of_older_printers_are_drawn() -> None:
     """SymPy 1.13 prints an element that browsers have dropped, with the signs as its attributes; these are drawn."""
     old = '<mi>f</mi><mfenced><mi>x</mi><mfenced close="|" open="|"><mi>y</mi></mfenced></mfenced>'
     new = "<mi>f</mi><mrow><mo>(</mo><mi>x</mi><mrow><mo>|</mo><mi>y</mi><mo>|</mo></mrow><mo>)</mo></mrow>"
-    assert _unfenced(old) == new
+    assert _with_written_parentheses(old) == new
 
 
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])

@@ -332,7 +332,7 @@ def _families(options: argparse.Namespace) -> None:
 
     print("cartesian_graph(phi)\n    z = phi(x)\n    The graph of a function of x.")
     for row in FAMILIES.values():
-        print(f"{row.name}({', '.join(row.takes)})")
+        print(f"{row.name}({', '.join(row.argument_names)})")
         print(f"    {', '.join(_formulas(row))}")
         print(f"    {row.title}{f'; {row.note}' if row.note else ''}.")
     print(

@@ -85,11 +85,11 @@ class Family:
         """
         where = f"families.{self.name}"
         if unnamed:
-            named = ", ".join(f"{n}={short(v)}" for n, v in zip(self.takes, unnamed, strict=False))
+            named = ", ".join(f"{n}={short(v)}" for n, v in zip(self.argument_names, unnamed, strict=False))
             raise ArgumentError(f"{where}: takes arguments by name only; write {where}({named})")
         for given in arguments:
-            if given not in self.takes:
-                names_here = (*self.takes, "parameter", "domain", "inverted")
+            if given not in self.argument_names:
+                names_here = (*self.argument_names, "parameter", "domain", "inverted")
                 raise ArgumentError(unknown_argument(where, given, names_here))
         flag(inverted, where=f"{where}: inverted")
         called = self.parameter if parameter is None else check_parameter_name(parameter, where)
@@ -166,7 +166,7 @@ class Family:
         )
 
     @property
-    def takes(self) -> tuple[str, ...]:
+    def argument_names(self) -> tuple[str, ...]:
         """The names of the run-time parameters and of the whole numbers."""
         return (*self.arguments, *dict(self.whole))
 

@@ -120,7 +120,10 @@ def units_of(curve: DeclaredCurve) -> dict[str, str]:
 def description(curve: DeclaredCurve) -> str:
     """Describe a curve in a few lines."""
     units = units_of(curve)
-    lines = [f"{curve.title or 'Curve'}: {_what(curve)}", *(f"  {name} = {form}" for name, form in _forms(curve))]
+    lines = [
+        f"{curve.title or 'Curve'}: {_definition_in_words(curve)}",
+        *(f"  {name} = {form}" for name, form in _forms(curve)),
+    ]
     low, high = curve.domain
     if low is not None or high is not None:
         ends = f"{'-oo' if low is None else low} <= {curve.parameter} <= {'oo' if high is None else high}"
@@ -131,7 +134,7 @@ def description(curve: DeclaredCurve) -> str:
     return "\n".join(lines)
 
 
-def _what(curve: DeclaredCurve) -> str:
+def _definition_in_words(curve: DeclaredCurve) -> str:
     made = curve.definition
     if isinstance(made, Track):
         count = made.points.count("\n") + 1

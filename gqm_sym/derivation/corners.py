@@ -14,7 +14,7 @@ from math import isfinite
 
 import sympy as sp
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.declare import Curve
 from gqm_sym.derivation.algebra.algebra import Algebra
 from gqm_sym.derivation.algebra.differentiate import differentiate
@@ -50,7 +50,7 @@ def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
     """
     lam, values = curve.parameter, tried_values(defaults)
     for zero in dict.fromkeys(_zeros(curve.point, lam)):
-        spend()
+        check_budget()
         for low, high in _changes(_function(zero, lam, values), curve, values):
             _compare(curve, values, zero, _root(zero.xreplace(values), lam, low, high))
 
@@ -74,7 +74,7 @@ def check_powers(
             base, exponent = power.args
             if exponent.is_number or lam in exponent.free_symbols or lam not in base.free_symbols:
                 continue
-            spend()
+            check_budget()
             negative = [at for at, value in _sampled(_function(base, lam, values), curve, values) if value < 0.0]
             if negative:
                 given = ", ".join(sorted(symbol.name for symbol in exponent.free_symbols))
@@ -85,7 +85,7 @@ def check_powers(
                 )
 
 
-def without_known_bars(form: sp.Expr, signs: Signs) -> sp.Expr:
+def without_known_absolute_values(form: sp.Expr, signs: Signs) -> sp.Expr:
     """Replace |u| by u or -u if u has one sign on the domain."""
     known = {bar: signs.sign(bar.args[0]) for bar in form.atoms(sp.Abs)}
     return form.xreplace({bar: sign * bar.args[0] for bar, sign in known.items() if sign is not None})
@@ -158,7 +158,7 @@ def _root(form: sp.Expr, lam: sp.Symbol, low: float, high: float) -> sp.Expr:
     a, b = sp.Float(low, DIGITS), sp.Float(high, DIGITS)
     rising = form.xreplace({lam: b}).evalf(DIGITS) > 0
     while abs(b - a) > sp.Float("1e-80", DIGITS):
-        spend()
+        check_budget()
         middle = (a + b) / 2
         value = form.xreplace({lam: middle}).evalf(DIGITS)
         if not value.is_real or value == 0:

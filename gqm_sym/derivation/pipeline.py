@@ -13,7 +13,7 @@ from gqm_sym.declare.closing import check_period
 from gqm_sym.declare.ends import check_order
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
-from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
+from gqm_sym.derivation.corners import check_corners, check_powers, without_known_absolute_values
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.forces.dissipation import (
     CORIOLIS,
@@ -121,7 +121,7 @@ def derive(
         check_powers(curve.coordinates, curve, values)
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
-        curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
+        curve = replace(curve, **{name: without_known_absolute_values(form, signs) for name, form in curve.coordinates})
     # A rotating frame pushes a body out of every vertical plane.
     heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):

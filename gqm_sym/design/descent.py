@@ -131,12 +131,12 @@ def _end_angle(mp: Any, mu: Any, slope: float, where: str) -> Any:
     """Return the angle of the tangent at the end of the curve whose chord falls by ``slope``."""
     from scipy.optimize import brentq
 
-    def surplus(angle: float) -> float:
+    def root_function(angle: float) -> float:
         tau, k, end = _shape(mp, mp.mpf(angle), mu)
         x, z = (_along(row, end, mp) for row in _waves(k, tau, mu))
         return float(-z / x) / slope - 1.0
 
     low, high = -0.5 * float(mp.pi) + EDGE, float(mp.pi / 2 - 2 * mp.atan(mu)) - EDGE
-    if not surplus(low) > 0.0 > surplus(high):
+    if not root_function(low) > 0.0 > root_function(high):
         raise DeclarationError(f"{where}: to: a chord of slope {-slope:.9g} is too steep or too flat to be computed")
-    return mp.mpf(brentq(surplus, low, high, xtol=1e-300, rtol=1e-15))
+    return mp.mpf(brentq(root_function, low, high, xtol=1e-300, rtol=1e-15))

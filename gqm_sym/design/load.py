@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import sympy as sp
 
 from gqm_sym.arguments import checked, short
-from gqm_sym.budgets import budget, spend
+from gqm_sym.budgets import budget, check_budget
 from gqm_sym.declare.curve import Curve
 from gqm_sym.design.tracks import (
     TERMS,
@@ -198,7 +198,7 @@ def from_load(
     pieces: list[Piece] = []
     u, width = mp.mpf(0), length / 4
     while u < length:
-        spend()
+        check_budget()
         width = min(width, length - u)
         try:
             piece, ahead = _piece(motion, state, u, width)

@@ -202,16 +202,16 @@ def _limit(law: _Law, where: str) -> float | None:
     squares, weights = np.cos(angles) ** 2, 0.25 * np.pi * weights * np.cos(angles)
     scale = float(law.shares[0]) * np.sqrt(2.0 * float(law.g)) / np.pi
 
-    def surplus(w: Array) -> Array:
+    def ds_excess(w: Array) -> Array:
         """Return ds/dw - 2 w."""
         with np.errstate(all="ignore"):
             values = np.broadcast_to(function(np.square(w)[:, None] * squares), (w.size, squares.size))
         out: Array = scale * (values @ weights) - 2.0 * w
         return out
 
-    unit = 0.5 * float(surplus(np.zeros(1))[0])
+    unit = 0.5 * float(ds_excess(np.zeros(1))[0])
     w = unit * np.arange(0.0, np.sqrt(SEARCHED), STEP)
-    values = surplus(w)
+    values = ds_excess(w)
     bad = np.flatnonzero(~(values > 0.0))
     if not bad.size:
         return None
@@ -223,7 +223,7 @@ def _limit(law: _Law, where: str) -> float | None:
         )
     from scipy.optimize import brentq
 
-    root = brentq(lambda u: float(surplus(np.array([u]))[0]), w[k - 1], w[k], xtol=1e-300, rtol=1e-15)
+    root = brentq(lambda u: float(ds_excess(np.array([u]))[0]), w[k - 1], w[k], xtol=1e-300, rtol=1e-15)
     return float(root) ** 2
 
 

@@ -72,7 +72,7 @@ class _Middle:
         return sin(self.m) * even + cos(self.m) * odd if head is sin else cos(self.m) * even - sin(self.m) * odd
 
 
-def _apart(
+def _with_constant_factors(
     forms: Sequence[Expr], place: Symbol, ends: tuple[Symbol, Symbol], gaps: tuple[Symbol, Symbol]
 ) -> list[Expr]:
     """Write sines, cosines and their second differences in terms of factors most of which are constant along an
@@ -99,10 +99,10 @@ def _apart(
 
 
 def _of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Expr:
-    """A function of a rate times the mean of some points, by the numbers whose sum this is; others as they are.
+    """Rewrite a function of a rate times the mean of some points by the numbers whose sum its argument is.
 
-    Multiplied by the rate of a wave, the rounding of a place far from zero is much more than that of the sine, and all
-    nodes of an orbit have it in common.
+    Other functions are returned unchanged. Multiplied by the rate of a wave, the rounding of a place far from zero is
+    much more than that of the sine, and all nodes of an orbit have it in common.
     """
     argument = call.args[0]
     rates = {argument.diff(point) for point in points}
@@ -148,7 +148,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
     potential = in_single_waves(model.effective_potential, place)
-    forms = _apart((_near(differences.second(potential)), model.ds), place, (a, b), (da, db))
+    forms = _with_constant_factors((_near(differences.second(potential)), model.ds), place, (a, b), (da, db))
     outputs, held = hoist(forms, {place, da, db})
     ends = [(a, at(lows)), (b, at(highs))]
     middle, rest = names.symbol("middle"), names.symbol("rest")

@@ -130,7 +130,7 @@ def _read_together(function: FunctionIR) -> _ChartReading:
 
 
 def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:
-    """The rows of ``out`` and the assignments of each of the loops that a function is divided into."""
+    """Return the rows of ``out`` and the assignments of each of the loops into which a function is divided."""
     parts: list[tuple[list[int], list[Assignment]]] = []
     for row in range(len(function.outputs)):
         rows = [*parts[-1][0], row] if parts else [row]
@@ -144,7 +144,7 @@ def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:
 
 
 def _needed(function: FunctionIR, rows: Sequence[int]) -> list[Assignment]:
-    """The assignments inside a loop that some rows of ``out`` need, in their order."""
+    """Return the assignments inside a loop that some rows of ``out`` need, in their order."""
     names = {symbol.name for row in rows for symbol in function.outputs[row].free_symbols}
     kept: list[Assignment] = []
     for a in reversed(function.inside):

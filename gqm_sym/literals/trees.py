@@ -8,7 +8,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, Protocol, TypeVar, cast
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import ExpressionError
 from gqm_sym.literals import rationals
 
@@ -60,7 +60,7 @@ def evaluate(tree: ast.expr, algebra: Algebra[T], *, where: str) -> T:
     """
 
     def at(node: ast.expr, operation: Callable[..., T], *operands: object) -> T:
-        spend()
+        check_budget()
         try:
             return operation(*operands)
         except (ValueError, ArithmeticError) as error:

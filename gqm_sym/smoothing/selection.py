@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.splines import ORDER, Array, Basis, Fit, Smoother
 
@@ -107,7 +107,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
     best: dict[float | None, Choice] = {}
     top = high - low
     for sites, bottom, places in _grids(u, low, high, period is not None):
-        spend()
+        check_budget()
         basis = Basis.between(sites, closed=period is not None)
         widths = top * RATIO ** -np.arange(np.ceil(np.log(top / bottom) / np.log(RATIO)) + 1.0)
         weights = per_length * widths ** (2 * ORDER)
@@ -150,13 +150,13 @@ def _grids(u: Array, low: float, high: float, closed: bool) -> Iterator[tuple[Ar
     while length / pieces > REFINEMENT * usual and pieces * REFINEMENT < len(u):
         yield np.linspace(low, high, pieces + 1), PIECES * length / pieces, None
         pieces *= REFINEMENT
-    places = _apart(u, MIN_KNOT_DISTANCE * usual, high if closed else None)
+    places = _spaced(u, MIN_KNOT_DISTANCE * usual, high if closed else None)
     # These are the knots of an interpolating spline, which omits two places at each end.
     sites = np.append(places, high) if closed else np.concatenate([places[:1], places[ORDER:-ORDER], places[-1:]])
     yield sites, MIN_WIDTH * usual, places
 
 
-def _apart(u: Array, least: float, high: float | None) -> Array:
+def _spaced(u: Array, least: float, high: float | None) -> Array:
     """Return places in order, without those that are too near to the one before or to the end of the lap."""
     places = np.unique(u)
     kept = [float(places[0])]

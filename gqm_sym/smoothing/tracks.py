@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.report import Smoothing
 from gqm_sym.smoothing.selection import MIN_KNOT_DISTANCE, Choice, choose
@@ -175,7 +175,7 @@ def _nearest(track: _Track, points: Array) -> Array:
     """Return the places of a track that are nearest to points, by Newton's method from the previous places."""
     basis, u = track.choice.smoother.basis, track.u
     for _ in range(STEPS):
-        spend()
+        check_budget()
         inside = u if basis.closed else np.clip(u, basis.low, basis.high)
         first, second, off = track.spline(inside, 1), track.spline(inside, 2), points - track.at(u)
         square = np.square(first).sum(axis=1)

@@ -13,7 +13,7 @@ import sympy as sp
 from pydantic import BaseModel, ValidationError
 
 from gqm_sym.arguments import file_path, nearest
-from gqm_sym.budgets import budget, outside_budgets, spend
+from gqm_sym.budgets import budget, check_budget, outside_budgets
 from gqm_sym.declare import Curve
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.kernels import KERNELS, Kernel
@@ -186,7 +186,7 @@ class _Reader:
         for name, default in defaults.items():
             if default is not None or name in declared:
                 continue
-            spend()
+            check_budget()
             near = nearest(name, unused)
             remedy = f"add it there, as in {name}: 1 (null: to be given at run time)"
             if near:

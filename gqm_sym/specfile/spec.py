@@ -92,7 +92,7 @@ class Spec:
                 what = f"parameters.{name}: is null; solving needs a value"
                 mistakes.add(mark, what, f"write one, as in {name}: 1")
         lam0 = None if self.launch is None or model.curve.charted else str(self.launch["lam0"])
-        if lam0 is not None and not mistakes and (fault := _fault(model, lam0)):
+        if lam0 is not None and not mistakes and (fault := _refusal_reason(model, lam0)):
             mark = node_at(self.tree, ("launch", "lam0", "value")).mark
             what = f"launch.lam0: {model.parameter.name} = {lam0}: {fault}"
             mistakes.add(mark, what, "launch where the curve and the forces are defined")
@@ -114,7 +114,7 @@ class Spec:
         return mistakes.error()
 
 
-def _fault(model: Model, lam0: str) -> str:
+def _refusal_reason(model: Model, lam0: str) -> str:
     """Return the reason why a motion cannot begin at a place; an empty text if it can."""
     values = {sp.Symbol(n, real=True): exact_value(v) for n, v in model.defaults if v is not None}
     values[model.parameter] = exact_value(lam0)

@@ -62,7 +62,7 @@ def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
         for argument in KERNELS[key].arguments:
             called = term.get(argument)
             if argument in KERNEL_UNITS and (called is None or isinstance(called, str)):
-                units[_called(called, argument)] = KERNEL_UNITS[argument]
+                units[_parameter_name(called, argument)] = KERNEL_UNITS[argument]
     return {**units, "m": "kg", "g": "m/s**2"}
 
 
@@ -78,5 +78,5 @@ def _dimension(unit: str) -> Dimension:
     return dimension(*read_unit(unit, where="unit").dimension)
 
 
-def _called(given: str | None, argument: str) -> str:
+def _parameter_name(given: str | None, argument: str) -> str:
     return argument if given is None else name_or_value(given, argument)[0]

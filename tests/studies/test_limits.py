@@ -10,7 +10,7 @@ import pytest
 from gqm_sym import emission
 from gqm_sym.cli import tool
 from gqm_sym.errors import InputError, SpecFileError
-from gqm_sym.specfile import beside
+from gqm_sym.specfile import companion_files
 from gqm_sym.studies import read_sweep, reader
 
 SWING = (
@@ -100,14 +100,14 @@ def test_a_table_that_changes_meanwhile(kind: str, here: Path, monkeypatch: pyte
     """A table is checked again after it is opened, and a pipe does not block."""
     if kind == "a pipe":
         os.mkfifo("pipe")
-        monkeypatch.setattr(beside, "companion_path", lambda *_, **__: here / "pipe")
+        monkeypatch.setattr(companion_files, "companion_path", lambda *_, **__: here / "pipe")
         message = "'a.csv': is not a plain file; give a CSV file"
     else:
 
         def refuse(*_: Any) -> int:
             raise PermissionError(13, "Permission denied")
 
-        monkeypatch.setattr(beside.os, "open", refuse)
+        monkeypatch.setattr(companion_files.os, "open", refuse)
         message = r"'a\.csv': cannot be read \(Permission denied\); give a CSV file"
     with pytest.raises(InputError, match=message):
         read_sweep(sweep("table: a.csv"))

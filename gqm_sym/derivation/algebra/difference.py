@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import sympy
 from sympy import Expr, Function, Integer, Rational, S, Symbol
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import MEAN_HEIGHT, SPACE, chart_alpha, chart_x, chart_z
 
@@ -68,14 +68,14 @@ class Differences:
         """Return ``u[points[i], points[j]]``."""
         key = (u, i, j)
         if key not in self._first:
-            spend()
+            check_budget()
             self._first[key] = self._build_first(u, i, j)
         return self._first[key]
 
     def second(self, u: Expr) -> Expr:
         """Return ``u[a, lam, b]``."""
         if u not in self._second:
-            spend()
+            check_budget()
             self._second[u] = self._build_second(u)
         return self._second[u]
 

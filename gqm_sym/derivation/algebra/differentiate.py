@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import DerivationError
 from gqm_sym.sympy_charts import SpaceFunction, TrainLoad
 
@@ -51,7 +51,7 @@ def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         if variable not in node.free_symbols:
             return sp.S.Zero
         if node not in known:
-            spend()
+            check_budget()
             known[node] = _rule(node, variable, visit)
         return known[node]
 

@@ -12,7 +12,7 @@ from math import prod
 import sympy as sp
 from sympy.simplify.fu import TR8
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.derivation.algebra.algebra import Algebra, Fraction, Polynomial
 from gqm_sym.derivation.algebra.factors import factors
 from gqm_sym.derivation.algebra.normal_form import MAX_SPELLED, in_multiple_angles, minus_signs, shortest, spell
@@ -53,7 +53,7 @@ def without_waves(expression: sp.Expr) -> sp.Expr:
         if not (node.args and node.has(sp.sin)):
             return node
         if node not in known:
-            spend()
+            check_budget()
             args = [visit(part) for part in node.args]
             if isinstance(node, sp.Add):
                 known[node] = _without_unit(args)
@@ -268,7 +268,7 @@ def known_sign(signs: Signs, factor: sp.Expr) -> int | None:
     return signs.sign(factor)
 
 
-def absorb_bars(expression: sp.Expr) -> sp.Expr:
+def combine_absolute_values(expression: sp.Expr) -> sp.Expr:
     """Rewrite u**2/|u| as |u| in a product."""
     powers = expression.as_powers_dict()
     for bar in [base for base in powers if isinstance(base, sp.Abs)]:

@@ -85,7 +85,7 @@ def dissipation(
     """
     v, nu = DIRECTION, CONTACT_SIGN
     # The curvature of a curve in no vertical plane has no sign.
-    resistance = _without_bars(kernel.resistance, 1 if TURNS[0] in pieces else signs.sign(pieces[KAPPA]))
+    resistance = _without_absolute_values(kernel.resistance, 1 if TURNS[0] in pieces else signs.sign(pieces[KAPPA]))
     extra = kernel.tangential_law.xreplace(coordinates)
     sliding, other, contact = v * nu * kernel.friction, extra, (LOAD, KAPPA)
     rubbing = sp.S.Zero
@@ -121,7 +121,10 @@ def dissipation(
             PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other - rubbing / SIGMA
         )
         / kernel.inertia,
-        holds=(_held(kernel, resistance, extra, load, 1), _held(kernel, resistance, extra, load, -1)),
+        holds=(
+            _static_balance(kernel, resistance, extra, load, 1),
+            _static_balance(kernel, resistance, extra, load, -1),
+        ),
         contact=contact,
         friction=bool(kernel.friction),
         kinked=bool(resistance.atoms(sp.Abs)),
@@ -129,13 +132,13 @@ def dissipation(
     )
 
 
-def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, direction: int) -> sp.Expr:
+def _static_balance(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, direction: int) -> sp.Expr:
     against = resistance + kernel.static_friction * load
     return (
         PUSH - direction * against + extra.xreplace({DIRECTION: sp.Integer(direction), W: sp.S.Zero})
     ) / kernel.inertia
 
 
-def _without_bars(resistance: sp.Expr, sign: int | None) -> sp.Expr:
+def _without_absolute_values(resistance: sp.Expr, sign: int | None) -> sp.Expr:
     """Replace |κ| by κ or -κ if the sign of κ is known, on a curve that bends in one direction only."""
     return resistance if sign is None else resistance.xreplace({sp.Abs(KAPPA): sign * KAPPA})

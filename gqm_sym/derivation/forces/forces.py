@@ -7,7 +7,7 @@ import sympy as sp
 
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
-from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
+from gqm_sym.derivation.algebra.rewrite import combine_absolute_values, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
 from gqm_sym.errors import DeclarationError
 from gqm_sym.kernels.base import DIRECTION, Kernel, W, X, Y, Z
@@ -107,8 +107,8 @@ def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> For
         potential=potential,
         effective_potential=tidy(potential / kernel.inertia),
         effective_potential_slope=push * shape.size / kernel.inertia,
-        push=absorb_bars(-push * shape.per_length),
-        static_normal_load=absorb_bars(load * shape.per_length),
+        push=combine_absolute_values(-push * shape.per_length),
+        static_normal_load=combine_absolute_values(load * shape.per_length),
         pressure=load * shape.size,
     )
 
@@ -123,10 +123,10 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
         potential=potential,
         effective_potential=tidy(potential / kernel.inertia),
         effective_potential_slope=push * shape.size / kernel.inertia,
-        push=absorb_bars(-push * shape.per_length),
+        push=combine_absolute_values(-push * shape.per_length),
         static_normal_load=load * sp.Abs(shape.per_length),
         pressure=load * sp.Abs(shape.size),
-        loads=tuple(absorb_bars(part * shape.per_length) for part in crossed),
+        loads=tuple(combine_absolute_values(part * shape.per_length) for part in crossed),
         coriolis=_coriolis(kernel.spin, shape) if kernel.spin else (),
     )
 

@@ -22,7 +22,7 @@ from gqm_sym.derivation.algebra.generators import OverBudget
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import (
     Power,
-    absorb_bars,
+    combine_absolute_values,
     direction,
     magnitudes,
     product,
@@ -261,8 +261,8 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
         size=product(scale),
         per_length=per_length,
         ds=product(ds),
-        dxds=absorb_bars(product([*along, (per_length, 1)])),
-        dzds=absorb_bars(product([*across, (per_length, 1)])),
+        dxds=combine_absolute_values(product([*along, (per_length, 1)])),
+        dzds=combine_absolute_values(product([*across, (per_length, 1)])),
         kappa=product([*rate, *inverse_of(ds)]),
         turning_rate=turning_rate,
         angle=turning_rate * lam
@@ -287,7 +287,7 @@ def _in_space(curve: Curve, signs: Signs) -> Geometry:
         *length_of([change_of(tangent, pair) for pair in PAIRS], algebra, signs),
         *inverse_of([*square, (weight, 2)]),
     ]
-    dxds, dyds, dzds = (absorb_bars(part * per_length) for part in (along, sideways, across))
+    dxds, dyds, dzds = (combine_absolute_values(part * per_length) for part in (along, sideways, across))
     return Geometry(
         along=along,
         sideways=sideways,

@@ -45,7 +45,7 @@ def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) ->
     if not found:
         return None
     step = min((abs(place - found[0]) for place in found[1:]), key=_size, default=None)
-    return Symmetry(found[0], step, _only_there(slope, lam, found[0], step))
+    return Symmetry(found[0], step, _vanishes_only_at(slope, lam, found[0], step))
 
 
 def _is_longer(form: sp.Expr, length: int) -> bool:
@@ -83,7 +83,7 @@ def is_half_turn(step: sp.Expr | None, rate: sp.Expr) -> bool:
     return step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
 
 
-def _only_there(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | None) -> bool:
+def _vanishes_only_at(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | None) -> bool:
     """Return whether a slope vanishes at places of symmetry and nowhere else, as a sine, a power or a hyperbolic sine
     does.
     """

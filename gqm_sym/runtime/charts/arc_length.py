@@ -14,7 +14,7 @@ from numba import types
 from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import BudgetError, SolutionError
 from gqm_sym.runtime.charts.chart import FIT, NODES
 from gqm_sym.runtime.charts.evaluate import TERMS
@@ -166,7 +166,7 @@ def divided(rows: Rows, edges: Array, dimension: int, *, where: str) -> Division
     shortest = MIN_PIECE_SHARE * (edges[-1] - edges[0])
     found = []
     while low.size:
-        spend()
+        check_budget()
         if low.size > MAX_PIECES + edges.size:
             raise BudgetError(
                 f"chart: {where}: not resolved by {MAX_PIECES} pieces near {float(low[0])!r}; "

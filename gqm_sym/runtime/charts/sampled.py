@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
@@ -218,7 +218,7 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
     knots = summed(reduce(np.hypot, np.diff(points[:, :ROLL], axis=0).T))
     for _ in range(MAX_ITERATIONS):
-        spend()
+        check_budget()
         terms = _polynomials(points[:, :ROLL], knots, closed)
         lengths = _lengths(knots, terms)
         change = np.abs(lengths / np.diff(knots) - 1.0).max()

@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from numba import types
 
-from gqm_sym.budgets import spend
+from gqm_sym.budgets import check_budget
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.compiled.calls import call_effective_potential
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of
@@ -217,7 +217,7 @@ def search_beyond_barriers(
     """
     f, lam0 = problem.functions, problem.lam0
     for _ in range(MAX_BARRIERS):
-        spend()
+        check_budget()
         what, near, far = found
         if what != CRITICAL:
             return found, None

@@ -126,7 +126,7 @@ def equilibria(formulas: Formulas, p: ParameterValues, between: Any = None) -> t
     InputError
         If the range is not a pair of numbers in ascending order.
     SolutionError
-        If the potential is constant, or has too many equilibria to be listed. (Equilibria on stretches of constant
+        If the potential is constant, or has too many equilibria to be listed. (Equilibria on parts of constant
         potential are omitted if the potential varies elsewhere.)
     """
     potential = Potential(formulas, p)
@@ -188,7 +188,9 @@ def _clusters(potential: Potential, starts: list[float]) -> Iterator[tuple[float
         looked += 1
         if looked > MAX_INTERVALS or found > MAX_EQUILIBRIA:
             what = (
-                f"more than {MAX_EQUILIBRIA} of them" if found > MAX_EQUILIBRIA else "on a level stretch all places are"
+                f"more than {MAX_EQUILIBRIA} of them"
+                if found > MAX_EQUILIBRIA
+                else "on a level part of the curve all places are"
             )
             raise SolutionError(f"equilibria: {what}; give the range to look in as between=(low, high)")
         bottom, top = potential.bounds(a, b)[:2]

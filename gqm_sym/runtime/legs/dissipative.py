@@ -359,4 +359,4 @@ class DissipativeMotion(FollowedMotion):
             done = len(self._pieces)
             if not self._is_ahead(places):
                 return
-            self._go_on()
+            self._follow_next()

@@ -255,7 +255,7 @@ class Driver:
         number = self.body.item
         if number(PANEL_COUNT) >= MAX_STORED:
             if self._force_cancels(self._last_record):
-                raise self._lost(self._last_record)
+                raise self._failure(self._last_record)
             raise BudgetError(
                 f"motion: {number(PANEL_COUNT):.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
@@ -292,7 +292,7 @@ class Driver:
                 parts.append(record[0])
             else:
                 break
-        raise self._lost(record[0])
+        raise self._failure(record[0])
 
     def _end_run(self, what: int, record: Array, before: Array | None) -> None:
         """Store a run after which the body is followed in another way, or not at all."""
@@ -303,7 +303,7 @@ class Driver:
         heading, leaves_frame = int(record[HEADING]), frame is not None and what == END_LIMIT
         if leaves_frame:
             self._leave_frame(record)
-        self._settle(what, float(record[START]), float(record[END]))
+        self._decide_at_equilibrium(what, float(record[START]), float(record[END]))
         if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
         name = "" if leaves_frame else self._end_name(what, record, heading)
@@ -311,7 +311,7 @@ class Driver:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
         # At a cusp dW/dlam vanishes, so that its rounding error is large compared with it there too.
         if what == END_TOO_MANY_PANELS or (what == END_TOO_NARROW and name != "cusp" and self._force_cancels(record)):
-            raise self._lost(record)
+            raise self._failure(record)
         self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self.number(ENDING):
             self.ending = name
@@ -347,7 +347,7 @@ class Driver:
             else:
                 legs, self._space = 1, 4 * (self._space or space)
 
-    def _settle(self, what: int, start: float, end: float) -> None:
+    def _decide_at_equilibrium(self, what: int, start: float, end: float) -> None:
         """Decide whether a run has come so close to an equilibrium that the motion ends there, or is followed in a
         frame.
         """
@@ -362,7 +362,7 @@ class Driver:
             if turns_nearby or creeps:
                 self._enter_frame()
 
-    def _lost(self, record: Array) -> SolutionError:
+    def _failure(self, record: Array) -> SolutionError:
         """Return the error that says why a leg could not be followed."""
         place = f"V**2 beyond {self.problem.formulas.parameter} = {float(record[END])!r}"
         if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:

@@ -96,7 +96,7 @@ class FollowedMotion(Motion):
             settled = driver.number(TURNS) >= (1.0 if self.problem.w0 == 0.0 else 2.0)
             if found or driver.ending or settled or driver.elapsed >= self._horizon:
                 return found
-            self._go_on()
+            self._follow_next()
 
     # -- leg after leg ------------------------------------------------------------------------
 
@@ -146,7 +146,7 @@ class FollowedMotion(Motion):
             self._known_beginning = len(self._all_runs)
         return self._known_beginning
 
-    def _go_on(self) -> None:
+    def _follow_next(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
         self._known_beginning = self._beginning  # before it can change
         self._driver.go_on()
@@ -156,20 +156,20 @@ class FollowedMotion(Motion):
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
         while not self._driver.ending and self._driver.elapsed < reach:
-            self._go_on()
+            self._follow_next()
 
     def _follow_amply(self, enough: float) -> None:
         """Follow the motion until there are enough pieces, or as far as it can be followed."""
         with suppress(SolutionError, BudgetError):  # the error is raised when the failed part is requested
             while len(self._pieces) < enough and not self._driver.ending and self._driver.elapsed < self._horizon:
-                self._go_on()
+                self._follow_next()
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
             self._follow(self._horizon)
         while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
-            self._go_on()
+            self._follow_next()
 
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""

@@ -204,7 +204,7 @@ class PhasePoints:
         return lam
 
     def arc_lengths(self) -> Array:
-        """Arc length in m from the launch, within the lap."""
+        """Return the arc length in m from the launch, within the lap."""
         s = np.zeros_like(self.laps)
         for timed, mask, phi in self.segments:
             s[mask] = timed.s_a + timed.segment.direction * timed.segment.lengths(phi)
@@ -212,7 +212,7 @@ class PhasePoints:
         return s
 
     def velocities(self, launch: float) -> Array:
-        """ds/dt in m/s; at launch it is exactly that of the launch."""
+        """Return ds/dt in m/s; at launch it is exactly that of the launch."""
         v = np.zeros_like(self.laps)
         for timed, mask, phi in self.segments:
             v[mask] = timed.direction * timed.segment.speeds(phi)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.budgets import budget, spend
+from gqm_sym.budgets import budget, check_budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
@@ -175,12 +175,12 @@ class Arithmetic:
 
     def effective_potential(self, lam: Any) -> Any:
         """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
-        spend()
+        check_budget()
         return self.track.effective_potential(lam)
 
     def effective_potential_slope(self, lam: Any) -> Any:
         """Return the derivative of U with respect to lam."""
-        spend()
+        check_budget()
         return self.track.effective_potential_slope(lam)
 
     def potential_curvature(self, lam: Any) -> Any:

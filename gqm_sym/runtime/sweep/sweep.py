@@ -139,7 +139,7 @@ def sweep(
 
 
 def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
-    """Return which launches `solve` refuses because doubles cannot tell places apart so many laps away."""
+    """Return which launches `solve` refuses because doubles do not resolve places so many laps away."""
     found: NDArray[np.bool_] = np.abs(lam0) > MAX_LAPS * np.where(period > 0.0, period, inf)
     return found
 

@@ -65,7 +65,7 @@ def test_one_crossing_a_leg(generated_folder: Path) -> None:
         """Return a motion followed up to a time."""
         motion = module.solve(0, 3, c="0.01")
         while motion._driver.elapsed < t:
-            motion._go_on()
+            motion._follow_next()
         return motion
 
     for t in (10.0, 300.0):

@@ -1,6 +1,6 @@
 """The times for which a load on the rider is beyond a level: between the places where it equals that level.
 
-Along each stretch of a motion the load is a smooth function of the phase angle. It is written as Chebyshev polynomials
+Along each segment of a motion the load is a smooth function of the phase angle. It is written as Chebyshev polynomials
 on parts that are halved until they resolve it; all roots of these are found, and a few secant steps on the load itself
 make each of them exact to rounding.
 """
@@ -28,7 +28,7 @@ NODES, MAX_TAIL, MAX_HALVINGS = 16, 1e-9, 10
 # outside of its part.
 STEPS, OUTSIDE = 3, 1e-9
 
-# Spans of time that are separated by less than this share of the time are joined, because stretches of a motion follow
+# Spans of time that are separated by less than this share of the time are joined, because segments of a motion follow
 # each other to rounding.
 SAME_TIME = 1e-13
 
