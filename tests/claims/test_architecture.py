@@ -103,6 +103,7 @@ TESTED_THROUGH = {
     "compiled/types.py": "runtime/compiled/test_jit.py",
     "double_double/interpreter.py": "runtime/double_double/test_arithmetic.py",
     "double_double/nodes.py": "runtime/double_double/test_orbit_time.py",
+    "double_double/quadrature.py": "runtime/double_double/test_orbit_time.py",
     "gradients/charts/orbit.py": "runtime/gradients/test_charts.py",
     "gradients/charts/programs.py": "runtime/gradients/test_charts.py",
     "gradients/charts/shaped_pieces.py": "runtime/gradients/test_charts.py",

@@ -27,7 +27,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
+from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
 from gqm_sym.runtime.double_double.recording import bind, record_by_coordinates
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 

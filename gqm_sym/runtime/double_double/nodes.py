@@ -1,7 +1,7 @@
 """Nodes of quadrature rules in double-double arithmetic, computed by compiled code when they are first needed."""
 
 from functools import cache
-from math import cos, pi
+from math import cos, pi, sin
 
 import numpy as np
 
@@ -17,6 +17,9 @@ LEVELS = (0, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
 # The number of nodes of a Gauss-Legendre rule, and the number of Newton iterations that find them from starting values
 # of three digits.
 RULE, NEWTON_STEPS = 16, 6
+
+# The number of places at which a polynomial about a slow place is found, which is odd: one of them is the slow place.
+WINDOW = 17
 
 
 @entry(MATRIX(INTEGER))
@@ -79,6 +82,36 @@ def legendre_rule():  # type: ignore[no-untyped-def]
     return rows
 
 
+@entry(MATRIX())
+def powers_table():  # type: ignore[no-untyped-def]
+    """Return what turns values at nodes of [-1, 1] into coefficients of powers.
+
+    Returns
+    -------
+    rows : (1 + 2 n, n) array
+        The nodes, of which the one in the middle is 0; then, for each power, the factors of the values at the nodes: n
+        rows of high parts and n rows of low parts. The first power is 1, and its coefficient is the value at 0 alone.
+    """
+    n = WINDOW
+    rows = np.zeros((1 + 2 * n, n))
+    for j in range(n):
+        rows[0, j] = sin(0.5 * pi * (2.0 * j / (n - 1.0) - 1.0))
+    for j in range(n):
+        # Lagrange's polynomial of the node is multiplied out, factor by factor.
+        rows[1, j], degree = 1.0, 0
+        for m in range(n):
+            if m == j:
+                continue
+            gap, gap_low = add(rows[0, j], 0.0, -rows[0, m], 0.0)
+            degree += 1
+            for k in range(degree, -1, -1):
+                high, low = multiply(rows[1 + k, j], rows[1 + n + k, j], -rows[0, m], 0.0)
+                if k > 0:
+                    high, low = add(high, low, rows[k, j], rows[n + k, j])
+                rows[1 + k, j], rows[1 + n + k, j] = divide(high, low, gap, gap_low)
+    return rows
+
+
 @cache
 def trapezoidal_nodes(kind: int) -> Array:
     """Return the table of `node_tables`, which is computed once."""
@@ -91,3 +124,10 @@ def panel_rule() -> Array:
     """Return the rule of `legendre_rule`, which is computed once."""
     rule: Array = legendre_rule()
     return rule
+
+
+@cache
+def powers() -> Array:
+    """Return the table of `powers_table`, which is computed once."""
+    table: Array = powers_table()
+    return table

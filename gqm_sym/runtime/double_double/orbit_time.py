@@ -4,80 +4,51 @@ V**2 is the plain difference of effective potentials, because many of the 31 dig
 computed along with it. The nodes are phase angles (MATHS, section 4), whose sines are tabulated.
 """
 
-from math import copysign, fabs, inf, nan
-from typing import Any, NamedTuple
+from math import fabs, nan
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import HALF_PI, atan
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import borrowed, on_stack
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import (
-    UNIT,
-    add,
-    divide,
-    improved_arc_tangent,
-    multiply,
-    sine_and_cosine,
-    square_root,
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, square_root
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, call_interpreter
+from gqm_sym.runtime.double_double.nodes import panel_rule, powers, trapezoidal_nodes
+from gqm_sym.runtime.double_double.quadrature import (
+    TAPE,
+    Integrand,
+    energy_level,
+    fill_parameters,
+    mean_by_trapezoid,
+    phase_angle,
+    time_between,
 )
-from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.double_double.nodes import LEVELS, RULE, panel_rule, trapezoidal_nodes
 from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.double_double.slow_passages import time_in_parts
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
-
-# The trapezoidal rule has converged if two successive changes have shrunk by this factor and the next one would be
-# smaller than a share of the value, which is the second number if all digits are wanted, or if the last change is
-# rounding only and the one before was below the third number.
-MAX_RATIO, MAX_NEXT_CHANGE, MAX_CHANGE_BEFORE = 1e-3, 1e-27, 1e-20
 
 # The number of places that are evaluated together at the ends: both turning points, the launch, and the launch again to
 # fill a register.
 ENDS = 8
 
-# The number of panels of an interval is doubled from MIN_PANELS to MAX_PANELS at most, until the next change would be
-# smaller than this share of the time, or than its rounding.
-MIN_PANELS, MAX_PANELS, MAX_PANEL_CHANGE = 2, 128, 1e-24
-
 # The largest relative error of a time; a less accurate one is not used.
 MAX_ERROR = 1e-17
 
-# The number of Newton iterations, each of which doubles the digits, starting with those of a double. A step may be at
-# most this share of the orbit's width.
-NEWTON_STEPS, MAX_STEP = 2, 1e-6
+# The relative errors of the trapezoidal rule and of Gauss's rules that are small enough if all digits are wanted.
+MAX_RULE_ERROR, MAX_PANEL_ERROR = 1e-27, 1e-24
 
-# Types of what compiled functions take: a tape behind the interpreter's address, a number with its error, and an orbit.
-TAPE = types.Tuple((INTEGER, types.int64[:, ::1], types.UniTuple(INTEGER, 3), types.UniTuple(INTEGER, 6)))
+# The number of Newton iterations, each of which doubles the digits, starting with those of a double, of which few are
+# right next to a hilltop. They may move a turning point by at most this share of the orbit's width.
+MAX_STEPS, MAX_STEP = 6, 1e-6
+
 BOUNDED = types.UniTuple(REAL, 3)
 LEVEL_AND_INTERVAL = types.Tuple((BOUNDED, types.UniTuple(REAL, 2), types.UniTuple(REAL, 2)))
 
-stacked_sums = on_stack(ROW)
 NO_TIMES = np.empty((3, 0))
-
-
-class Integrand(NamedTuple):
-    """The inputs of the time per share of an interval.
-
-    Attributes
-    ----------
-    tape : Tape
-        The module's formulas.
-    work : array
-        The registers.
-    level : (high, low, error)
-        U + V**2/2, which is constant.
-    start, width : (high, low)
-        The start of the interval, and the increase of the curve's parameter over it.
-    """
-
-    tape: Any
-    work: Any
-    level: Any
-    start: Any
-    width: Any
 
 
 class BoundedNumber(NamedTuple):
@@ -91,28 +62,6 @@ class BoundedNumber(NamedTuple):
     def is_decided(self) -> bool:
         """Whether ``high`` is certainly the double nearest to the number."""
         return self.high + (self.low - self.error) == self.high == self.high + (self.low + self.error)
-
-
-@Inner
-def fill_parameters(tape, p, work):  # type: ignore[no-untyped-def]
-    """Fill the registers of the run-time parameters, and of all that does not depend on the place."""
-    address, operations, parts, registers = tape
-    for k in range(p.shape[1]):
-        error = 0.25 * UNIT * fabs(p[0, k]) if p[1, k] != 0.0 else 0.0
-        for i in range(BLOCK):
-            at = registers[0] + k * ROW + i
-            work[at], work[at + LOW], work[at + ERROR] = p[0, k], p[1, k], error
-    call_interpreter(address, operations, 0, parts[0], work, BLOCK)
-
-
-@Inner
-def energy_level(work, registers, launch, i):  # type: ignore[no-untyped-def]
-    """Return U + V**2/2, which is constant, with its error, from the place of the launch, which is number i."""
-    _, _, v0, v0_low = launch
-    half, half_low = multiply(v0, v0_low, 0.5 * v0, 0.5 * v0_low)
-    u = registers[2] + i
-    high, low = add(work[u], work[u + LOW], half, half_low)
-    return high, low, work[u + ERROR] + UNIT * half
 
 
 @Inner
@@ -133,22 +82,27 @@ def find_turns(tape, work, launch, offsets):  # type: ignore[no-untyped-def]
     lam0, lam0_low = launch[0], launch[1]
     for i in range(ENDS):
         work[place + i], work[place + LOW + i] = add(lam0, lam0_low, offsets[i] if i < 2 else 0.0, 0.0)
-    level, step, residual = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
-    for _ in range(NEWTON_STEPS):
+    level, moved, residual = (0.0, 0.0, 0.0), np.zeros(2), np.zeros(2)
+    for _ in range(MAX_STEPS):
         for i in range(ENDS):
             work[place + ERROR + i] = 0.25 * UNIT * fabs(work[place + i])
         call_interpreter(address, operations, parts[0], parts[2], work, ENDS)
-        level = energy_level(work, registers, launch, 2)
+        level, has_converged = energy_level(work, registers, launch, 2), True
         for i in range(2):
             u, at, up = potential + i, place + i, slope + i
             half, half_low = add(level[0], level[1], -work[u], -work[u + LOW])
             move, move_low = divide(half, half_low, work[up], work[up + LOW])
             work[at], work[at + LOW] = add(work[at], work[at + LOW], move, move_low)
-            # Each step reduces V**2 by the square of the ratio of the steps.
-            ratio = fabs(move) / step[i] if step[i] > 0.0 else 0.0
-            if not fabs(move) <= MAX_STEP * fabs(offsets[1] - offsets[0]):
-                ratio = nan
-            step[i], residual[i] = fabs(move), fabs(half) * ratio * ratio + level[2] + work[u + ERROR]
+            moved[i] += move
+            rounding = level[2] + work[u + ERROR]
+            has_converged = has_converged and fabs(half) <= rounding
+            residual[i] = rounding + fabs(half)
+            if offsets[i] == 0.0 and launch[2] == 0.0:  # the launch itself, which is exact up to its own rounding
+                residual[i] = 0.25 * UNIT * fabs(lam0 * work[up]) if lam0_low != 0.0 else 0.0
+            if not fabs(moved[i]) <= MAX_STEP * fabs(offsets[1] - offsets[0]):
+                residual[i] = nan
+        if has_converged:  # the other formulas are then known at the turning points themselves
+            break
     errors = residual[0] / fabs(work[slope]), residual[1] / fabs(work[slope + 1])
     return (level[0], level[1], level[2] + residual[0] + residual[1]), errors
 
@@ -167,122 +121,6 @@ def mean_at_ends(work, registers, width):  # type: ignore[no-untyped-def]
         high, low = add(high, low, g, g_low)
         error += g * (work[on + ERROR] / work[on] + 0.5 * work[up + ERROR] / fabs(work[up]) + 8.0 * UNIT)
     return high, low, error
-
-
-@Inner
-def fill_places(n, start, width, nodes, first, place):  # type: ignore[no-untyped-def]
-    """Fill a register with the places of nodes."""
-    shares, shares_low = nodes[0, first : first + n], nodes[1, first : first + n]
-    for i in range(n):
-        distance, distance_low = multiply(width[0], width[1], shares[i], shares_low[i])
-        place[i], place[LOW + i] = add(start[0], start[1], distance, distance_low)
-        place[ERROR + i] = UNIT * (fabs(place[i]) + fabs(distance))
-
-
-@Inner
-def fill_integrand(n, level, nodes, first, potential, ds, out):  # type: ignore[no-untyped-def]
-    """Fill a register with the time per share of the interval, divided by the width of the segment."""
-    factor, factor_low = nodes[2, first : first + n], nodes[3, first : first + n]
-    for i in range(n):
-        half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
-        root, root_low = square_root(2.0 * half, 2.0 * half_low)
-        g, g_low = multiply(factor[i], factor_low[i], ds[i], ds[LOW + i])
-        out[i], out[LOW + i] = divide(g, g_low, root, root_low)
-        lost = 0.5 * (level[2] + potential[ERROR + i]) / half
-        out[ERROR + i] = out[i] * (ds[ERROR + i] / ds[i] + lost + 8.0 * UNIT)
-
-
-@Inner
-def add_nodes(integrand, nodes, first, stop, total):  # type: ignore[no-untyped-def]
-    """Add the integrand at nodes number ``first`` to before ``stop`` to a sum with its error."""
-    tape, work, level, start, width = integrand
-    address, operations, parts, registers = tape
-    _, place, potential, ds, _, _ = registers
-    sums = stacked_sums()
-    high, low, error = total
-    for begin in range(first, stop, BLOCK):
-        n = min(BLOCK, stop - begin)
-        fill_places(n, start, width, nodes, begin, work[place : place + ROW])
-        call_interpreter(address, operations, parts[0], parts[1], work, n)
-        fill_integrand(n, level, nodes, begin, work[potential : potential + ROW], work[ds : ds + ROW], sums)
-        while n > 1:  # n is a power of two
-            n //= 2
-            for i in range(n):
-                sums[i], sums[LOW + i] = add(sums[i], sums[LOW + i], sums[n + i], sums[LOW + n + i])
-                sums[ERROR + i] += sums[ERROR + n + i]
-        high, low = add(high, low, sums[0], sums[LOW])
-        error += sums[ERROR]
-    return high, low, error
-
-
-@Inner
-def mean_by_trapezoid(integrand, nodes, ends, tolerance):  # type: ignore[no-untyped-def]
-    """Return the mean of the integrand with its error by the trapezoidal rule; NaN if that does not converge."""
-    total, before, value, value_low = ends, inf, inf, 0.0
-    for level in range(len(LEVELS) - 1):
-        n = LEVELS[level + 1]
-        total = add_nodes(integrand, nodes, LEVELS[level], n, total)
-        high, low, rounding = total[0] / n, total[1] / n, total[2] / n
-        change = fabs(add(high, low, -value, -value_low)[0]) if level > 0 else inf
-        following = change * change / before
-        if change <= MAX_RATIO * before and before < inf and following <= tolerance * high:
-            return high, low, rounding + following
-        if change <= rounding and before <= MAX_CHANGE_BEFORE * high:
-            return high, low, rounding + change
-        before, value, value_low = change, high, low
-    return nan, nan, nan
-
-
-@Inner
-def fill_panel(kind, left, step, panel, rule, nodes):  # type: ignore[no-untyped-def]
-    """Fill the nodes, in the form of `node_tables`, of one of the panels of width ``step`` that follow an angle."""
-    for k in range(RULE):
-        i = panel * RULE + k
-        share, share_low = add(rule[0, k], rule[1, k], float(panel), 0.0)
-        angle, angle_low = multiply(step[0], step[1], share, share_low)
-        angle, angle_low = add(left[0], left[1], angle, angle_low)
-        nodes[0, i], nodes[1, i], nodes[2, i], nodes[3, i] = angle, angle_low, rule[2, k], rule[3, k]
-        if kind == LIBRATION:
-            s, s_low, c, c_low = sine_and_cosine(0.5 * angle, 0.5 * angle_low)
-            nodes[0, i], nodes[1, i] = multiply(s, s_low, s, s_low)
-            c, c_low = multiply(c, c_low, rule[2, k], rule[3, k])
-            nodes[2, i], nodes[3, i] = multiply(s, s_low, c, c_low)
-
-
-@Inner
-def time_between(integrand, kind, left, right, rule):  # type: ignore[no-untyped-def]
-    """Return the time from one phase angle to another and its error; NaN if Gauss's rules do not converge."""
-    width = add(right[0], right[1], -left[0], -left[1])
-    scale, scale_low = multiply(width[0], width[1], integrand.width[0], integrand.width[1])
-    nodes = np.empty((4, RULE * MAX_PANELS))
-    panels, before, before_low, change_before = MIN_PANELS, inf, 0.0, inf
-    while panels <= MAX_PANELS:
-        step, first = (width[0] / panels, width[1] / panels), LEVELS[0]
-        for panel in range(panels):
-            fill_panel(kind, left, step, panel, rule, nodes)
-        total = add_nodes(integrand, nodes, first, RULE * panels, (0.0, 0.0, 0.0))
-        time, low = multiply(scale, scale_low, total[0] / panels, total[1] / panels)
-        rounding = fabs(scale) * total[2] / panels + 4.0 * UNIT * fabs(time)
-        change = fabs(add(time, low, -before, -before_low)[0])
-        following = min(change, change * (change / change_before)) if change_before > 0.0 else change
-        if following <= max(MAX_PANEL_CHANGE * fabs(time), rounding):
-            return fabs(time), copysign(low, time * low), rounding + following
-        panels, before, before_low, change_before = 2 * panels, time, low, change
-    return nan, nan, nan
-
-
-@Inner
-def launch_angle(integrand, launch):  # type: ignore[no-untyped-def]
-    """Return the phase angle of the launch, 2 atan(sqrt((lam0 - a)/(b - lam0))) between turning points a and b."""
-    start, width = integrand.start, integrand.width
-    behind, behind_low = add(launch[0], launch[1], -start[0], -start[1])
-    ahead, ahead_low = add(width[0], width[1], -behind, -behind_low)
-    ratio, ratio_low = divide(behind, behind_low, ahead, ahead_low)
-    root, root_low = square_root(ratio, ratio_low)
-    guess = atan(root)
-    s, s_low, c, c_low = sine_and_cosine(guess, 0.0)
-    half, half_low = improved_arc_tangent(root, root_low, guess, (s, s_low), (c, c_low))
-    return 2.0 * half, 2.0 * half_low
 
 
 @entry(
@@ -320,24 +158,25 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
     angle, last_angle, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     times[1, 0], times[2, 0] = 0.0, 0.0
     is_thrown = times[0, 0] != 0.0
-    thrown_at = launch_angle(integrand, launch) if is_thrown else angle
+    behind, behind_low = add(launch[0], launch[1], -integrand.start[0], -integrand.start[1])
+    thrown_at = phase_angle(integrand, LIBRATION, behind, behind_low) if is_thrown else angle
     for k in range(1, times.shape[1] + 1):
         is_last = k == times.shape[1]
         if is_thrown and (is_last or thrown_at[0] < times[0, k]):
-            part, part_low, of_part = time_between(integrand, kind, last_angle, thrown_at, rule)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, thrown_at, rule, MAX_PANEL_ERROR)
             times[1, 0], times[2, 0] = add(high, low, part, part_low)
             is_thrown, of_launch = False, error + of_part
         if not is_last:
             # The upper turning point is at the angle pi itself.
             angle = (times[0, k], 2.0 * HALF_PI[1] if times[0, k] == 2.0 * HALF_PI[0] else 0.0)
-            part, part_low, of_part = time_between(integrand, kind, last_angle, angle, rule)
+            part, part_low, of_part = time_between(integrand, kind, last_angle, angle, rule, MAX_PANEL_ERROR)
             high, low = add(high, low, part, part_low)
             times[1, k], times[2, k], last_angle, error = high, low, angle, error + of_part
     return max(error, of_launch)
 
 
 @Inner
-def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance):  # type: ignore[no-untyped-def]
+def find_orbit_time(tape, work, p, launch, offsets, direction, rules, tolerance):  # type: ignore[no-untyped-def]
     """Return the duration and the turning points of an orbit, which are NaN if they are not found.
 
     Parameters
@@ -354,10 +193,11 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
         Approximate distances of the lower and the upper turning point from the launch.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
-    nodes : (4, n) array
-        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`), or none if the duration is not wanted.
-    tolerance : float
-        The relative error of the trapezoidal rule that is small enough.
+    rules : (array, array, array)
+        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`), or none if the duration is not wanted; the nodes
+        of panels (`nodes.panel_rule`); and what finds polynomials (`nodes.powers`).
+    tolerance : (float, float)
+        The relative errors of the trapezoidal rule and of Gauss's rules that are small enough.
 
     Returns
     -------
@@ -383,27 +223,39 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes, tolerance)
         level, errors, ends = energy_level(work, registers, launch, 2), (0.0, 0.0), (0.0, 0.0, 0.0)
         start, end, scale = (launch[0], launch[1]), (launch[0], launch[1]), (work[period], work[period + LOW])
         width = (direction * scale[0], direction * scale[1])
-    mean = (nan, nan, nan)
-    if nodes.shape[1] > 0:
-        mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends, tolerance)
-    high, low = multiply(mean[0], mean[1], scale[0], scale[1])
-    duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
+    integrand, nodes, duration = Integrand(tape, work, level, start, width), rules[0], (nan, nan, nan)
+    kind = CIRCULATION if direction else LIBRATION
+    for attempt in range(3 if nodes.shape[1] > 0 else 0):
+        if attempt == 1:
+            duration = time_in_parts(integrand, kind, errors, rules[1:], tolerance[1])
+        else:
+            mean = mean_by_trapezoid(integrand, nodes, ends, tolerance[0], attempt == 0)
+            high, low = multiply(mean[0], mean[1], scale[0], scale[1])
+            duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
+        if duration[2] <= MAX_ERROR * duration[0]:
+            break
     low_error, high_error = errors[0] + UNIT * fabs(start[0]), errors[1] + UNIT * fabs(end[0])
     return duration, (start[0], start[1], low_error), (end[0], end[1], high_error), (level, start, width)
 
 
 @entry(
     types.Tuple((BOUNDED, BOUNDED, BOUNDED, LEVEL_AND_INTERVAL))(
-        TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, MATRIX
+        TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, types.UniTuple(MATRIX, 3)
     ),
     checked=False,
 )
-def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
+def orbit_time(tape, work, p, launch, offsets, direction, rules):  # type: ignore[no-untyped-def]
     """Return what `find_orbit_time` returns."""
     address, operations, parts, registers = tape
     tape = (address, borrowed(operations), parts, registers)
-    work, p, nodes = borrowed(work), borrowed(p), borrowed(nodes)
-    return find_orbit_time(tape, work, p, launch, offsets, direction, nodes, MAX_NEXT_CHANGE)
+    work, p, rules = borrowed(work), borrowed(p), (borrowed(rules[0]), borrowed(rules[1]), borrowed(rules[2]))
+    return find_orbit_time(tape, work, p, launch, offsets, direction, rules, (MAX_RULE_ERROR, MAX_PANEL_ERROR))
+
+
+def rules_for(kind: int, *, wanted: bool = True) -> tuple[Array, Array, Array]:
+    """Return the rules of `find_orbit_time` for a kind of orbit, with or without those of its duration."""
+    nodes = trapezoidal_nodes(kind)
+    return nodes if wanted else np.ascontiguousarray(nodes[:, :0]), panel_rule(), powers()
 
 
 class Orbit(NamedTuple):
@@ -428,7 +280,7 @@ def find_turning_points(
     """Return the lower and the upper turning point of a libration; the arguments are those of `time_orbit`."""
     lam0, v0 = launch
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low), (-offsets[0], offsets[1])
-    _, low, high, _ = orbit_time(*given, 0, np.ascontiguousarray(trapezoidal_nodes(LIBRATION)[:, :0]))
+    _, low, high, _ = orbit_time(*given, 0, rules_for(LIBRATION, wanted=False))
     return BoundedNumber(*low), BoundedNumber(*high)
 
 
@@ -458,9 +310,8 @@ def time_orbit(
     """
     lam0, v0 = launch
     kind, by_panels = CIRCULATION if direction else LIBRATION, times.shape[1] > 1
-    nodes = trapezoidal_nodes(kind)[:, :0] if by_panels else trapezoidal_nodes(kind)
     given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
-    *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, np.ascontiguousarray(nodes))
+    *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, rules_for(kind, wanted=not by_panels))
     duration, low, high = map(BoundedNumber._make, found)
     if times.size:
         error = fill_times(*given, kind, orbit, panel_rule(), times)

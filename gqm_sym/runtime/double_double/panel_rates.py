@@ -12,8 +12,8 @@ from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.double_double.orbit_time import (
-    ENDS,
+from gqm_sym.runtime.double_double.orbit_time import ENDS
+from gqm_sym.runtime.double_double.quadrature import (
     TAPE,
     energy_level,
     fill_integrand,

@@ -17,7 +17,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS, RULE
-from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fill_panel
+from gqm_sym.runtime.double_double.quadrature import MAX_PANELS, MIN_PANELS, fill_panel
 from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 

@@ -157,12 +157,9 @@ class PeriodicTimes(Motion):
     def _orbit(self) -> Orbit | None:
         """Duration and turning points in double-double arithmetic; None if that does not suffice."""
         launch = self.problem, self.kind, self.direction, self._offsets
-        is_charted = self.problem.formulas.chart is not None
-        # No panels are needed if the trapezoidal rule has converged in doubles.
-        if is_charted or self._segment_in_doubles.known_duration is not None:
-            orbit = self._orbit_by_rule or timing.orbit_of(*launch)
-            if is_charted or orbit is not None:
-                return orbit
+        orbit = self._orbit_by_rule or timing.orbit_of(*launch)
+        if orbit is not None or self.problem.formulas.chart is not None:
+            return orbit
         return timing.orbit_of(*launch, timing.times_along(self._segment, is_thrown=False))
 
     @cached_property

@@ -14,8 +14,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import LAM0, PARAMETERS, V0, element
 from gqm_sym.runtime.compiled.types import MATRIX, Array
-from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
-from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, find_orbit_time
+from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, find_orbit_time, rules_for
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
@@ -29,16 +28,18 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
 
-# The largest error of a turning point, as a share of the orbit's width, and of the rule for the time, as a share of it:
+# The largest error of a turning point, as a share of the orbit's width, and of the rules for the time, as shares of it:
 # the answer is rounded to a double.
-MAX_TURN_ERROR, MAX_RULE_ERROR = 2.0**-54, 1e-19
+MAX_TURN_ERROR, MAX_RULE_ERRORS = 2.0**-54, (1e-19, 1e-19)
+
+RULES = types.UniTuple(MATRIX, 3)
 
 
 @entry(
-    types.void(EXACT, types.int64[:, ::1], types.int64, MATRIX, ANSWERS, types.UniTuple(MATRIX, 2)),
+    types.void(EXACT, types.int64[:, ::1], types.int64, MATRIX, ANSWERS, types.UniTuple(RULES, 2)),
     nogil=True,
 )
-def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignore[no-untyped-def]
+def fill_orbits(exact, columns, quantity, spans, answers, rules):  # type: ignore[no-untyped-def]
     """Fill the answer of each launch whose status is SPAN_KNOWN; the status becomes UNDECIDED if double-double
     arithmetic does not suffice.
 
@@ -54,12 +55,14 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         For each launch, the answer to SPANS.
     answers : Answers
         Filled in.
-    nodes : (array, array)
-        The nodes of the trapezoidal rule for librations and for laps (`nodes.trapezoidal_nodes`).
+    rules : pair
+        The rules for librations and for laps (`orbit_time.rules_for`).
     """
     (address, operations, parts, registers), work, p = exact
     tape, work, p = (address, borrowed(operations), parts, registers), borrowed(work), borrowed(p)
-    half, lap = borrowed(nodes[0]), borrowed(nodes[1])
+    (nodes, rule, table), (lap_nodes, _, _) = rules
+    rule, table = borrowed(rule), borrowed(table)
+    half, lap = (borrowed(nodes), rule, table), (borrowed(lap_nodes), rule, table)
     columns, spans, values = borrowed(columns), borrowed(spans), borrowed(answers.values)
     statuses = borrowed(answers.status)
     for k in range(statuses.size):
@@ -75,8 +78,8 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         for row in range(p.shape[1]):
             p[0, row] = element(columns, PARAMETERS + row, k)
         launch = element(columns, LAM0, k), 0.0, element(columns, V0, k), 0.0
-        rule = lap if circulates else half
-        found = find_orbit_time(tape, work, p, launch, (low, high), direction, rule, MAX_RULE_ERROR)
+        chosen = lap if circulates else half
+        found = find_orbit_time(tape, work, p, launch, (low, high), direction, chosen, MAX_RULE_ERRORS)
         duration, lower, upper, _ = found
         if quantity == TURNING_POINTS:
             values[k, 0], values[k, 1] = lower[0], upper[0]
@@ -92,6 +95,6 @@ def answer_exactly(
     exact: RecordedFormulas, columns: NDArray[np.int64], quantity: int, spans: Array, answers: Answers
 ) -> None:
     """Call `fill_orbits` for launches whose spans are known."""
-    count = 0 if quantity == TURNING_POINTS else None
-    nodes = tuple(np.ascontiguousarray(trapezoidal_nodes(kind)[:, :count]) for kind in (LIBRATION, CIRCULATION))
-    fill_orbits(exact, columns, quantity, spans, answers, nodes)
+    wanted = quantity != TURNING_POINTS
+    rules = rules_for(LIBRATION, wanted=wanted), rules_for(CIRCULATION, wanted=wanted)
+    fill_orbits(exact, columns, quantity, spans, answers, rules)

@@ -19,7 +19,7 @@ from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import add
 from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
-from gqm_sym.runtime.double_double.orbit_time import TAPE, energy_level, fill_parameters
+from gqm_sym.runtime.double_double.quadrature import TAPE, energy_level, fill_parameters
 from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
 from gqm_sym.runtime.sweep.orbit import Orbit

@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import RULE
-from gqm_sym.runtime.double_double.orbit_time import TAPE
+from gqm_sym.runtime.double_double.quadrature import TAPE
 from gqm_sym.runtime.double_double.recording import NOWHERE, bind, record_values
 
 

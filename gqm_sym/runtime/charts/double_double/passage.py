@@ -30,7 +30,8 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
-from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, TAPE, BoundedNumber, Orbit, fill_parameters
+from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, BoundedNumber, Orbit
+from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
 from gqm_sym.runtime.double_double.recording import BoundTape
 
 # The largest difference between distances of turning points from the launch and those in doubles, as a share of the

@@ -10,7 +10,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
-from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
+from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
 
 # The number of Newton steps to a turning point; the largest change in the last but one; and the number of times that
 # the search may pass to a neighbouring piece.

@@ -24,7 +24,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
-from gqm_sym.runtime.double_double.orbit_time import fill_panel
+from gqm_sym.runtime.double_double.quadrature import fill_panel
 from gqm_sym.runtime.gradients.charts.programs import (
     ChartSource,
     chart_circulation_program,

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
@@ -126,8 +127,8 @@ class Law(ABC):
         """Return the results of a program in states (`evaluation.values`), given bounds on the errors of parameters."""
         found = np.empty((program.outputs.size, parts, states.shape[1]))
         w = np.maximum(states[2], LEAST_V2)  # laws may contain its square root
-        places = np.vstack([self.coordinates(states), w, np.zeros_like(w)])
-        inputs = np.hstack([self.parameters, np.zeros((3, 2))])
+        places = np.concatenate([self.coordinates(states), w[None], np.zeros((1, w.size))])
+        inputs = np.concatenate([self.parameters, np.zeros((3, 2))], axis=1)
         if errors is not None:
             inputs[2, : self.count] = errors
         fill_signed_values(program.operands, program.work, inputs, places, states, found)
@@ -182,26 +183,34 @@ class FormulaLaw(Law):
         """Return `force_errors` on the panels of each run, beginning with those from its start: the largest at three
         places of each.
         """
-        places, signs, counts = [], [], []
+        halves, panels, ends = [], [], [0]
         for run in runs:
-            v, halves = run.record[HEADING], [(run.record[START], run.half_c, run.panels_ahead)]
+            v, ahead = float(run.record[HEADING]), run.panels_ahead
+            halves.append((run.record[START], v, v, run.half_c))
+            panels.append(ahead)
+            ends.append(ends[-1] + len(ahead))
             if run.what != END_ASYMPTOTE:
-                halves.append((run.record[END], 0.0, run.panels_back))
-            counts.append(sum(len(panels) for *_, panels in halves))
-            for sense, (origin, half_c, panels) in zip((v, -v), halves, strict=False):
-                right = panels[:, RIGHT]
-                left = np.append(0.0, right)[:-1]
-                w = np.array([left, 0.5 * (left + right), right])
-                places.append(origin + sense * (w if half_c == inf else w * (w + 2.0 * half_c)))
-                nu = np.where(panels[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
-                signs.append(np.array([np.full_like(nu, v), nu]))
-        (v, nu), at = np.hstack(signs), np.hstack(places)
-        errors = self.force_errors(at.ravel(), np.tile(v, 3), np.tile(nu, 3)).reshape(at.shape)
-        return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
+                halves.append((run.record[END], v, -v, 0.0))
+                panels.append(run.panels_back)
+                ends[-1] += len(panels[-1])
+        sizes = [len(of_half) for of_half in panels]
+        origin, v, sense, half_c = np.repeat(np.array(halves).T, sizes, axis=1)
+        right, load = (np.concatenate([of_half[:, k] for of_half in panels]) for k in (RIGHT, NORMAL_LOAD + COUNT // 2))
+        left = np.concatenate([[0.0], right])
+        left[np.cumsum(sizes) - sizes] = 0.0  # at the first panel of each half
+        left = left[:-1]
+        w = np.array([left, 0.5 * (left + right), right])
+        is_distance = half_c == inf
+        places = origin + sense * np.where(is_distance, w, w * (w + 2.0 * np.where(is_distance, 0.0, half_c)))
+        nu = np.where(load > 0.0, 1.0, -1.0)
+        errors = self.force_errors(places.ravel(), np.concatenate([v] * 3), np.concatenate([nu] * 3))
+        largest = errors.reshape(places.shape).max(axis=0)
+        return [largest[begin:end] for begin, end in pairwise(ends)]
 
     def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
         """Return the errors of dW/dlam of a body at rest in doubles: by rounding, and by the rounding of the place."""
-        return np.nan_to_num(self._forces(places, v, nu)[1], posinf=0.0)
+        errors = self._forces(places, v, nu)[1]
+        return np.where(errors < inf, errors, 0.0)
 
     def _forces(self, places: Array, v: Array, nu: Array) -> tuple[Array, Array]:
         """Return the force dW/dlam on a body at rest, and its errors.

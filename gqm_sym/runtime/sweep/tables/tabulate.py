@@ -17,7 +17,7 @@ from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_pot
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import multiply as multiply_pairs
-from gqm_sym.runtime.double_double.orbit_time import fill_parameters
+from gqm_sym.runtime.double_double.quadrature import fill_parameters
 from gqm_sym.runtime.interface import PATH_ROWS
 from gqm_sym.runtime.sweep.tables.fitting import MAX_TRUE_TAIL_RATIO, fill_terms, fill_true_terms, fit, move_terms
 from gqm_sym.runtime.sweep.tables.layout import (
