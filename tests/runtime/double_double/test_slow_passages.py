@@ -1,4 +1,4 @@
-"""Orbits whose body turns next to a hilltop, or only just passes one."""
+"""Half periods and laps are right for bodies that turn next to a hilltop, or barely pass one."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -21,13 +21,13 @@ EXPONENTS = np.linspace(1.0, 13.5, 26)
 
 @pytest.fixture(scope="module")
 def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead on a circle."""
+    """Return a bead on a circle."""
     return module_of("circle")
 
 
 @pytest.fixture(scope="module")
 def double_well(module_of: Callable[[str], ModuleType]) -> ModuleType:
-    """A bead between two wells."""
+    """Return a bead between two wells."""
     return module_of("double_well")
 
 
@@ -44,7 +44,7 @@ def assert_found(motion: object, wanted: mpf, answer: float) -> None:
 
 @pytest.mark.parametrize("exponent", EXPONENTS[EXPONENTS < 7.0])
 def test_released_beside_the_top(exponent: float, circle: ModuleType) -> None:
-    """K(k) sqrt(L/g) 2, where both turning points are at the top."""
+    """The half period is 2 K(k) sqrt(L/g), with both turning points at the top."""
     amplitude = float(np.pi - 10.0**-exponent)
     motion = circle.solve(lam0=amplitude, L=1)
     with mp.workdps(50):
@@ -53,7 +53,7 @@ def test_released_beside_the_top(exponent: float, circle: ModuleType) -> None:
 
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_thrown_up_to_the_top(exponent: float, circle: ModuleType) -> None:
-    """With the speed v at the bottom, K(v**2/(4 g L)) sqrt(L/g) 2 below the speed that suffices."""
+    """With a speed v at the bottom that does not suffice, the half period is 2 K(v**2/(4 g L)) sqrt(L/g)."""
     speed = float(np.sqrt(4 * 9.81) * (1.0 - 10.0**-exponent))
     motion = circle.solve(lam0=0, v0=speed, L=1)
     assert motion.kind == "libration"
@@ -63,7 +63,7 @@ def test_thrown_up_to_the_top(exponent: float, circle: ModuleType) -> None:
 
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_round_and_slowly_over_the_top(exponent: float, circle: ModuleType) -> None:
-    """4 K(4 g L/v**2) L/v above that speed, whichever place and direction it is thrown in."""
+    """With a higher speed a round takes 4 K(4 g L/v**2) L/v, in whichever place and direction the body is launched."""
     speed = float(np.sqrt(4 * 9.81) * (1.0 + 10.0**-exponent))
     motion = circle.solve(lam0=0, v0=speed, L=1, direction=(-1) ** int(2 * exponent))
     assert motion.kind == "circulation"

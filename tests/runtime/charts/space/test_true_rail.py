@@ -1,4 +1,4 @@
-"""Rails in space in double-double arithmetic: half periods against closed forms."""
+"""Half periods on rails in space, in double-double arithmetic, agree with closed forms."""
 
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,10 @@ WAVES = {"x": "c*(u - 4)", "y": "R*sin(u - 4)", "z": "-R*cos(u - 4)", "parameter
     ],
 )
 def test_half_periods_of_a_coil(tmp_path: Path, pieces: list[Any]) -> None:
-    """A helix about a level axis is a pendulum: half periods are correctly rounded, also many turns from the start and
-    across the end of a piece with formulas. They were up to 304 units in the last place off.
+    """On a helix about a level axis half periods are correctly rounded (a pendulum's; they were up to 304 units in the
+    last place off).
+
+    This holds also many turns from the start, and across the end of a piece with formulas.
     """
     given = COILED if len(pieces) == 1 else {"parameters": COILED["parameters"]}
     module = built(tmp_path, f"coil_of_{len(pieces)}", pieces, **given)
