@@ -1,9 +1,10 @@
 """Import of generated modules from their files."""
 
+import atexit
 import importlib.util
 import os
 import tempfile
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -33,6 +34,18 @@ def load(path: str | os.PathLike[str], name: str) -> ModuleType:
     return module
 
 
+@cache
+def _folder() -> str:
+    """Return a folder for modules that have no file of their own; it is deleted when the process ends.
+
+    numba stores compiled code only for functions whose file exists when they are compiled, and without a place for it
+    they would be compiled at their first call.
+    """
+    folder = tempfile.TemporaryDirectory(prefix="gqm-")
+    atexit.register(folder.cleanup)
+    return folder.name
+
+
 @lru_cache(maxsize=16)
 def load_text(source: str, text: str, name: str) -> ModuleType:
     """Import a generated module from its text, in another process or on another machine.
@@ -47,7 +60,6 @@ def load_text(source: str, text: str, name: str) -> ModuleType:
     path = Path(source)
     if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
         return load(path, name)
-    with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
-        path = Path(folder) / f"{name}.py"
-        path.write_text(text, encoding="utf-8")
-        return load(path, name)
+    path = Path(tempfile.mkdtemp(dir=_folder())) / f"{name}.py"
+    path.write_text(text, encoding="utf-8")
+    return load(path, name)

@@ -28,8 +28,9 @@ import gqm_sym as gqm
 from gqm_sym.errors import GQMError
 
 DIGITS = 60
-# Nodes of the Gauss-Legendre rule on each panel, and the share of the whole time that may be missed by a panel.
-NODES, TOLERANCE = 24, mpf(10) ** -19
+# Nodes of the Gauss-Legendre rule on each panel (14 take the least time; with fewer, panels are halved), and the share
+# of the whole time that may be missed by a panel.
+NODES, TOLERANCE = 14, mpf(10) ** -19
 MAX_DEPTH = 40
 # Places on the way to the next turning point at which a motion is looked at, as shares of the phase angle.
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97, 0.99, 1.0)

@@ -13,7 +13,8 @@ from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 from problems import PROBLEMS, TRACKS, Problem
 
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.compiled import uncompiled as plain
 
 # The first example of a test may compile for seconds, and a failure must be reproducible.
 settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
@@ -26,6 +27,10 @@ if hasattr(providers, "is_local_module_file"):
 
 # On a busy machine compiling may take any time, and tests check what is printed on standard error.
 jit.ANNOUNCER.seconds = 1e6
+
+# Most of the suite's modules are used a few times only, and compiling their functions took half of the time of many
+# tests. Python gives the same bits, and may go on until it has taken as long as the compiler would.
+emitted.MAX_PYTHON_TIME, plain.MAX_LAUNCHES = 0.1, 8
 
 # A worker has up to a million objects of SymPy and numba; collecting garbage as often as usual takes a twelfth of the
 # time.

@@ -3,7 +3,6 @@
 import argparse
 import json
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -248,15 +247,9 @@ def _assignment(text: str, known: Sequence[str]) -> tuple[str, str]:
 
 def _module(text: str, name: str, folder: Path) -> Any:
     """Import the generated module from the folder if the file there is up to date, or else from a temporary one."""
-    from gqm_sym.building import difference, load, write_module
+    from gqm_sym.loading import load_text
 
-    present = folder / f"{name}.py"
-    if present.is_file() and not difference(text, present):
-        return load(present, name)
-    with tempfile.TemporaryDirectory(prefix="gqm-") as temporary:
-        path = Path(temporary) / present.name
-        write_module(text, path)
-        return load(path, name)
+    return load_text(str(folder / f"{name}.py"), text, name)
 
 
 # -- sweep and fit ---------------------------------------------------------------------------
