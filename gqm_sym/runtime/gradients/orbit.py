@@ -27,8 +27,8 @@ def requested_quantity(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
-        "gradients: there are none along tracks in space without formulas, tracks of rolling bodies with a radius or of "
-        "trains, and curves that are known in doubles only; declare the curve by formulas"
+        "gradients: there are none along tracks in space without formulas, tracks of rolling bodies with a radius or "
+        "of trains, and curves that are known in doubles only; declare the curve by formulas"
     )
 
 
