@@ -230,8 +230,8 @@ class PeriodicTimes(Motion):
         """
         if self.problem.functions.exact is None:
             raise SolutionError(
-                "period_to: this curve is a chart in doubles, whose period has no more digits than `period`; "
-                "declare the curve by formulas for more"
+                "period_to: along this track no more digits are known than those of `period`; declare the curve by "
+                "formulas for more"
             )
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
 
