@@ -186,7 +186,7 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
         "loop": True,
         "index": index,
         "count": count,
-        "loops": loops,
+        "blocks": loops,
     }
     return fields, printer.used
 
@@ -230,8 +230,7 @@ def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) 
         "loop": function.batch,
         "index": index,
         "count": count[0] if count else "",
-        "loops": [inside],
-        "inside": inside,
+        "blocks": [inside],
     }
     return fields, printer.used
 
