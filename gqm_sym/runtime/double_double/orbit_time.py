@@ -1,7 +1,6 @@
-"""Half periods and lap times in double-double arithmetic by the trapezoidal rule, with turning points and a bound.
+"""Half periods and lap times in double-double arithmetic, with turning points and bounds on the errors.
 
-V**2 is the plain difference of effective potentials, because many of the 31 digits may be lost; a bound on the loss is
-computed along with it. The nodes are phase angles (MATHS, section 4), whose sines are tabulated.
+The time is found by the trapezoidal rule (`quadrature`), or in parts where the body is slow (`slow_passages`).
 """
 
 from math import fabs, nan
@@ -45,6 +44,7 @@ MAX_RULE_ERROR, MAX_PANEL_ERROR = 1e-27, 1e-24
 # right next to a hilltop. They may move a turning point by at most this share of the orbit's width.
 MAX_STEPS, MAX_STEP = 6, 1e-6
 
+# Types of what compiled functions take: a number with its error, and an orbit.
 BOUNDED = types.UniTuple(REAL, 3)
 LEVEL_AND_INTERVAL = types.Tuple((BOUNDED, types.UniTuple(REAL, 2), types.UniTuple(REAL, 2)))
 

@@ -43,7 +43,7 @@ MIN_PANELS, MAX_PANELS = 2, 128
 # The largest factor by which the ratio of successive changes may grow from one doubling to the next.
 SAFETY = 16.0
 
-# Types of what compiled functions take: a tape behind the interpreter's address, a number with its error, and an orbit.
+# The type of a tape behind the interpreter's address.
 TAPE = types.Tuple((INTEGER, types.int64[:, ::1], types.UniTuple(INTEGER, 3), types.UniTuple(INTEGER, 6)))
 
 stacked_sums = on_stack(ROW)

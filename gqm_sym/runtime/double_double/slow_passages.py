@@ -119,9 +119,8 @@ def fill_without_roots(w, at_place, k):  # type: ignore[no-untyped-def]
         new_b, new_b_low = divide(part, part_low, one, one_low)
         change = fabs((new_b - b) + (new_b_low - b_low)) + fabs((new_c - c) + (new_c_low - c_low))
         b, b_low, c, c_low = new_b, new_b_low, new_c, new_c_low
-        if not fabs(b) + fabs(c) <= MAX_ROOTS or (change >= before and change <= UNIT * (fabs(b) + fabs(c))):
-            break
-        if change == 0.0:
+        size = fabs(b) + fabs(c)
+        if not size <= MAX_ROOTS or change == 0.0 or before <= change <= UNIT * size:
             break
         before = change
     return (b, b_low), (c, c_low)

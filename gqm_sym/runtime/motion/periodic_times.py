@@ -144,9 +144,8 @@ class PeriodicTimes(Motion):
 
     @cached_property
     def _orbit_by_rule(self) -> Orbit | None:
-        """The orbit of a launch from a turning point, or of a circulation, found by the trapezoidal rule alone.
-
-        It is None if that rule has not converged in doubles, and along charts.
+        """The orbit of a launch from a turning point, or of a circulation, for which the trapezoidal rule has converged
+        in doubles; None for others, and along charts.
         """
         is_smooth = self._segment_in_doubles.known_duration is not None and self.problem.formulas.chart is None
         if not is_smooth or (self.kind == "libration" and self.problem.w0 > 0.0):
