@@ -8,7 +8,7 @@ import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.charts.chart import Chart
-from gqm_sym.runtime.charts.double_double.pieces import NODES, Samples, sample_places
+from gqm_sym.runtime.charts.double_double.pieces import Samples, sample_places
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
@@ -48,13 +48,9 @@ class Parts:
 
     def sample(self, k: int) -> Samples:
         """Return a piece at the Chebyshev points in double-double arithmetic (`double_double.pieces`)."""
-        context, (part, low, high) = self._context, self._origins[k]
-        at, samples = self._part(part), np.empty((2, 2, NODES))
-        middle, half = (context.mpf(high) + low) / 2, (context.mpf(high) - low) / 2
-        for i, node in enumerate(sample_places().T.tolist()):
-            for row, value in zip(samples, at(middle + half * sum(map(context.mpf, node)))[:2], strict=True):
-                row[:, i] = two_doubles(value)
-        return samples, 4.0 * UNIT * float(np.abs(samples).max())
+        part, low, high = self._origins[k]
+        at = self._part(part)
+        return samples_between(self._context, lambda place: at(place)[:2], low, high)
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
         """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
@@ -74,6 +70,17 @@ class Parts:
         raise SolutionError(f"the track near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to it")
 
 
+def samples_between(context: Any, coordinates: Callable[[Any], Sequence[Any]], low: float, high: float) -> Samples:
+    """Return coordinates at the Chebyshev points between two places in double-double arithmetic
+    (`double_double.pieces`).
+    """
+    middle, half = (context.mpf(high) + low) / 2, (context.mpf(high) - low) / 2
+    places = (middle + half * sum(map(context.mpf, node)) for node in sample_places().T.tolist())
+    found = np.array([[two_doubles(value) for value in coordinates(place)] for place in places])
+    samples = np.ascontiguousarray(found.transpose(1, 2, 0))
+    return samples, 4.0 * UNIT * float(np.abs(samples).max())
+
+
 def polynomial(context: Any, begin: Any, unit: Any, x: Sequence[Any], z: Sequence[Any]) -> Part:
     """Return a part whose coordinates are polynomials in ``(place - begin)/unit``, lowest power first."""
     rows = Polynomials(context, (x, z))
@@ -85,18 +92,18 @@ def polynomial(context: Any, begin: Any, unit: Any, x: Sequence[Any], z: Sequenc
     return at
 
 
-def spiral(context: Any, pen: tuple[Any, Any, Any], length: Any, first: Any, last: Any, count: int) -> Part:
+def spiral(context: Any, pose: tuple[Any, Any, Any], length: Any, first: Any, last: Any, count: int) -> Part:
     """Return a line, an arc or a clothoid as Taylor series about the middles of ``count`` equal steps of length.
 
     Parameters
     ----------
-    pen
+    pose
         x, z and the angle of the tangent at its beginning.
     first, last
         Its curvature at the beginning and at the end.
     """
     step, bent = length / count, (last - first) / length
-    x, z, angle = pen
+    x, z, angle = pose
     steps: list[Part] = []
     for k in range(count):
         middle = (k + context.mpf(1) / 2) * step

@@ -19,7 +19,7 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, Indices, Pieces, joined, rectify, summed
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, tangents_of
-from gqm_sym.runtime.charts.double_double.pieces import DIGITS, TruePieces
+from gqm_sym.runtime.charts.double_double.pieces import TruePieces, starting_context
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
@@ -40,7 +40,7 @@ PIECE_NUMBERS = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("
 
 
 @dataclass(frozen=True, slots=True)
-class Pen:
+class Pose:
     """An end of a piece: its coordinates, and the angle of the tangent in radians."""
 
     x: float
@@ -90,35 +90,35 @@ class Rail:
             If pieces do not meet, or a closed rail does not close.
         """
         numbers = iter(self.numbers(FLOATS, p))
-        pen = Pen(*(float(number) for number in islice(numbers, 3))) if self.placed else None
+        pose = Pose(*(float(number) for number in islice(numbers, 3))) if self.placed else None
         segments = iter(self.segments)
         parts: list[Pieces] = []
-        joints, start, length = [0.0], pen, 0.0
+        joints, start, length = [0.0], pose, 0.0
         for count, kind in enumerate(self.pieces, start=1):
             where = f"piecewise: piece {count} ({kind})"
             if kind == "curve":
                 low, high = islice(numbers, 2)
                 part, begin, end = _curve(next(segments), np.array(p), low, high, where)
-                if pen is not None:
+                if pose is not None:
                     _check_joint(
-                        pen, begin, length + part.lengths.sum(), f"{where}: begins", "the piece before it ends"
+                        pose, begin, length + part.lengths.sum(), f"{where}: begins", "the piece before it ends"
                     )
-                    laps = 2.0 * pi * round((pen.angle - begin.angle) / (2.0 * pi))
+                    laps = 2.0 * pi * round((pose.angle - begin.angle) / (2.0 * pi))
                     part = replace(part, angles=part.angles + laps)
-                    end = Pen(end.x, end.z, end.angle + laps)
-                start, pen = start or begin, end
+                    end = Pose(end.x, end.z, end.angle + laps)
+                start, pose = start or begin, end
             else:
-                assert pen is not None
-                part, pen = _standard(kind, numbers, pen, where)
+                assert pose is not None
+                part, pose = _standard(kind, numbers, pose, where)
             parts.append(part)
             if sum(one.lengths.size for one in parts) > MAX_PIECES:
                 raise BudgetError(f"chart: {where}: {MAX_PIECES} pieces reach no farther; let the rail turn less")
             length += float(part.lengths.sum())
             joints.append(length)
         assert start is not None
-        assert pen is not None
+        assert pose is not None
         which = np.repeat(np.arange(len(parts)), [part.lengths.size for part in parts])
-        return self._assembled(joined(parts), which, joints, start, pen)
+        return self._assembled(joined(parts), which, joints, start, pose)
 
     def is_exact(self, chart: Chart) -> bool:
         """Return True: every piece has formulas."""
@@ -127,32 +127,29 @@ class Rail:
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
         """Return the rail in extended precision."""
         numbers = iter(self.numbers(context, p))
-        pen = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
+        pose = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
         formulas, counts = iter(self.formulas), np.bincount(chart.origins[:, 0].astype(np.int64))
         parts: list[Part] = []
         for kind, count in zip(self.pieces, counts.tolist(), strict=True):
             if kind == "curve":
-                parts.append(_formula(context, next(formulas), p, *islice(numbers, 2)))
+                parts.append(along_range(context, next(formulas), p, *islice(numbers, 2)))
                 x, z, dx, dz = parts[-1](context.mpf(1))
-                pen = x, z, context.atan2(dz, dx)
+                pose = x, z, context.atan2(dz, dx)
                 continue
-            assert pen is not None
+            assert pose is not None
             given = {name: context.mpf(next(numbers)) for name in PIECE_NUMBERS[kind]}
-            length, first, last = _bent(kind, given)
-            parts.append(spiral(context, pen, length, first, last, count))
-            pen = *parts[-1](context.mpf(count))[:2], pen[2] + length * (first + last) / 2
+            length, first, last = ends_of(kind, given)
+            parts.append(spiral(context, pose, length, first, last, count))
+            pose = *parts[-1](context.mpf(count))[:2], pose[2] + length * (first + last) / 2
         return Parts(context, chart, parts.__getitem__)
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces:
         """Return the rail in double-double arithmetic."""
-        from mpmath.ctx_mp import MPContext
-
-        context = MPContext()
-        context.dps = DIGITS
+        context = starting_context()
         curve = self.true_curve(context, tuple(number.at(context) for number in p), chart)
         return TruePieces(chart, curve.sample)
 
-    def _assembled(self, pieces: Pieces, parts: Indices, joints: list[float], start: Pen, end: Pen) -> Chart:
+    def _assembled(self, pieces: Pieces, parts: Indices, joints: list[float], start: Pose, end: Pose) -> Chart:
         edges = summed(pieces.lengths)
         inner = joints[1:-1]
         turn = 0.0
@@ -171,7 +168,7 @@ class Rail:
         )
 
 
-def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
+def _check_joint(end: Pose, begin: Pose, length: float, who: str, whom: str) -> None:
     """Refuse a joint at which the place or the tangent jumps."""
     gap = hypot(begin.x - end.x, begin.z - end.z)
     turn = abs((begin.angle - end.angle + pi) % (2.0 * pi) - pi)
@@ -183,18 +180,24 @@ def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> No
         )
 
 
-def _formula(context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low: Any, high: Any) -> Part:
-    """Return a curve with formulas as a function of the share of its parameter's range; its ends 0 and 1 are exact."""
+def along_range(
+    context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low: Any, high: Any
+) -> Callable[[Any], Any]:
+    """Return a curve with formulas as a function of the share of its parameter's range; its ends 0 and 1 are exact.
+
+    The function gives the coordinates and their derivatives with respect to the share.
+    """
     low, width = context.mpf(low), context.mpf(high) - low
 
-    def at(share: Any) -> tuple[Any, Any, Any, Any]:
-        x, z, dx, dz = formula(context, low + width * share, p)
-        return x, z, dx * width, dz * width
+    def at(share: Any) -> tuple[Any, ...]:
+        values = formula(context, low + width * share, p)
+        dimension = len(values) // 2
+        return *values[:dimension], *(rate * width for rate in values[dimension:])
 
     return at
 
 
-def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
+def ends_of(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
     """Return the length of a line, an arc or a clothoid, and its curvature at both ends."""
     if kind == "arc":
         length = given["radius"] * abs(given["angle"])
@@ -202,7 +205,7 @@ def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
     return given["length"], given.get("kappa_start", 0.0), given.get("kappa_end", 0.0)
 
 
-def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[Pieces, Pen]:
+def _standard(kind: str, numbers: Iterator[Any], pose: Pose, where: str) -> tuple[Pieces, Pose]:
     """Return a line, an arc or a clothoid, and its right end."""
     given = {name: float(next(numbers)) for name in PIECE_NUMBERS[kind]}
     for name, value in given.items():
@@ -211,7 +214,7 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
             raise ParameterError(f"{where}: {name}: must be {wanted}, got {value!r}")
     if given.get("angle") == 0.0:
         raise ParameterError(f"{where}: angle: must not be zero; positive turns left, negative right")
-    length, first, last = (float(value) for value in _bent(kind, given))
+    length, first, last = (float(value) for value in ends_of(kind, given))
     turned = max(abs(first), abs(last)) * length
     if not turned <= MAX_TOTAL_TURN:
         raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
@@ -220,7 +223,7 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
     left: Array = step * np.arange(count, dtype=np.float64)[:, None]
 
     def angle(s: Array) -> Array:
-        return pen.angle + s * (first + s * bent)
+        return pose.angle + s * (first + s * bent)
 
     nodes, weights = _GAUSS
     inside, middle = angle(left + 0.5 * step * (1.0 + nodes)), angle(left + 0.5 * step)
@@ -232,7 +235,7 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
         ],
         axis=1,
     )
-    places = np.cumsum(np.concatenate([[[pen.x, pen.z]], gained]), axis=0, dtype=np.longdouble).astype(np.float64)
+    places = np.cumsum(np.concatenate([[[pose.x, pose.z]], gained]), axis=0, dtype=np.longdouble).astype(np.float64)
     s = left + 0.5 * step * (1.0 + NODES)
     steps = np.arange(count)
     pieces = Pieces(
@@ -242,7 +245,7 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
         angles=angle(s),
         curvatures=first + 2.0 * bent * s,
     )
-    return pieces, Pen(float(places[-1, 0]), float(places[-1, 1]), pen.angle + 0.5 * (first + last) * length)
+    return pieces, Pose(float(places[-1, 0]), float(places[-1, 1]), pose.angle + 0.5 * (first + last) * length)
 
 
 @entry(types.float64[:, ::1](types.int64, types.float64[::1], types.float64[::1]))
@@ -253,7 +256,7 @@ def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
     return out
 
 
-def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple[Pieces, Pen, Pen]:
+def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple[Pieces, Pose, Pose]:
     """Return a curve with formulas, and both its ends."""
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError(f"{where}: domain: must have finite ends lo < hi, got ({low!r}, {high!r})")
@@ -265,6 +268,6 @@ def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple
     pieces = rectify(rows, np.array([low, high], dtype=np.float64), where=where)
     pieces = replace(pieces, places=(pieces.places - low) / (high - low))
     ends = rows(np.array([low, high], dtype=np.float64), np.zeros((2, 1)))[:, :, 0]
-    begin, end = (Pen(float(e[0]), float(e[1]), atan2(e[4], e[3])) for e in ends.T)
+    begin, end = (Pose(float(e[0]), float(e[1]), atan2(e[4], e[3])) for e in ends.T)
     laps = 2.0 * pi * round((pieces.angles[-1, 0] - end.angle) / (2.0 * pi))
-    return pieces, begin, Pen(end.x, end.z, end.angle + laps)
+    return pieces, begin, Pose(end.x, end.z, end.angle + laps)

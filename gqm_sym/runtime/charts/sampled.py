@@ -19,8 +19,8 @@ from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, divided, rectify, summed, unwrapped
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, assemble_in_space
+from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
-from gqm_sym.runtime.charts.double_double.pieces import SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
@@ -144,7 +144,7 @@ def sample_spline(t, c, place, nodes):  # type: ignore[no-untyped-def]
         at, at_low = multiply(width, width_low, share, share_low)
         at, at_low = add(at, at_low, begin, 0.0)
         for row in range(dimension):
-            column = row if dimension == 2 else (0, 2, 1)[row]
+            column = row if dimension == 2 else IN_SAMPLES[row]
             for j in range(DEGREE + 1):
                 terms[j, 0], terms[j, 1] = c[k - DEGREE + j, column], 0.0
             for order in range(1, DEGREE + 1):

@@ -19,8 +19,8 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic import doubledouble
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.continuation import CLOSED, FAR, MAX_PIECES, PIECE_ROWS, SINGULAR, trace_one_way
-from gqm_sym.runtime.charts.double_double.pieces import DIGITS, SAMPLES, Samples, TruePieces, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
+from gqm_sym.runtime.charts.double_double.pieces import SAMPLES, Samples, TruePieces, sample_places, starting_context
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, LevelCurve, evaluate_points
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -162,13 +162,10 @@ class Traced:
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
         """Return the curve in double-double arithmetic; None if F is too long a formula, or not smooth."""
-        from mpmath.ctx_mp import MPContext
-
         formulas = bind(record_by_coordinates(self.level, len(p)), p) if self.is_exact(chart) else None
         if formulas is None:
             return None
-        context = MPContext()
-        context.dps = DIGITS
+        context = starting_context()
         x, z = Zeros(self, context, tuple(number.at(context) for number in p)).start
         given = chart.block, *formulas.operands, sample_places()
         count = chart.edges.size - 1

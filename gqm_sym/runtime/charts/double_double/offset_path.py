@@ -16,6 +16,7 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     fill_points,
     piece_of,
     sloppy_add,
+    squared_rate,
 )
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
@@ -67,9 +68,7 @@ def fill_path(curve, number, n, u, points):  # type: ignore[no-untyped-def]
     fill_bends(curve, number, n, u, bends)
     for i in range(n):
         dx, dz = (points[DX + i], points[DX_LOW + i]), (points[DZ + i], points[DZ_LOW + i])
-        s, s_low = multiply(dx[0], dx[1], dx[0], dx[1])
-        t, t_low = multiply(dz[0], dz[1], dz[0], dz[1])
-        square, square_low = add(s, s_low, t, t_low)
+        square, square_low = squared_rate(curve, points, i)
         speed, speed_low = square_root(square, square_low)
         ahead, ahead_low = divide(h, h_low, speed, speed_low)
         s, s_low = multiply(dx[0], dx[1], bends[2 * RULE + i], bends[3 * RULE + i])

@@ -57,6 +57,8 @@ X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE, Y, Y_LOW, DY, DY_LOW = range(
 
 # The rows of the terms of a curve in space: two for each coordinate, in the order x, z, y.
 ROWS_IN_SPACE = 6
+# The coordinates x, y and z in this order.
+IN_SAMPLES = (0, 2, 1)
 
 stacked_points, stacked_places = on_stack(13 * RULE), on_stack(2 * RULE)
 
@@ -104,6 +106,15 @@ TRUE_CURVE = types.NamedTuple(
     ),
     TrueCurve,
 )
+
+
+def starting_context() -> Any:
+    """Return an mpmath context with the digits to which starting values of double-double arithmetic are computed."""
+    from mpmath.ctx_mp import MPContext
+
+    context = MPContext()
+    context.dps = DIGITS
+    return context
 
 
 @Inlined

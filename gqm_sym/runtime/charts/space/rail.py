@@ -124,8 +124,7 @@ class SpaceRail:
             If pieces do not meet, a closed rail does not close, or the frame of a banked one has no roll angle.
         """
         numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
-        given_start = np.array([float(number) for number in islice(numbers, 6 * self.placed)], dtype=np.longdouble)
-        pose = _start(given_start) if self.placed else None
+        pose = _start(np.array([*map(float, islice(numbers, 6))], dtype=np.longdouble)) if self.placed else None
         start, parts, joints = pose, [], [0.0]
         for count, kind in enumerate(self.pieces, start=1):
             where = f"piecewise: piece {count} ({kind})"

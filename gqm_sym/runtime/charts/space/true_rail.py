@@ -1,7 +1,6 @@
 """Rails in space in double-double arithmetic, by Taylor series of the frame on the parts of each piece."""
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache
 from itertools import islice
 from typing import Any
 
@@ -9,8 +8,10 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.charts import rail
 from gqm_sym.runtime.charts.chart import Chart
-from gqm_sym.runtime.charts.double_double.pieces import DIGITS, NODES, Samples, sample_places
+from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, NODES, Samples, sample_places, starting_context
+from gqm_sym.runtime.charts.exact_parts import samples_between
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
@@ -18,8 +19,12 @@ from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
 # The coefficients of each of the three rates of a transition, in powers of the distance from its beginning.
 POWERS = 6
-# The numbers that define each piece: the length of a transition, followed by the coefficients of its rates.
-PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
+# The number of numbers that define each piece; those of a transition are its length and the coefficients of its rates.
+PIECE_NUMBERS = {
+    **{kind: len(names) for kind, names in rail.PIECE_NUMBERS.items()},
+    "transition": 1 + 3 * POWERS,
+    "curve": 2,
+}
 
 # A tangent that deviates from the vertical by less has no level direction.
 MIN_LEVEL = 1e-9
@@ -30,8 +35,6 @@ TERMS = 56
 TURNS = np.array([(0, 1, 0, 1), (0, 2, 1, 1), (1, 0, 0, -1), (1, 2, 2, -1), (2, 0, 1, -1), (2, 1, 2, 1)])
 # The rows of a pose: those of the frame, then the place.
 PLACE = 3
-# The coordinates in the order of `pieces.Samples`: x, z, y.
-IN_SAMPLES = (0, 2, 1)
 # A bound on the rounding errors of a frame over one part, in units of double-double arithmetic.
 ROUNDINGS = 100.0
 
@@ -41,16 +44,11 @@ def rates_of(kind: str, given: Any) -> tuple[Any, tuple[Sequence[Any], Sequence[
 
     Arcs and clothoids turn by pitch, as a rail in a plane does.
     """
-    match kind:
-        case "arc":
-            radius, angle = given
-            return radius * abs(angle), ((), ((1 if angle > 0 else -1) / radius,), ())
-        case "clothoid":
-            length, first, last = given
-            return length, ((), (first, (last - first) / length), ())
-        case _:
-            yaw, pitch, roll = (given[1 + POWERS * row : 1 + POWERS * (row + 1)] for row in range(3))
-            return given[0], (yaw, pitch, roll)
+    if kind == "transition":
+        yaw, pitch, roll = (given[1 + POWERS * row : 1 + POWERS * (row + 1)] for row in range(3))
+        return given[0], (yaw, pitch, roll)
+    length, first, last = rail.ends_of(kind, dict(zip(rail.PIECE_NUMBERS[kind], given, strict=True)))
+    return length, ((), (first, (last - first) / length), ())
 
 
 def starting_frame(cosine: Any, sine: Any, heading: Any, climb: Any, roll: Any) -> list[list[Any]]:
@@ -182,14 +180,11 @@ class TrueRail:
         p: Sequence[Number],
         chart: Chart,
     ) -> None:
-        from mpmath.ctx_mp import MPContext
-
-        self._context = context = MPContext()
-        context.dps = DIGITS
-        self._p, following = tuple(number.at(context) for number in p), iter(formulas)
+        self._context = context = starting_context()
+        values, following = tuple(number.at(context) for number in p), iter(formulas)
         self._origins = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
         counts = np.bincount(chart.origins[:, 0].astype(np.int64)).tolist()
-        given = (context.mpf(number) for number in numbers(context, self._p))
+        given = (context.mpf(number) for number in numbers(context, values))
         pose, passed = np.zeros((4, 3, 2)), 0
         if placed:
             place, angles = [*islice(given, 3)], [*islice(given, 3)]
@@ -199,7 +194,7 @@ class TrueRail:
             own = [*islice(given, PIECE_NUMBERS[kind])]
             passed += count
             if kind == "curve":
-                at = self._curve(next(following), *own)
+                at = rail.along_range(context, next(following), values, *own)
                 *place, dx, dy, dz = at(context.mpf(1))
                 size = context.sqrt(dx * dx + dy * dy + dz * dz)
                 pose = _pairs([*level_frame(context.hypot, [dx / size, dy / size, dz / size]), place])
@@ -222,22 +217,12 @@ class TrueRail:
         if not callable(known):
             samples = np.ascontiguousarray(known[int(low)])
             return samples, self._error + 4.0 * UNIT * float(np.abs(samples).max())
-        samples, context = np.empty((3, 2, NODES)), self._context
-        middle, half = (context.mpf(high) + low) / 2, (context.mpf(high) - low) / 2
-        for i, node in enumerate(sample_places().T.tolist()):
-            x, y, z = known(middle + half * sum(map(context.mpf, node)))[:3]
-            samples[:, :, i] = _pairs((x, z, y))
-        return samples, 4.0 * UNIT * float(np.abs(samples).max())
 
-    def _curve(self, formula: Callable[..., Any], low: Any, high: Any) -> Callable[[Any], tuple[Any, ...]]:
-        """Return a curve with formulas as a function of the share of its parameter's range."""
+        def coordinates(place: Any) -> list[Any]:
+            found = known(place)
+            return [found[axis] for axis in IN_SAMPLES]
 
-        @cache
-        def at(share: Any) -> tuple[Any, ...]:
-            *place, dx, dy, dz = formula(self._context, low + (high - low) * share, self._p)
-            return *place, dx, dy, dz
-
-        return at
+        return samples_between(self._context, coordinates, low, high)
 
 
 def _pairs(values: Any) -> Array:
