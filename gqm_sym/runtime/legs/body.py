@@ -51,6 +51,10 @@ PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
 LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS, SIZE = range(26, 36)
 
+# A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
+# doubles.
+LEAST_SWING = 1e-110
+
 
 def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:
     """Return bodies at their launch.
