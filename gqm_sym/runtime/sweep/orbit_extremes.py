@@ -10,13 +10,13 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS
 
-# The number of intervals of the first grid, in equal steps of the phase angle; the factor by which the step shrinks
-# each time that the best point is refined; and the factor by which it grows if the vertex of a parabola lies outside of
-# it.
-GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
+# The number of intervals of the first grid, in equal steps of the phase angle; the factors by which the step shrinks
+# when the best point is refined for the first time and each time after that; and the factor by which it grows if the
+# vertex of a parabola lies outside of it.
+GRID_INTERVALS, FIRST_STEP_RATIO, STEP_RATIO, GROWTH = 64, 4.0, 16.0, 4.0
 
-# A grid that does not resolve the orbit is followed by one that is finer by this factor, up to so many grids of the
-# first size side by side.
+# A grid that does not resolve the orbit or one of its peaks is followed by one that is finer by this factor, up to so
+# many grids of the first size side by side.
 REFINEMENT, MAX_GRIDS = 4, 256
 
 # A grid resolves a function if its mean over every second point is the same up to this share of its range, and up to
@@ -24,10 +24,15 @@ REFINEMENT, MAX_GRIDS = 4, 256
 # curve bends; only these show a bend that is shorter than the grid's steps.
 MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
 
-# The smallest and the largest number of refinements of the best point. In between, refinement ends if the value changes
-# by less than this share of the largest on the grid: its error is then far smaller, because it decreases with the
-# fourth power of the step.
-REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
+# The largest number of refinements of the best point. Refinement ends if the parabola through the last three values
+# rises above the middle one by less than this share of the largest value on the grid, and if its step is so small that
+# its top, which is off by the fourth power of the step, has all digits.
+MAX_REFINEMENTS, MAX_GAIN, MAX_LAST_STEP = 13, 1e-15, 1e-4
+
+# A point of the grid stands for one peak if the second difference at it is proportional to the square of the step, up
+# to this share and up to rounding. Otherwise two peaks and the dip between them may lie within one step, as where a
+# maximum in the middle of a well has just become two beside it.
+MAX_BEND_CHANGE, BEND_ROUNDING = 0.25, 2e-15
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
@@ -145,25 +150,48 @@ def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[
 
 @Inner
 def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-untyped-def]
-    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it."""
+    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it, or if
+    there may be more than one peak within a step.
+    """
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
-    share, value = peak[1] * step, f1
+    share, value, expected = peak[1] * step, f1, 0.0
     for k in range(MAX_REFINEMENTS):
-        curvature = sign * (f0 - 2.0 * f1 + f2)
-        move = 0.5 * sign * (f0 - f2) / curvature if curvature < 0.0 else 0.0
+        tilt, bend = sign * (f0 - f2), sign * (f0 - 2.0 * f1 + f2)
+        if k == 1 and not fabs(bend - expected) <= MAX_BEND_CHANGE * fabs(expected) + BEND_ROUNDING * size:
+            return np.nan
+        ratio = FIRST_STEP_RATIO if k == 0 else STEP_RATIO
+        expected = bend / ratio**2
+        move = 0.5 * tilt / bend if bend < 0.0 else 0.0
+        gain = -0.25 * tilt * move if bend < 0.0 else 0.5 * (fabs(tilt) + bend)
+        if k > 0 and step <= MAX_LAST_STEP and gain <= MAX_GAIN * size:
+            return value
         share += step * min(max(move, -1.0), 1.0)
-        step *= 1.0 / STEP_RATIO if fabs(move) < 1.0 else GROWTH
+        step *= 1.0 / ratio if fabs(move) < 1.0 else GROWTH
         points[0], points[1], points[2] = share, share - step, share + step
         if not orbit.circulates:
             for i in range(3):
                 points[i] = sin(0.5 * pi * points[i]) ** 2
         sample_loads(fns, p, orbit, force, points, 3, found, frame)
-        change, f1, f0, f2 = fabs(found[0] - value), found[0], found[1], found[2]
+        f1, f0, f2 = found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
-        if k >= REFINEMENTS and fabs(move) < 1.0 and change <= MAX_LAST_CHANGE * size:
-            return value
     return np.nan
+
+
+@Inner
+def highest_top(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
+    """Return ``sign`` times the value at the highest of the peaks of `find_peaks`; NaN if the grid is too coarse for one
+    of them.
+    """
+    least, largest = sums[LEAST], sums[LARGEST]
+    size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
+    for k in range(PEAKS):
+        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
+            value = top_of(fns, p, orbit, force, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
+            if value != value:
+                return value
+            best = max(best, sign * value)
+    return best
 
 
 @Inner
@@ -185,19 +213,11 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
         sample_loads(fns, p, orbit, force, points, 1, sums, frame)
         return sqrt(sums[0])
     grids = 1
-    while True:
+    while grids <= MAX_GRIDS:
         find_peaks(fns, p, orbit, force, sign, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, force):
-            break
+            best = highest_top(fns, p, orbit, force, sign, grids, sums, peaks)
+            if best == best:
+                return sign * best if force else sqrt(sign * best)
         grids *= REFINEMENT
-        if grids > MAX_GRIDS:
-            return np.nan
-    least, largest = sums[LEAST], sums[LARGEST]
-    size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
-    for k in range(PEAKS):
-        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
-            value = top_of(fns, p, orbit, force, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
-            if value != value:
-                return value
-            best = max(best, sign * value)
-    return sign * best if force else sqrt(sign * best)
+    return np.nan
