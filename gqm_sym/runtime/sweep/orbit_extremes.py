@@ -180,9 +180,7 @@ def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-unt
 
 @Inner
 def highest_top(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
-    """Return ``sign`` times the value at the highest of the peaks of `find_peaks`; NaN if the grid is too coarse for one
-    of them.
-    """
+    """Return ``sign`` times the value at the highest peak of a grid; NaN if the grid is too coarse for one of them."""
     least, largest = sums[LEAST], sums[LARGEST]
     size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
     for k in range(PEAKS):
