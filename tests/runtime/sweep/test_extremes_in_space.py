@@ -56,7 +56,11 @@ def test_on_a_wire_about_a_level_axis(build: Build) -> None:
         (
             "knotted",
             gqm.Curve.space(
-                x="(2+cos(3*t))*cos(2*t)", y="(2+cos(3*t))*sin(2*t)", z="sin(3*t)+sin(t)/5", parameter="t", period="2*pi"
+                x="(2+cos(3*t))*cos(2*t)",
+                y="(2+cos(3*t))*sin(2*t)",
+                z="sin(3*t)+sin(t)/5",
+                parameter="t",
+                period="2*pi",
             ),
             gqm.Potential("0"),
             -0.45,
