@@ -332,7 +332,6 @@ def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, .
 
         run_in_threads(work, which.size, MIN_LAUNCHES_PER_THREAD)
 
-    found[:] = nan
     swings = np.flatnonzero(~circulates)
     found[swings] = in_lanes(source, rows, launches, swings)
     is_open = np.isnan(found).any(axis=1)
