@@ -150,12 +150,10 @@ def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Return whether compiled loops can compute the quantity for most launches.
 
-    They cannot for motions that lose energy, and for motions with a last time they compute only the end. The grid on
-    which they search for extremes is too coarse for the length of a vector, which may be almost zero somewhere, and
-    they do not distinguish the sides of a space curve.
+    They cannot for motions that lose energy, and for motions with a last time they compute only the end. They do not
+    distinguish the sides of a space curve.
     """
-    of_force = quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE)
-    if not formulas.signed and (of_force or ONLY_SIGN[contact]):
+    if not formulas.signed and ONLY_SIGN[contact]:
         return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
@@ -193,7 +191,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE)
+        directed = formulas.path_in_space.address if formulas.path_in_space and formulas.directed else 0
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, formulas.signed, directed)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
         if code in ANSWERED_BY_BATCHES and exact.work.size:
