@@ -105,11 +105,10 @@ def sweep(
     shape = broadcast_shape(dict(zip(names, arrays, strict=False)))
     columns, domain = ([widen(array, shape) for array in of] for of in (arrays, domain))
     size = prod(shape)
-    answers = Answers(
-        np.full((size, found.width), nan),
-        np.full(size, quantities.UNDECIDED, dtype=np.int8),
-        np.full(size, quantities.BATCH, dtype=np.int8),
-    )
+    answers = Answers(np.empty((size, found.width)), np.empty(size, np.int8), np.empty(size, np.int8))
+    answers.values.fill(nan)
+    answers.status.fill(quantities.UNDECIDED)
+    answers.route.fill(quantities.BATCH)
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
     if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
@@ -128,8 +127,8 @@ def sweep(
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
             if chosen is not None:
                 answers.put(chosen, some)
-    if domain:
-        answers.status[np.broadcast_to(_too_far(columns[0], domain[2]).ravel(), size)] = quantities.UNDECIDED
+    if domain and (far := _too_far(columns[0], domain[2])).any():
+        answers.status[np.broadcast_to(far.ravel(), size)] = quantities.UNDECIDED
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
@@ -140,7 +139,11 @@ def sweep(
 
 def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
     """Return which launches `solve` refuses because doubles do not resolve places so many laps away."""
-    found: NDArray[np.bool_] = np.abs(lam0) > MAX_LAPS * np.where(period > 0.0, period, inf)
+    if period.ndim == 0:
+        last: Any = MAX_LAPS * period.item() if period.item() > 0.0 else inf
+    else:
+        last = np.where(period > 0.0, MAX_LAPS * period, inf)
+    found: NDArray[np.bool_] = np.abs(lam0) > last
     return found
 
 

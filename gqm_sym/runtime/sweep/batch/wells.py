@@ -30,7 +30,7 @@ class Wells(NamedTuple):
 
     Attributes
     ----------
-    proofs : int8 array
+    proofs : int array
         UNTRIED, PROVED or FAILED for each distance at which proofs end; empty if launches differ in their parameters,
         or if there is no axis.
     place : float
@@ -41,7 +41,7 @@ class Wells(NamedTuple):
         Work space.
     """
 
-    proofs: NDArray[np.int8]
+    proofs: NDArray[np.int64]
     place: float
     params: Array
     work: Array
@@ -59,7 +59,7 @@ def wells_of(columns):  # type: ignore[no-untyped-def]
         place, low = element(columns, AXIS, 0), element(columns, PLACE_LOW, 0)
         known = place - place == 0.0 and low == low
     size = PARTS * (LARGEST_EXPONENT - LEAST_EXPONENT) if known else 0
-    return Wells(np.zeros(size, dtype=np.int8), place, params, np.empty((6, LANES)))
+    return Wells(np.zeros(size, dtype=np.int64), place, params, np.empty((6, LANES)))
 
 
 @Inner
