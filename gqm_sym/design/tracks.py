@@ -28,17 +28,19 @@ MAX_HALVINGS = 40
 # Nonzero numbers in a design must lie between this power of ten and its inverse.
 MAX_EXPONENT = 60
 
-_U = sp.Symbol("u")
 
-
-def _chebyshev_rows(argument: sp.Expr) -> list[list[int]]:
-    """Return the coefficients of the Chebyshev polynomials of an argument in u, lowest power first."""
-    polynomials = [sp.Poly(sp.chebyshevt(n, argument), _U) for n in range(TERMS)]
-    return [[int(term) for term in reversed(polynomial.all_coeffs())] for polynomial in polynomials]
+def _chebyshev_rows(constant: int, factor: int) -> list[list[int]]:
+    """Return the coefficients of the Chebyshev polynomials of ``constant + factor*u``, lowest power first."""
+    rows = [[1], [constant, factor]]
+    for n in range(2, TERMS):
+        here, before = rows[n - 1] + [0], rows[n - 2] + [0, 0]
+        times_u = [0, *rows[n - 1]]
+        rows.append([2 * (constant * here[k] + factor * times_u[k]) - before[k] for k in range(n + 1)])
+    return rows
 
 
 # For u in [0, 1], and for u in [-1, 1].
-_FROM_0, _CENTRED = _chebyshev_rows(2 * _U - 1), _chebyshev_rows(_U)
+_FROM_0, _CENTRED = _chebyshev_rows(-1, 2), _chebyshev_rows(0, 1)
 
 
 class Piece(NamedTuple):

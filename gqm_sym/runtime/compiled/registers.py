@@ -15,7 +15,7 @@ from numba.core import cgutils
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.compiled.uncompiled import go_on, in_python
+from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
 
 # Doubles in a register.
 LANES = 8
@@ -85,6 +85,14 @@ class Lanes:
         return Lanes(self.builder, operation(self.builder, name, self.value))
 
 
+def fused(x: Any, y: Any, z: Any) -> Any:
+    """Return x * y + z with one rounding, for the formulas of rows; ``z`` may be a number."""
+    if isinstance(x, Lanes):
+        total = z.value if isinstance(z, Lanes) else ir.Constant(REGISTER, [float(z)] * LANES)
+        return Lanes(x.builder, operation(x.builder, "fma", x.value, y.value, total))
+    return fma_of_arrays()(x, y, z).astype(np.float64)
+
+
 def over_rows(formula: Callable[..., Any], width: int) -> Any:
     """Return a compiled function ``f(array, out, ...)`` that fills a row by a formula.
 
@@ -93,7 +101,7 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
     Parameters
     ----------
     formula
-        A function of registers, made of ``+ - * /``, ``abs`` and ``numpy.sqrt``.
+        A function of registers, made of ``+ - * /``, ``abs``, ``numpy.sqrt`` and `fused`.
     width : int
         Numbers of a row, a multiple of LANES.
     """

@@ -78,6 +78,7 @@ from gqm_sym.runtime.legs.runs.ends import (
 from gqm_sym.runtime.legs.runs.follow import direction_from_rest, follow
 from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 
 # Codes for the result of an advance, in addition to those of `runs.ends`. END_REST takes the place of END_TURN if the
 # body stays; ENDING has the same code if the motion ends. END_LIFTOFF_AT_ONCE: the track would have to pull the body at
@@ -275,6 +276,25 @@ def expected_width(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def blocks_to_try(body, width):  # type: ignore[no-untyped-def]
+    """Return the smallest number of blocks with which a leg of a width may be one polynomial; 0 if there is none."""
+    for k in range(MAX_BLOCKS):
+        if width == 0.0 or body[UNRESOLVED + k] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED + k]:
+            return k + 1
+    return 0
+
+
+@Inner
+def note_blocks(body, width, blocks):  # type: ignore[no-untyped-def]
+    """Note that a leg of a width was one polynomial with so many blocks, or none if that is 0."""
+    for k in range(MAX_BLOCKS):
+        if 0 < blocks <= k + 1:
+            body[UNRESOLVED + k] = 0.0
+        elif body[UNRESOLVED + k] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED + k]:
+            body[UNRESOLVED + k] = width
+
+
+@Inner
 def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
@@ -296,12 +316,12 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     width = expected_width(body)
-    may_be_whole = width == 0.0 or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]
+    blocks = blocks_to_try(body, width)
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:
         start = RunStart(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
-            *(width, may_be_whole),
+            *(width, blocks),
         )
         route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
@@ -320,8 +340,7 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
     width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
     body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0
-    if found.is_whole or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]:
-        body[UNRESOLVED] = 0.0 if found.is_whole else body[LAST_WIDTH]
+    note_blocks(body, body[LAST_WIDTH], found.blocks)
     body[TURNS] += 1.0
     body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
     return rests

@@ -29,7 +29,8 @@ LEG_TIME              the time since the last turn
 LAST_LEG, LEG_BEFORE  the times of the last leg from turn to turn, and of the one before it; 0 if there was none
 LAST_WIDTH,           the distances in the curve parameter from turn to turn of the last leg, and of the one before it;
 WIDTH_BEFORE          0 if there was none
-UNRESOLVED            that of the last leg if it was not one polynomial, or 0
+UNRESOLVED, ..._2,    that of the last leg that was not one polynomial with so many blocks (`runs.whole_tables`); 0 if
+..._3                 the last one was
 TURNS, PAUSES         how often the body has turned, and how many runs without an end have paused since
 MAY_REST              whether the body could stay at its last turn, were the curve less steep; 1 before the first turn
 FROM_REST             1 if the launch was from rest
@@ -49,7 +50,8 @@ from gqm_sym.runtime.compiled.types import Array
 LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
-LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS, SIZE = range(26, 36)
+LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
+UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, SIZE = range(34, 38)
 
 # A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
 # doubles.

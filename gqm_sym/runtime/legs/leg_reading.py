@@ -2,13 +2,14 @@
 contact force.
 """
 
-from math import fabs, inf, sqrt
+from math import asin, cos, fabs, inf, pi, sin, sqrt
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum, legendre_sum
 from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed, on_stack
 from gqm_sym.runtime.compiled.types import VECTOR, Array
@@ -33,11 +34,14 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_END,
     TIME_FROM_START,
     WHOLE,
+    WHOLE_ROWS,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope, to_coefficients
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope
+from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -64,8 +68,8 @@ def _to_legendre() -> tuple[Array, Array]:
 PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
 to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 
-# The length of a buffer for values at a panel's nodes and two series.
-terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(2 * WIDE)
+# Buffers for two series of a panel; and for values at nodes of a panel or leg, their series and the nodes.
+terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(3 * MAX_BLOCKS * WIDE)
 
 # The largest number of steps of a search within a panel, and the share of the panel at which the search stops.
 MAX_STEPS, LAST_STEP = 60, 4e-16
@@ -144,6 +148,8 @@ def passage(record, place):  # type: ignore[no-untyped-def]
         return inf
     if left == 0.0:
         return record[TIME_FROM_START] + record[TIME_FROM_END]
+    if record[WHOLE] > 0.0:
+        return passage_of_rows(record, covered, left)
     if offset(place, (record[MIDDLE], record[MIDDLE_LOW]), v) <= 0.0 and ahead > 0:
         return time_to(record, HEAD, ahead, marched(covered, march))
     if back == 0 or record[TIME_FROM_END] == 0.0:
@@ -193,34 +199,46 @@ def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def peak_of_panel(values, first, last, sign, best):  # type: ignore[no-untyped-def]
-    """Return the larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel.
+def peak_of_values(blocks, values, first, last, sign, best):  # type: ignore[no-untyped-def]
+    """Return the larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel or leg.
 
     Parameters
     ----------
+    blocks : int
+        The number of blocks of a row (`runs.whole_tables`).
     values : array
-        The function at the panel's nodes, and room for its series.
+        The function at the nodes, and room for its series and for the nodes.
     first, last : float
         The ends of the part, within [-1, 1].
     """
-    top, bottom = -inf, inf
-    for j in range(COUNT):
+    top, bottom, count, wide = -inf, inf, blocks * WIDE - 1, blocks * WIDE
+    for j in range(count):
         top, bottom = max(top, sign * values[j]), min(bottom, sign * values[j])
-    # Between the nodes a polynomial exceeds the values there by less than a multiple of their spread
-    # (`polynomials.LEBESGUE`).
-    if top + (top - bottom) <= best:
+    # Between the nodes a polynomial exceeds the values there by less than a multiple of their spread.
+    spread = 0.5 * (LEBESGUE - 1.0) * (top - bottom)
+    if top + spread <= best:
         return best
-    to_coefficients(values, 0, values, WIDE)
-    terms = values[WIDE : WIDE + COUNT]
+    # Nodes are equally spaced in an angle, and the series is even at both ends. Next to a node it exceeds the value
+    # there by an eighth of the second difference, or little more.
+    may_exceed = False
+    for j in range(count):
+        bend = (values[max(j - 1, 0)] - values[j]) + (values[min(j + 1, count - 1)] - values[j])
+        may_exceed = may_exceed or sign * values[j] + fabs(bend) > best
+    if not may_exceed:
+        return best
+    values[wide] = 1.0
+    to_nodes(blocks, values, wide, values, 2 * wide)
+    to_coefficients(blocks, values, 0, values, wide)
+    terms, shares = values[wide : wide + count], values[2 * wide : 2 * wide + count]
     best = max(best, max(sign * chebyshev_sum(terms, first), sign * chebyshev_sum(terms, last)))
-    for j in range(COUNT):
-        before, after = sign * values[max(j - 1, 0)], sign * values[min(j + 1, COUNT - 1)]
-        here, x = sign * values[j], 2.0 * SHARES[j] - 1.0
+    for j in range(count):
+        before, after = sign * values[max(j - 1, 0)], sign * values[min(j + 1, count - 1)]
+        here, x = sign * values[j], 2.0 * shares[j] - 1.0
         if first < x < last:
             best = max(best, here)
-            if here >= before and here >= after and here + (top - bottom) > best:
-                lo = 2.0 * SHARES[j - 1] - 1.0 if j > 0 else -1.0
-                hi = 2.0 * SHARES[j + 1] - 1.0 if j < COUNT - 1 else 1.0
+            if here >= before and here >= after and here + spread > best:
+                lo = 2.0 * shares[j - 1] - 1.0 if j > 0 else -1.0
+                hi = 2.0 * shares[j + 1] - 1.0 if j < count - 1 else 1.0
                 best = max(best, peak(terms, max(lo, first), min(hi, last), sign))
     return best
 
@@ -252,20 +270,64 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
         for j in range(COUNT):
             growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
             values[j] = record[at + NORMAL_LOAD + j] if force else growth * record[at + Y_ROW + j]
-        best = peak_of_panel(values, max(first, -1.0), min(last, 1.0), sign, best)
+        best = peak_of_values(1, values, max(first, -1.0), min(last, 1.0), sign, best)
     return best
 
 
 @Inner
-def peak_of_rows(record, asked, best):  # type: ignore[no-untyped-def]
+def time_to_phase(record, phase, backwards):  # type: ignore[no-untyped-def]
+    """Return the time from the start, or ``backwards`` from the end, of a leg whose record has rows to a phase angle of
+    at most pi/2, and its derivative.
+    """
+    count, sign = int(record[WHOLE]) * WIDE - 1, 1.0 if backwards else -1.0
+    # The sum of c_k cos(k phase), with the signs of c_k that the direction requires, and its integral.
+    c, s = cos(phase), sin(phase)
+    rate, rate_after, time, time_after = 0.0, 0.0, 0.0, 0.0
+    for k in range(count - 1, 0, -1):
+        term = record[WHOLE_ROWS + k] if k % 2 == 0 else sign * record[WHOLE_ROWS + k]
+        rate, rate_after = fma(2.0 * c, rate, term - rate_after), rate
+        time, time_after = fma(2.0 * c, time, term / k - time_after), time
+    constant = record[WHOLE_ROWS]
+    return fma(constant, phase, s * time), fma(c, rate, constant - rate_after)
+
+
+@Inner
+def passage_of_rows(record, covered, left):  # type: ignore[no-untyped-def]
+    """Return the time from the start of a leg whose record has rows to a place, given its distances from both ends."""
+    if covered <= left:
+        return time_to_phase(record, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
+    total = record[TIME_FROM_START] + record[TIME_FROM_END]
+    return total - time_to_phase(record, 2.0 * asin(sqrt(left / (covered + left))), True)[0]
+
+
+@Inner
+def place_in_rows(record, time):  # type: ignore[no-untyped-def]
+    """Return the place in [-1, 1] at a time from the start of a leg whose record has rows, to some ten digits."""
+    total = record[TIME_FROM_START] + record[TIME_FROM_END]
+    backwards = time > record[TIME_FROM_START]
+    wanted = total - time if backwards else time
+    phase = 0.5 * pi * wanted / (record[TIME_FROM_END] if backwards else record[TIME_FROM_START])
+    for _ in range(MAX_STEPS):
+        there, rate = time_to_phase(record, phase, backwards)
+        step = (there - wanted) / rate
+        phase = min(max(phase - step, 0.0), 0.5 * pi)
+        if fabs(step) <= FLAT_PART:
+            break
+    return cos(phase) if backwards else -cos(phase)
+
+
+@Inner
+def peak_of_rows(record, until, asked, best):  # type: ignore[no-untyped-def]
     """Return `peak_of_leg` for a leg from turn to turn whose record has rows."""
-    values, (force, sign) = sample_buffer(), asked
+    values, (force, sign), blocks = sample_buffer(), asked, int(record[WHOLE])
     if sign < 0.0 and not force:
         return max(best, 0.0)  # the body is slowest where it turns
-    copy(values, 0, record, HEAD + (NORMAL_LOAD if force else Y_ROW))
+    for at in range(0, blocks * WIDE, WIDE):
+        copy(values, at, record, WHOLE_ROWS + (2 if force else 1) * blocks * WIDE + at)
+    last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
     if force:
-        return peak_of_panel(values, -1.0, 1.0, sign, best)
-    return max(best, sqrt(peak_of_panel(values, -1.0, 1.0, sign, max(best, 0.0) ** 2)))
+        return peak_of_values(blocks, values, -1.0, last, sign, best)
+    return max(best, sqrt(peak_of_values(blocks, values, -1.0, last, sign, max(best, 0.0) ** 2)))
 
 
 @Inner
@@ -276,7 +338,7 @@ def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
     With the sign -1, the peak is minus the smallest value.
     """
     if record[WHOLE] > 0.0:
-        return peak_of_rows(record, asked, best)
+        return peak_of_rows(record, until, asked, best)
     ahead, back = int(record[AHEAD]), int(record[BACK])
     if ahead > 0:
         whole = until >= record[TIME_FROM_START]

@@ -14,8 +14,9 @@ HALF_C               c/2 of the march variable (`panels.equation.March`); inf wh
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
-WHOLE                1 if the record has no panels, but one row each of V**2 and of N per mass at nodes of the whole
-                     leg, where the first panel would have Y and N
+WHOLE                0; or, if the record has no panels but rows of the whole leg from WHOLE_ROWS on, the number of
+                     blocks of a row (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of
+                     the time per phase angle, V**2, and N per mass
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end
 from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
                      the field next to an equilibrium
@@ -59,6 +60,7 @@ WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
+WHOLE_ROWS = HEAD + 4 * COLUMNS
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 FIELD_COLUMNS = 2 + 2 * COUNT

@@ -58,9 +58,9 @@ def _of_text(value: str, name: str) -> float:
 
 def check_launches(v0: Array, direction: Array) -> None:
     """Refuse speeds and directions that no launch of a sweep may have."""
-    if (v0 < 0.0).any():
+    if v0.item() < 0.0 if v0.ndim == 0 else (v0 < 0.0).any():
         raise InputError("v0: is a speed and cannot be negative; use direction=-1 to launch the other way")
-    if (np.abs(direction) != 1.0).any():
+    if abs(direction.item()) != 1.0 if direction.ndim == 0 else (np.abs(direction) != 1.0).any():
         raise InputError("direction: must be 1 or -1 (the sign of ds/dt at launch)")
 
 

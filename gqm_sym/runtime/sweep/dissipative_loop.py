@@ -1,6 +1,6 @@
 """One quantity for each of many launches with dissipative forces, by driving all bodies in compiled code."""
 
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from gqm_sym.runtime.compiled.strided import (
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.legs import answers as legs
-from gqm_sym.runtime.legs.body import STATUS, VALUE, launched
+from gqm_sym.runtime.legs.body import SIZE, STATUS, VALUE
 from gqm_sym.runtime.legs.leg_record import COLUMNS
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.quantities import Answers
@@ -100,30 +100,38 @@ def answer_driven(
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
-        chosen = np.flatnonzero(_are_possible(lines, found.status.size))
-        some = [line if line.size == 1 else line[chosen] for line in lines]
-        ends = (some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD])
-        asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
-        given = (some[LAM0], *ends, *asks, some[V0] * some[V0])
-        bodies = launched(np.stack(np.broadcast_arrays(*given, chosen)[:-1], axis=1))
+        possible = _are_possible(lines, found.status.size)
+        chosen = None if possible.all() else np.flatnonzero(possible)
+        some = lines if chosen is None else [line if line.size == 1 else line[chosen] for line in lines]
+        bodies = np.zeros((found.status.size if chosen is None else chosen.size, SIZE))
+        domain = some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD]
+        asks = some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET]
+        launches: list[Any] = [some[LAM0], *domain, *asks, some[V0] * some[V0]]  # in the order of `legs.body`
+        for k, column in enumerate(launches):
+            bodies[:, k] = column
         rows = _rows(some[PARAMETERS:], track.chart)
         legs.drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
         if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
-            values = values * some[mass]
-        none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
-        decided = ended != legs.LEFT
-        there = chosen[decided]
-        found.values[there, 0] = np.where(ended == legs.FOUND, values, nan)[decided]
-        found.status[there] = np.where(ended == legs.FOUND, quantities.ANSWERED, none)[decided]
-        found.route[there] = quantities.SINGLE
+            values *= some[mass]
+        status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
+        without = ended != legs.FOUND
+        if without.any():
+            none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
+            values[without], status[without] = nan, none
+            decided = ended != legs.LEFT
+            values, status = values[decided], status[decided]
+            chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]
+        there = slice(None) if chosen is None else chosen
+        found.values[there, 0], found.status[there], found.route[there] = values, status, quantities.SINGLE
 
 
 def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
     """Return which launches consist of finite numbers and lie inside the domain; `solve` refuses the others."""
     possible = np.ones(count, dtype=np.bool_)
     for line in (*lines[: TARGET + 1], *lines[PARAMETERS:]):
-        possible &= np.isfinite(line)
+        if line.size > 1 or not isfinite(line[0]):
+            possible &= np.isfinite(line)
     possible &= (lines[LAM0] >= lines[DOMAIN_LOW]) & (lines[LAM0] <= lines[DOMAIN_HIGH])
     return possible
 

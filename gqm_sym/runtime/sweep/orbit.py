@@ -35,6 +35,11 @@ class SweptCurve(NamedTuple):
         The speed of the launch.
     exact : RecordedFormulas
         The formulas as a tape, for places at which doubles do not suffice (`slow_places`).
+    signed : bool
+        Whether the contact force has a sign.
+    path_in_space : int
+        The address of the function with the contact force as a vector, if it depends on the direction of motion; 0
+        otherwise.
     """
 
     fns: Any
@@ -49,6 +54,8 @@ class SweptCurve(NamedTuple):
     levels: Any
     v0: Any
     exact: Any
+    signed: Any
+    path_in_space: Any
 
 
 class Orbit(NamedTuple):

@@ -1,22 +1,26 @@
 """The smallest and largest speed or contact force on one of many orbits: the best point of a grid, refined."""
 
-from math import fabs, inf, pi, sqrt
+from math import fabs, floor, inf, pi, sqrt
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import sin
-from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1
+from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_path_in_space, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.interface import PATH_ROWS
+from gqm_sym.runtime.interface import PATH_ROWS, SPACE_ROWS
 
-# The number of intervals of the first grid, in equal steps of the phase angle; the factor by which the step shrinks
-# each time that the best point is refined; and the factor by which it grows if the vertex of a parabola lies outside of
-# it.
-GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
+# The functions whose extremes are searched for: V**2; the contact force, if it has a sign; and the square of its
+# length, which is smooth also where the length almost vanishes.
+V2, FORCE, FORCE_SQUARED = range(3)
 
-# A grid that does not resolve the orbit is followed by one that is finer by this factor, up to so many grids of the
-# first size side by side.
+# The number of intervals of the first grid, in equal steps of the phase angle; the factors by which the step shrinks
+# when the best point is refined for the first time and each time after that; and the factor by which it grows if the
+# vertex of a parabola lies outside of it.
+GRID_INTERVALS, FIRST_STEP_RATIO, STEP_RATIO, GROWTH = 64, 4.0, 16.0, 4.0
+
+# A grid that does not resolve the orbit or one of its peaks is followed by one that is finer by this factor, up to so
+# many grids of the first size side by side.
 REFINEMENT, MAX_GRIDS = 4, 256
 
 # A grid resolves a function if its mean over every second point is the same up to this share of its range, and up to
@@ -24,10 +28,18 @@ REFINEMENT, MAX_GRIDS = 4, 256
 # curve bends; only these show a bend that is shorter than the grid's steps.
 MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
 
-# The smallest and the largest number of refinements of the best point. In between, refinement ends if the value changes
-# by less than this share of the largest on the grid: its error is then far smaller, because it decreases with the
-# fourth power of the step.
-REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
+# The largest number of refinements of the best point. Refinement ends if the parabola through the last three values
+# rises above the middle one by less than this share of the largest value on the grid, and if its step is so small that
+# its top, which is off by the fourth power of the step, has all digits.
+MAX_REFINEMENTS, MAX_GAIN, MAX_LAST_STEP = 13, 1e-15, 1e-4
+
+# A point of the grid stands for one peak if the second difference at it is proportional to the square of the step, up
+# to this share and up to rounding. Otherwise two peaks and the dip between them may lie within one step, as where a
+# maximum in the middle of a well has just become two beside it.
+MAX_BEND_CHANGE, BEND_ROUNDING = 0.25, 2e-15
+
+# The square of a length that is only a rounding of the largest length, as a share of the square of the latter.
+SMALLEST_SQUARE = 1e-32
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
@@ -41,31 +53,81 @@ FUNCTIONS, COORDINATES = 4, 3
 # point of the grid, and the values before, at and after it. Peaks within the third share of the range from the highest
 # are refined, because the grid does not distinguish them.
 PEAKS, PEAK_ROW, TIED = 4, 5, 0.02
-line_buffer, pair_buffer, frame_buffer, point_buffer, sum_buffer, peak_buffer = (
-    on_stack(n) for n in (GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, 3, 4 * FUNCTIONS, PEAKS * PEAK_ROW)
+line_buffer, pair_buffer, frame_buffer, vector_buffer, point_buffer, sum_buffer, peak_buffer = (
+    on_stack(n)
+    for n in (
+        *(GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, SPACE_ROWS * GRID_POINTS),
+        *(3, 4 * FUNCTIONS, PEAKS * PEAK_ROW),
+    )
 )
 
 
 @Inner
-def sample_loads(fns, p, orbit, force, shares, n, out, frame):  # type: ignore[no-untyped-def]
-    """Fill V**2, or the contact force if ``force`` is set, at n shares of an orbit's width from its lower end.
+def fill_force(curve, sought, n, lam, v2, frame, out):  # type: ignore[no-untyped-def]
+    """Fill the contact force at n places, or the square of its length if that is sought, and ``frame`` with the path.
 
-    For the contact force, and only then, ``frame`` is filled with the path. V**2 is its value at launch less its
-    decrease from there. Next to a turning point its error is a rounding of the largest V**2 on the orbit, not of the
-    small value itself.
+    ``sought`` has the function that is searched, and the direction of motion if the force depends on it, otherwise 0.
     """
-    offsets, lam, rows = line_buffer(), line_buffer(), pair_buffer()
-    width = orbit.high - orbit.low
-    for i in range(n):
-        offsets[i] = orbit.low + width * shares[i]
-        lam[i] = orbit.lam0 + offsets[i]
-    call_potential_divdiff1(fns.potential_divdiff1, n, orbit.lam0, lam, offsets, p, rows)
-    for i in range(n):
-        out[i] = max(orbit.v2 - 2.0 * offsets[i] * rows[i], 0.0)
-    if force:
-        call_path_and_contact_force(fns.path_and_contact_force, n, lam, out, p, frame)
+    (function, direction), vector = sought, vector_buffer()
+    call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
+    if function == FORCE_SQUARED and direction != 0:
+        call_path_in_space(curve.path_in_space, n, lam, v2, float(direction), curve.p, vector)
         for i in range(n):
-            out[i] = frame[4 * n + i]
+            out[i] = vector[n + i] ** 2 + vector[2 * n + i] ** 2 + vector[3 * n + i] ** 2
+        return
+    for i in range(n):
+        force = frame[4 * n + i]
+        out[i] = force * force if function == FORCE_SQUARED else force
+
+
+@Inner
+def is_loop(orbit, sought):  # type: ignore[no-untyped-def]
+    """Return whether the function that is sought is searched along a whole lap or period.
+
+    That is so for circulations, and for librations if the force depends on the direction of motion.
+    """
+    return orbit.circulates or sought[1] != 0
+
+
+@Inner
+def sample_loads(curve, orbit, sought, shares, n, out, frame):  # type: ignore[no-untyped-def]
+    """Fill the function that is sought (`fill_force`) at n shares of an orbit's width from its lower end.
+
+    If a libration is searched along its whole period (`is_loop`), they are shares of the period's phase angle. For the
+    contact force, and only then, ``frame`` is filled with the path. V**2 is its value at launch less its decrease from
+    there. Next to a turning point its error is a rounding of the largest V**2 on the orbit, not of the small value
+    itself.
+    """
+    offsets, lam, rows, v2 = line_buffer(), line_buffer(), pair_buffer(), line_buffer()
+    width, there_and_back = orbit.high - orbit.low, is_loop(orbit, sought) and not orbit.circulates
+    for i in range(n):
+        share = sin(pi * shares[i]) ** 2 if there_and_back else shares[i]
+        offsets[i] = orbit.low + width * share
+        lam[i] = orbit.lam0 + offsets[i]
+    call_potential_divdiff1(curve.fns.potential_divdiff1, n, orbit.lam0, lam, offsets, curve.p, rows)
+    for i in range(n):
+        out[i] = v2[i] = max(orbit.v2 - 2.0 * offsets[i] * rows[i], 0.0)
+    if sought[0] == V2:
+        return
+    if not there_and_back:
+        fill_force(curve, sought, n, lam, v2, frame, out)
+        return
+    fill_force(curve, (sought[0], 1), n, lam, v2, frame, out)
+    fill_force(curve, (sought[0], -1), n, lam, v2, frame, offsets)
+    for i in range(n):
+        if floor(2.0 * shares[i]) % 2.0 != 0.0:
+            out[i] = offsets[i]
+
+
+@Inner
+def resolution(function, value, size):  # type: ignore[no-untyped-def]
+    """Return the size whose roundings a value has, if the largest value on the orbit is ``size``.
+
+    A length has roundings of the largest length, so its square has roundings of the product of both.
+    """
+    if function != FORCE_SQUARED:
+        return size
+    return sqrt(size * max(fabs(value), SMALLEST_SQUARE * size))
 
 
 @Inner
@@ -110,13 +172,14 @@ def note_peak(peaks, sign, j, f0, f1, f2):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
+def find_peaks(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
     """Find the highest peaks of a grid that consists of ``grids`` grids of the first size side by side.
 
     A libration passes the grid there and back, so that a turning point has the same neighbour on both sides. In the
     phase angle, any function is even about the end of a curve too.
     """
-    out, shares, frame = line_buffer(), line_buffer(), frame_buffer()
+    out, shares, frame, force = line_buffer(), line_buffer(), frame_buffer(), sought[0] != V2
+    loop = is_loop(orbit, sought)
     count, f0, f1, second = grids * GRID_INTERVALS, 0.0, 0.0, 0.0
     for k in range(FUNCTIONS):
         at = k * FUNCTIONS
@@ -125,11 +188,11 @@ def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[
         peaks[k * PEAK_ROW] = -inf
     for grid in range(grids):
         for i in range(GRID_POINTS):
-            shares[i] = LAP_SHARES[i] if orbit.circulates else WIDTH_SHARES[i]
+            shares[i] = LAP_SHARES[i] if loop else WIDTH_SHARES[i]
             if grids > 1:
                 share = (grid + LAP_SHARES[i]) / grids
-                shares[i] = share if orbit.circulates else sin(0.5 * pi * share) ** 2
-        sample_loads(fns, p, orbit, force, shares, GRID_POINTS, out, frame)
+                shares[i] = share if loop else sin(0.5 * pi * share) ** 2
+        sample_loads(curve, orbit, sought, shares, GRID_POINTS, out, frame)
         for i in range(min(grid, 1), GRID_POINTS):
             j = grid * GRID_INTERVALS + i
             weight, is_coarse = 0.5 if j in (0, count) else 1.0, i % 2 == 0
@@ -137,44 +200,67 @@ def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[
             for k in range(COORDINATES if force else 0):
                 accumulate(sums, (1 + k) * FUNCTIONS, frame[k * GRID_POINTS + i], weight, is_coarse)
             second = out[i] if j == 1 else second
-            if j > 1 or (j == 1 and not orbit.circulates):
+            if j > 1 or (j == 1 and not loop):
                 note_peak(peaks, sign, j - 1, out[i] if j == 1 else f0, f1, out[i])
             f0, f1 = f1, out[i]
-    note_peak(peaks, sign, count, f0, f1, second if orbit.circulates else f0)
+    note_peak(peaks, sign, count, f0, f1, second if loop else f0)
 
 
 @Inner
-def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-untyped-def]
-    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it."""
+def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-untyped-def]
+    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it, or if
+    there may be more than one peak within a step.
+    """
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
-    share, value = peak[1] * step, f1
+    share, value, expected = peak[1] * step, f1, 0.0
     for k in range(MAX_REFINEMENTS):
-        curvature = sign * (f0 - 2.0 * f1 + f2)
-        move = 0.5 * sign * (f0 - f2) / curvature if curvature < 0.0 else 0.0
+        tilt, bend, scale = sign * (f0 - f2), sign * (f0 - 2.0 * f1 + f2), resolution(sought[0], f1, size)
+        if k == 1 and not fabs(bend - expected) <= MAX_BEND_CHANGE * fabs(expected) + BEND_ROUNDING * scale:
+            return np.nan
+        ratio = FIRST_STEP_RATIO if k == 0 else STEP_RATIO
+        expected = bend / ratio**2
+        move = 0.5 * tilt / bend if bend < 0.0 else 0.0
+        gain = -0.25 * tilt * move if bend < 0.0 else 0.5 * (fabs(tilt) + bend)
+        if k > 0 and step <= MAX_LAST_STEP and gain <= MAX_GAIN * scale:
+            return value
         share += step * min(max(move, -1.0), 1.0)
-        step *= 1.0 / STEP_RATIO if fabs(move) < 1.0 else GROWTH
+        step *= 1.0 / ratio if fabs(move) < 1.0 else GROWTH
         points[0], points[1], points[2] = share, share - step, share + step
-        if not orbit.circulates:
+        if not is_loop(orbit, sought):
             for i in range(3):
                 points[i] = sin(0.5 * pi * points[i]) ** 2
-        sample_loads(fns, p, orbit, force, points, 3, found, frame)
-        change, f1, f0, f2 = fabs(found[0] - value), found[0], found[1], found[2]
+        sample_loads(curve, orbit, sought, points, 3, found, frame)
+        f1, f0, f2 = found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
-        if k >= REFINEMENTS and fabs(move) < 1.0 and change <= MAX_LAST_CHANGE * size:
-            return value
     return np.nan
 
 
 @Inner
-def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
-    """Return the largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force if ``force`` is set.
+def highest_top(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
+    """Return ``sign`` times the value at the highest peak of a grid; NaN if the grid is too coarse for one of them."""
+    least, largest = sums[LEAST], sums[LARGEST]
+    size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
+    for k in range(PEAKS):
+        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
+            value = top_of(curve, orbit, sought, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
+            if value != value:
+                return value
+            best = max(best, sign * value)
+    return best
+
+
+@Inner
+def extreme(curve, orbit, sought, sign):  # type: ignore[no-untyped-def]
+    """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit; `fill_force` explains
+    ``sought``.
 
     Parabolas through three points are repeated with smaller and smaller steps. At an extreme the function is flat, so
     its value is accurate to all digits as soon as the place has half of them. The parabolas are fitted to V**2, because
     V has a kink where the body almost stops. In an even well, V is largest in the middle. The value is NaN if the
     finest grid is too coarse.
     """
+    force = sought[0] != V2
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
     if meets_turn and not (force or sign > 0.0):
         return 0.0
@@ -182,22 +268,14 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
     if orbit.even and not (orbit.circulates or force):
         points, frame = point_buffer(), frame_buffer()
         points[0] = 0.5
-        sample_loads(fns, p, orbit, force, points, 1, sums, frame)
+        sample_loads(curve, orbit, sought, points, 1, sums, frame)
         return sqrt(sums[0])
     grids = 1
-    while True:
-        find_peaks(fns, p, orbit, force, sign, grids, sums, peaks)
+    while grids <= MAX_GRIDS:
+        find_peaks(curve, orbit, sought, sign, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, force):
-            break
+            best = highest_top(curve, orbit, sought, sign, grids, sums, peaks)
+            if best == best:
+                return sign * best if sought[0] == FORCE else sqrt(sign * best)
         grids *= REFINEMENT
-        if grids > MAX_GRIDS:
-            return np.nan
-    least, largest = sums[LEAST], sums[LARGEST]
-    size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
-    for k in range(PEAKS):
-        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
-            value = top_of(fns, p, orbit, force, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
-            if value != value:
-                return value
-            best = max(best, sign * value)
-    return sign * best if force else sqrt(sign * best)
+    return np.nan

@@ -41,7 +41,7 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 )
 from gqm_sym.runtime.sweep.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
-from gqm_sym.runtime.sweep.orbit_extremes import extreme
+from gqm_sym.runtime.sweep.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -101,6 +101,8 @@ class GivenCurve(NamedTuple):
         The last time in s, infinite if there is none; only END_TIME depends on it.
     exact : RecordedFormulas
         The formulas as a tape; empty at first, because few launches need it.
+    signed, path_in_space : bool, int
+        As in `SweptCurve`.
     """
 
     parameters: Array
@@ -115,11 +117,17 @@ class GivenCurve(NamedTuple):
     side: int
     t_max: float
     exact: RecordedFormulas
+    signed: bool
+    path_in_space: int
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
 GIVEN = types.NamedTuple(
-    (VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL, EXACT), GivenCurve
+    (
+        *(VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL, EXACT),
+        *(types.boolean, types.int64),
+    ),
+    GivenCurve,
 )
 
 
@@ -215,11 +223,25 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def extreme_on(curve, orbit, passage, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force on an orbit, on its passage through a table if that has panels; NaN
+    if it is not accurate.
+    """
+    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+    function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
+    if function == FORCE_SQUARED and curve.path_in_space != 0:
+        # Next to a turning point the force then changes with V, which is no smooth function of the place on a panel.
+        return extreme(curve, orbit, (function, orbit.direction), sign) if passage.panels == orbit.leaves == 0 else nan
+    if passage.panels > 0:
+        return passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, 0), sign)
+    return extreme(curve, orbit, (function, 0), sign)
+
+
+@Inner
 def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):  # type: ignore[no-untyped-def]
     """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
     if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
-        force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-        return passage_extreme(curve, orbit, passage, half_v2_at_edges, force, sign)
+        return extreme_on(curve, orbit, passage, half_v2_at_edges, quantity)
     low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
     if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # the orbit computed without the table is more accurate than a part of a panel
@@ -236,8 +258,7 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
     inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
     if inside.size:
         return nan
-    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-    return extreme(curve.fns, curve.p, orbit, force, sign)
+    return extreme_on(curve, orbit, NOWHERE, buffers.half_v2_at_edges, quantity)
 
 
 @Inner
@@ -365,7 +386,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         period = element(columns, DOMAIN_PERIOD, k)
         v0 = element(columns, V0, k)
         made = fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels
-        curve = SweptCurve(*made, v0, exact)
+        curve = SweptCurve(*made, v0, exact, given.signed, given.path_in_space)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

@@ -105,11 +105,10 @@ def sweep(
     shape = broadcast_shape(dict(zip(names, arrays, strict=False)))
     columns, domain = ([widen(array, shape) for array in of] for of in (arrays, domain))
     size = prod(shape)
-    answers = Answers(
-        np.full((size, found.width), nan),
-        np.full(size, quantities.UNDECIDED, dtype=np.int8),
-        np.full(size, quantities.BATCH, dtype=np.int8),
-    )
+    answers = Answers(np.empty((size, found.width)), np.empty(size, np.int8), np.empty(size, np.int8))
+    answers.values.fill(nan)
+    answers.status.fill(quantities.UNDECIDED)
+    answers.route.fill(quantities.BATCH)
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
     if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
@@ -128,8 +127,8 @@ def sweep(
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
             if chosen is not None:
                 answers.put(chosen, some)
-    if domain:
-        answers.status[np.broadcast_to(_too_far(columns[0], domain[2]).ravel(), size)] = quantities.UNDECIDED
+    if domain and (far := _too_far(columns[0], domain[2])).any():
+        answers.status[np.broadcast_to(far.ravel(), size)] = quantities.UNDECIDED
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
@@ -140,19 +139,21 @@ def sweep(
 
 def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
     """Return which launches `solve` refuses because doubles do not resolve places so many laps away."""
-    found: NDArray[np.bool_] = np.abs(lam0) > MAX_LAPS * np.where(period > 0.0, period, inf)
+    if period.ndim == 0:
+        last: Any = MAX_LAPS * period.item() if period.item() > 0.0 else inf
+    else:
+        last = np.where(period > 0.0, MAX_LAPS * period, inf)
+    found: NDArray[np.bool_] = np.abs(lam0) > last
     return found
 
 
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Return whether compiled loops can compute the quantity for most launches.
 
-    They cannot for motions that lose energy, and for motions with a last time they compute only the end. The grid on
-    which they search for extremes is too coarse for the length of a vector, which may be almost zero somewhere, and
-    they do not distinguish the sides of a space curve.
+    They cannot for motions that lose energy, and for motions with a last time they compute only the end. They do not
+    distinguish the sides of a space curve.
     """
-    of_force = quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE)
-    if not formulas.signed and (of_force or ONLY_SIGN[contact]):
+    if not formulas.signed and ONLY_SIGN[contact]:
         return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
@@ -190,7 +191,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE)
+        directed = formulas.path_in_space.address if formulas.path_in_space and formulas.directed else 0
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, formulas.signed, directed)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
         if code in ANSWERED_BY_BATCHES and exact.work.size:

@@ -137,6 +137,22 @@ def test_turning_points_and_loads_as_of_one_motion(v0: float, module_of: ModuleO
             assert list(pair) == pytest.approx(sorted(circle.solve(start, v0, L=1).turning_points), rel=5e-16)
 
 
+def test_largest_loads_where_one_maximum_becomes_two(module_of: ModuleOf) -> None:
+    """On the ellipse with axes 2 and 1 the load is largest at the bottom, and beside it for releases higher than -1/3.
+
+    As a function of the height z it is g*(4*(z0 - z)/(1 + 3*z**2)**(3/2) - 2*z/sqrt(1 + 3*z**2)), with a stationary
+    place at z = z0 - sqrt(z0**2 + 1/3). At the boundary the maximum is of the fourth order.
+    """
+    lam0 = -np.arcsin(np.concatenate([np.linspace(0.3, 0.36, 300), 1 / 3 + np.geomspace(1e-9, 1e-3, 60)]))
+    lam0 = np.concatenate([lam0, -np.arcsin(1 / 3 - np.geomspace(1e-9, 1e-3, 60))])
+    z0 = np.sin(lam0)
+    z = np.maximum(z0 - np.sqrt(z0**2 + 1 / 3), -1.0)
+    truth = 9.81 * (4 * (z0 - z) / (1 + 3 * z**2) ** 1.5 - 2 * z / np.sqrt(1 + 3 * z**2))
+    got = module_of("ellipse").sweep("normal_force_max", lam0, a=2, b=1)
+    assert got.values == pytest.approx(truth, rel=LOAD, abs=0.0)
+    assert got.route_counts() == {"single": lam0.size}  # none is slow
+
+
 def test_loads_next_to_a_barrier(module_of: ModuleOf) -> None:
     """An orbit that is left to the exact problem has its largest load at the bottom too."""
     top = np.pi - 1e-5

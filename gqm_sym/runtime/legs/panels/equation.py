@@ -11,15 +11,15 @@ P)``. The integrals come from running means, so that nothing is subtracted howev
 all its digits next to a turning point.
 """
 
+from functools import reduce
 from math import fabs, factorial, inf, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.calls import call_speed_equation
-from gqm_sym.runtime.compiled.intrinsics import fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import copied, on_stack, over_rows
+from gqm_sym.runtime.compiled.registers import copied, fused, on_stack, over_rows
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.panels.breaks import within
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, ENDS_BY_NODE, WIDE, size_of, to_graded_means, to_means
@@ -91,6 +91,16 @@ load_size_row = over_rows(lambda ds, n0, kappa, w: abs(ds) * (abs(n0) + abs(kapp
 root_row = over_rows(np.sqrt, WIDE)
 time_rate_row = over_rows(lambda ds, speed, factor: factor * ds / speed, WIDE)
 arc_rate_row = over_rows(lambda ds, y, slope, g: ds * (slope + 2.0 * g * y), WIDE)
+
+
+def _expm1(x: Any) -> Any:
+    """Return exp(x) - 1 for a register of small numbers."""
+    terms = reduce(lambda total, term: fused(total, x, term), EXPM1_TERMS[1:], x * 0.0 + EXPM1_TERMS[0])
+    return fused(terms * x, x, x)
+
+
+expm1_row = over_rows(_expm1, WIDE)
+doubled_row = over_rows(lambda expm1: expm1 * (expm1 + 2.0), WIDE)
 
 
 class Forces(NamedTuple):
@@ -181,12 +191,10 @@ def fill_expm1(work, q, out):  # type: ignore[no-untyped-def]
     largest, scale, doublings = max(size_of(work, q), fabs(work[q + COUNT])), 1.0, 0
     while largest * scale > MAX_SERIES_Q:
         scale, doublings = 0.5 * scale, doublings + 1
-    for j in range(WIDE):
-        x = work[q + j] * scale
-        work[out + j] = fma(polynomial(EXPM1_TERMS, x) * x, x, x)
+    product(work, out, q, scale)
+    expm1_row(work, out, out)
     for _ in range(doublings):
-        for j in range(WIDE):
-            work[out + j] *= work[out + j] + 2.0
+        doubled_row(work, out, out)
 
 
 @Inner

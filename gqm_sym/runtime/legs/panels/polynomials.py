@@ -5,6 +5,7 @@ The nodes are those of the first kind, so that no function is ever needed at a p
 or the end of the domain. ``x`` runs from -1 at the beginning of the panel to 1 at its end.
 """
 
+from functools import cache
 from math import cos, fabs, fsum, pi, sin
 
 import numpy as np
@@ -22,33 +23,34 @@ BITS = 240
 PI = 31415926535897932384626433832795028841971693993751058209749445923078164062862 * (1 << BITS) // 10**76
 
 
-def _share(m: int) -> float:
-    """Return ``sin(pi m/(4 COUNT))**2`` correctly rounded, because an error of the nodes would be one of every turning
+def _share(m: int, nodes: int) -> float:
+    """Return ``sin(pi m/(4 nodes))**2`` correctly rounded, because an error of the nodes would be one of every turning
     point.
     """
-    square = (PI * m // (2 * COUNT)) ** 2 >> BITS  # the cosine of twice the angle
+    square = (PI * m // (2 * nodes)) ** 2 >> BITS  # the cosine of twice the angle
     total, term, n = 0, square // 2, 2
     while term:
         total, term, n = total + term, -(term * square >> BITS) // ((n + 1) * (n + 2)), n + 2
     return total / (2 << BITS)
 
 
-def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the nodes as shares of the panel, the matrices of running means, and the matrix of Chebyshev coefficients.
+@cache
+def tables(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``nodes`` nodes as shares of the panel, the matrices of running means, and that of Chebyshev coefficients.
 
     They are computed in integers and rounded at the end, because an error here would be one of every integral.
     """
     quarter = [
-        sin(0.5 * pi * m / COUNT) if 2 * m <= COUNT else cos(0.5 * pi * (COUNT - m) / COUNT) for m in range(COUNT)
+        sin(0.5 * pi * m / nodes) if 2 * m <= nodes else cos(0.5 * pi * (nodes - m) / nodes) for m in range(nodes)
     ]
     quarter.append(1.0)
     wave = [*quarter, *quarter[-2::-1]]
-    sines = np.array([*wave, *(-value for value in wave[1:-1])])  # sin(pi m / (2 COUNT))
-    degree, odd = np.arange(COUNT), 2 * np.arange(COUNT) + 1
-    shares = np.array([_share(m) for m in odd.tolist()])
+    sines = np.array([*wave, *(-value for value in wave[1:-1])])  # sin(pi m / (2 nodes))
+    degree, odd = np.arange(nodes), 2 * np.arange(nodes) + 1
+    shares = np.array([_share(m, nodes) for m in odd.tolist()])
     # T_k at node j, with x = -cos(angle).
-    at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + COUNT) % (4 * COUNT)]
-    coefficients = at_nodes * (2.0 / COUNT)
+    at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + nodes) % (4 * nodes)]
+    coefficients = at_nodes * (2.0 / nodes)
     coefficients[0] *= 0.5
     one = 1 << BITS
 
@@ -59,14 +61,14 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         top, bottom = share.as_integer_ratio()
         y = one // bottom * top
         values = [one, 2 * y - one]  # T_(k+1) = (4 y - 2) T_k - T_(k-1)
-        for _ in range(COUNT):
+        for _ in range(nodes):
             values.append((4 * y - 2 * one) * values[-1] // one - values[-2])
         from_start = [value - (-1) ** k * one for k, value in enumerate(values)]
         areas = [y, y * y // one - y]
-        areas += [(from_start[k + 1] // (k + 1) - from_start[k - 1] // (k - 1)) // 4 for k in range(2, COUNT + 1)]
+        areas += [(from_start[k + 1] // (k + 1) - from_start[k - 1] // (k - 1)) // 4 for k in range(2, nodes + 1)]
         # y T_k = T_k/2 + (T_(k+1) + T_(k-1))/4, with T_(-1) = T_1.
-        moments = [(2 * areas[k] + areas[k + 1] + areas[abs(k - 1)]) // 4 for k in range(COUNT)]
-        return [area / y for area in areas[:COUNT]], [2 * moment * one / (y * y) for moment in moments]
+        moments = [(2 * areas[k] + areas[k + 1] + areas[abs(k - 1)]) // 4 for k in range(nodes)]
+        return [area / y for area in areas[:nodes]], [2 * moment * one / (y * y) for moment in moments]
 
     means, graded = (np.array(rows) for rows in zip(*map(both_means, (*shares.tolist(), 1.0)), strict=True))
     times = [[fsum(row * column) for column in coefficients.T] for row in means]
@@ -76,7 +78,7 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 # Node j lies at ``SHARES[j]`` of the panel. Row j of ``MEANS`` gives the mean from the panel's start to that node, the
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
-SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
+SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = tables(COUNT)
 
 # A row has the values at the nodes and one at the panel's end, which makes its length a multiple of a register.
 WIDE = 24
@@ -88,6 +90,9 @@ to_means, to_graded_means, to_coefficients = (multiply(table.T) for table in (ME
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 to_tails = multiply(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T)
 extent, size_of = span(COUNT), largest(COUNT)
+
+# The same for WIDE values.
+extent_of_block, size_of_block = span(WIDE), largest(WIDE)
 
 # A bound on the Lebesgue constant: the polynomial nowhere differs from a number by more than this times the largest
 # difference at the nodes.
@@ -152,7 +157,7 @@ def sum_and_slope(c, x):  # type: ignore[no-untyped-def]
     """Return the series and its derivative at x."""
     value, value_after, slope, slope_after = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
-    for k in range(COUNT - 1, 0, -1):
+    for k in range(c.size - 1, 0, -1):
         slope, slope_after = fma(twice, slope, fma(2.0, value, -slope_after)), slope
         value, value_after = fma(twice, value, c[k] - value_after), value
     return fma(x, value, c[0] - value_after), value + fma(x, slope, -slope_after)

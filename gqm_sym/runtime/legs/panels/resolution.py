@@ -89,6 +89,14 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
     return largest_v2
 
 
+@Inlined
+def are_fine(tail, middle, size):  # type: ignore[no-untyped-def]
+    """Return whether last coefficients of the size ``tail``, and some in the middle, are those of a resolved
+    function.
+    """
+    return tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
+
+
 @Inner
 def examine(work, row, size):  # type: ignore[no-untyped-def]
     """Return the size of a function's last coefficients, that of some coefficients in the middle, and whether the
@@ -96,7 +104,7 @@ def examine(work, row, size):  # type: ignore[no-untyped-def]
     """
     to_tails(work, row, work, TAILS)
     tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
-    return tail, middle, tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
+    return tail, middle, are_fine(tail, middle, size)
 
 
 @Inner

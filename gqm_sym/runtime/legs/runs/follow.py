@@ -209,19 +209,19 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
             return end
         start = RunStart(
             *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
-            *(end.no_turn_until, start.width, False),
+            *(end.no_turn_until, start.width, 0),
         )
 
 
 @Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """Run to the end as one polynomial if that suffices, else by `run_to_end`; return the end, and the number of panels
-    stored from the end.
+    """Run to the end as one polynomial if that suffices, else by `run_to_end`; return the end, and the number of blocks
+    of the polynomial (`whole_tables`), or 0.
     """
-    if start.v2 == 0.0 and forces.linear and start.may_be_whole:
-        end = run_whole(forces, start, route, off, record)
+    if start.v2 == 0.0 and forces.linear and start.blocks > 0:
+        end, blocks = run_whole(forces, start, route, off, record)
         if end.what == END_TURN:
-            return end, 2
+            return end, blocks
     return run_to_end(forces, start, route, off, record), 0
 
 
@@ -236,8 +236,8 @@ class Followed(NamedTuple):
         At a turn, the direction that `direction_from_rest` returns; otherwise that of the motion.
     could_stay : bool
         At a turn, whether the body could stay there on some slope; otherwise True.
-    is_whole : bool
-        Whether the leg was one polynomial.
+    blocks : int
+        The number of blocks of the leg (`whole_tables`) if it was one polynomial, else 0.
     step, no_turn_until, v2 : float
         As in `runs.ends.End`.
     """
@@ -246,7 +246,7 @@ class Followed(NamedTuple):
     contact_sign: int
     direction: int
     could_stay: bool
-    is_whole: bool
+    blocks: int
     step: float
     no_turn_until: float
     v2: float
@@ -277,8 +277,8 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     )
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     record[WHOLE] = 0.0
-    end, back = run_forwards(forces, start, route, off, record)
-    is_whole = back > 0
+    end, blocks = run_forwards(forces, start, route, off, record)
+    back = 2 if blocks > 0 else 0  # a record without panels has the times of two in each half
     what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
     direction, could_stay = start.direction, True
     if what == END_TURN:
@@ -295,4 +295,4 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
         what = END_RECORD_FULL if back == NO_SPACE else END_TOO_MANY_PANELS
-    return Followed(what, end.contact_sign, direction, could_stay, is_whole, end.step, end.no_turn_until, end.v2)
+    return Followed(what, end.contact_sign, direction, could_stay, blocks, end.step, end.no_turn_until, end.v2)

@@ -36,8 +36,9 @@ class RunStart(NamedTuple):
         The distance up to which no turn is expected, however slow the body becomes.
     width : float
         The approximate length of the leg, if it begins at a turn; 0 if that is unknown.
-    may_be_whole : bool
-        Whether the leg is tried as one polynomial, if it begins at a turn.
+    blocks : int
+        The number of blocks (`whole_tables`) with which the leg is first tried as one polynomial, if it begins at a
+        turn; 0 if it is not.
     """
 
     place: float
@@ -48,7 +49,7 @@ class RunStart(NamedTuple):
     step: float
     no_turn_until: float
     width: float
-    may_be_whole: bool
+    blocks: int
 
 
 class Reading(NamedTuple):

@@ -5,9 +5,12 @@ behind the body, ``W = h y (1 - y) C`` with a smooth C > 0. With ``y = sin(phi/2
 ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. C is computed from running means of
 exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The width is that for which the mean
 over the whole leg vanishes; Newton's method finds it.
+
+The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). Where the panels
+of a leg are read, which takes as long as to follow it panel by panel if there are many, it has 23.
 """
 
-from math import fabs, fsum, pi, sin, sqrt
+from math import fabs, fsum, sqrt
 
 import numpy as np
 
@@ -22,10 +25,12 @@ from gqm_sym.runtime.legs.leg_record import (
     NORMAL_LOAD,
     PANELS,
     PASSAGE,
+    PEAKS,
     RIGHT,
     TIME,
     TIME_ERROR,
     WHOLE,
+    WHOLE_ROWS,
     Y_ROW,
     has_space,
 )
@@ -33,7 +38,6 @@ from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, located, offset,
 from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     DS,
-    EXPM1_Q,
     FORCE,
     KAPPA,
     LOAD,
@@ -46,34 +50,38 @@ from gqm_sym.runtime.legs.panels.equation import (
     TIME_RATE,
     W_FACTOR,
     March,
-    P,
     Panel,
     W,
-    begin_panel,
     copy,
-    damped_row,
-    fill_force,
     linear_row,
     load_per_mass_row,
-    load_row,
-    panel_buffer,
-    set_nodes,
     time_rate_row,
 )
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
-from gqm_sym.runtime.legs.panels.polynomials import BITS, COUNT, MEANS, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_means
-from gqm_sym.runtime.legs.panels.resolution import (
-    CANCELLATION_NOISE,
-    are_resolved,
-    examine,
-    first_change_of,
-    is_load_resolved,
-    kink,
-    set_sizes,
-    size_at,
-    tail_of,
-)
+from gqm_sym.runtime.legs.panels.polynomials import BITS, COUNT, SHARES, TO_COEFFICIENTS, WIDE, size_of
+from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE, examine, tail_of
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
+from gqm_sym.runtime.legs.runs.whole_rows import (
+    are_rows_resolved,
+    begin_leg,
+    blocks_for,
+    extent_of_row,
+    fill_times,
+    fill_v2,
+    has_no_kink,
+    is_load_resolved,
+    keeps_sign,
+    sample_leg,
+    size_of_row,
+    whole_buffer,
+)
+from gqm_sym.runtime.legs.runs.whole_tables import (
+    MAX_BLOCKS,
+    to_coefficients,
+    to_end_terms,
+    to_half_times,
+    to_means,
+)
 
 # The first width to try if none is known, in units of the first panel's width.
 FIRST_WIDTH = 2.0
@@ -90,44 +98,14 @@ LAST_STEP = 1e-3
 # If the step itself changes by this little, the next one would be about its square.
 LAST_CHANGE = 1e-9
 
+# The largest step of Newton's method after which a width is close enough to begin with more nodes.
+ROUGH_STEP = 0.03
+
 # The smallest and the largest factor by which the width grows if no turn is found on it.
 MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
 
 # The rounding error of a mean in units in the last place of its largest term.
 MEAN_ROUNDINGS = 4.0
-
-# The number of terms of the Taylor series at a leg's end.
-TERMS = 6
-
-
-def _end_terms() -> Array:
-    """Return the matrix that gives the Taylor series, at the leg's end, of the integral from its start, in units of its
-    width.
-    """
-    k = np.arange(COUNT, dtype=np.float64)
-    slope, columns = np.ones(COUNT), [MEANS[COUNT]]
-    for m in range(1, TERMS):
-        columns.append(slope @ TO_COEFFICIENTS / m)
-        # T_k has the m-th derivative prod (k**2 - i**2)/(2 i + 1) at 1; a share of the leg is half of x.
-        slope = slope * (k * k - (m - 1) ** 2) / (2 * m - 1) * 2.0 / m
-    return np.array(columns).T
-
-
-def _factors() -> Array:
-    """Return the matrix that gives C exp(q) from the means between each node and the nearer turn."""
-    half = COUNT // 2 + 1
-    near = MEANS[:half] / (1.0 - SHARES[:half, None])
-    return np.vstack([near, -near[COUNT - half - 1 :: -1, ::-1]]).T
-
-
-def _half_times() -> Array:
-    """Return the matrix that gives the times from the start to the middle, and from there to the end, from the values
-    of f.
-    """
-    k = np.arange(1, COUNT)
-    terms = np.append(0.5 * pi, [(-1.0) ** j * round(sin(0.5 * pi * j)) / j for j in k])
-    first = terms @ TO_COEFFICIENTS
-    return np.array([first, first[::-1]]).T
 
 
 def _to_part(begin: float, end: float) -> Array:
@@ -152,29 +130,19 @@ def _to_part(begin: float, end: float) -> Array:
 # variable in the middle.
 JOINT = 0.625
 TURN_PART, MIDDLE_PART = _to_part(0.0, JOINT), _to_part(JOINT, 1.0)
-to_end_terms, to_factors, to_half_times = multiply(_end_terms()), multiply(_factors()), multiply(_half_times())
 to_turn_part, to_middle_part = multiply(TURN_PART), multiply(MIDDLE_PART)
 # Beyond the middle, distances are counted from the end.
 from_turn_part, from_middle_part = multiply(TURN_PART[::-1]), multiply(MIDDLE_PART[::-1])
 
-v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
-whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 # Y at the share s of the value that the march variable has in the middle.
 part_speed_row = over_rows(lambda factor, s: np.sqrt(factor - 0.5 * factor * (s * s)), WIDE)
 part_arc_row = over_rows(lambda ds, s, slope: ds * (s * slope), WIDE)
 
 
 @Inner
-def step_to_turn(work):  # type: ignore[no-untyped-def]
+def step_to_turn(work, at):  # type: ignore[no-untyped-def]
     """Return the step to the zero of V**2 by its Taylor series at the end, as a share of the width."""
-    a, b, c, d, e, f = (
-        work[TAILS],
-        work[TAILS + 1],
-        work[TAILS + 2],
-        work[TAILS + 3],
-        work[TAILS + 4],
-        work[TAILS + 5],
-    )
+    a, b, c, d, e, f = work[at], work[at + 1], work[at + 2], work[at + 3], work[at + 4], work[at + 5]
     s = -a / b
     for _ in range(3):
         value = a + s * (b + s * (c + s * (d + s * (e + s * f))))
@@ -187,43 +155,48 @@ def step_to_turn(work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def factor_to_turn(work):  # type: ignore[no-untyped-def]
+def factor_to_turn(blocks, work):  # type: ignore[no-untyped-def]
     """Return an estimate of the factor by which the width must change if the turn is not near; NaN if there is none."""
-    to_means(work, FORCE, work, MEAN)
-    for j in range(COUNT + 1):
-        mean = work[MEAN + j]
+    at = blocks * MEAN
+    to_means(blocks, work, blocks * FORCE, work, at)
+    for j in range(blocks * WIDE):
+        mean = work[at + j]
         if not mean > 0.0:
             if j == 0:
                 return np.nan
-            before, y = work[MEAN + j - 1], work[NODES + j - 1]
-            return y + (work[NODES + j] - y) * before / (before - mean)
-    first, last = work[FORCE], work[TAILS + 1]
+            before, y = work[at + j - 1], work[blocks * NODES + j - 1]
+            return y + (work[blocks * NODES + j] - y) * before / (before - mean)
+    first, last = work[blocks * FORCE], work[blocks * TAILS + 1]
     # If the force were linear, the turn would be twice as far away as the zero of the force.
     factor = 2.0 * first / (first - last) if last < first else MAX_GROWTH
     return min(max(factor, MIN_GROWTH), MAX_GROWTH)
 
 
 @Inner
-def width_of_leg(forces, march, panel, room, width, work):  # type: ignore[no-untyped-def]
+def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # type: ignore[no-untyped-def]
     """Return the width of a leg, which is about ``width`` and at most ``room``, and fill FORCE and EXPM1_Q; return 0 if
     it is not found.
+
+    A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width.
     """
-    h, last = min(width, room), np.inf
+    h, last, at = min(width, room), np.inf, blocks * TAILS
+    begin_leg(blocks, work)
     for _ in range(MAX_TRIES):
-        begin_panel(forces, march, panel, h, work)
-        if not fill_force(march, work) < np.inf:
+        if not sample_leg(forces, march, panel, blocks, h, work):
             return 0.0
-        to_end_terms(work, FORCE, work, TAILS)
+        to_end_terms(blocks, work, blocks * FORCE, work, at)
         factor = 0.0
-        if work[TAILS + 1] < 0.0:
-            step = step_to_turn(work)
+        if work[at + 1] < 0.0:
+            step = step_to_turn(work, at)
             rounding = ULP * (MEAN_ROUNDINGS + fabs(march.origin[0]) / h)
-            if last <= LAST_STEP and fabs(step * work[TAILS + 1]) <= rounding * size_of(work, FORCE):
+            if last <= LAST_STEP and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE):
                 return h
             last = fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
+            if is_rough and fabs(step) <= ROUGH_STEP:
+                return min(h * factor, room)
         if factor == 0.0:
-            factor = factor_to_turn(work)
+            factor = factor_to_turn(blocks, work)
         if not factor > 0.0 or (h == room and factor > 1.0):
             return 0.0
         h = min(h * factor, room)
@@ -231,24 +204,49 @@ def width_of_leg(forces, march, panel, room, width, work):  # type: ignore[no-un
 
 
 @Inner
-def is_whole(forces, panel, h, work):  # type: ignore[no-untyped-def]
-    """Fill the other rows; return whether all are resolved and whether V**2 and N each have one sign on the leg."""
-    to_factors(work, FORCE, work, W_FACTOR)
-    damped_row(work, W_FACTOR, W_FACTOR, EXPM1_Q)
-    v2_row(work, W, W_FACTOR, NODES, h)
-    if forces.kinked and not kink(work) > 1.0:
-        return False
-    load_row(work, LOAD, DS, N0, KAPPA, W)
-    set_sizes(0.0, 0.0, work)
-    if not (are_resolved(work, W_FACTOR, P)[0] and is_load_resolved(work)[0]):
-        return False
-    turn, _, touch = first_change_of(work, W_FACTOR, 1, CANCELLATION_NOISE * size_of(work, FORCE))
-    change, _, _ = first_change_of(work, LOAD, panel.contact_sign, ZERO_TOLERANCE * work[size_at(LOAD)])
-    if min(turn, touch, change) <= 1.0:
-        return False
-    whole_time_row(work, TIME_RATE, DS, W_FACTOR, h)
-    work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
-    return are_resolved(work, TIME_RATE, LOAD)[0]
+def is_whole(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg, and the number
+    of blocks to try next, or 0.
+    """
+    if forces.kinked:
+        has_one_sign, ratio = has_no_kink(blocks, work)
+        if not has_one_sign:
+            return False, blocks_for(ratio, blocks)
+    fill_v2(blocks, h, work)
+    fine, ratio = are_rows_resolved(blocks, h, work)
+    load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
+    if not (fine and load_fine):
+        return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
+    noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]
+    if not (
+        keeps_sign(blocks, work, W_FACTOR, 1, noise)
+        and keeps_sign(blocks, work, LOAD, panel.contact_sign, ZERO_TOLERANCE * load_noise)
+    ):
+        return False, 0
+    fine, ratio = fill_times(blocks, h, work)
+    return fine, blocks_for(ratio, blocks)
+
+
+@Inner
+def solve_leg(forces, march, panel, room, start, most, work):  # type: ignore[no-untyped-def]
+    """Return the number of blocks that resolve a leg, at most ``most``, and its width; 0 blocks if there are none."""
+    blocks = start.blocks
+    if blocks > most:
+        return 0, 0.0
+    width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
+    h = width_of_leg(forces, march, panel, 1, room, width, blocks > 1, work)
+    while h > 0.0:
+        if blocks > 1:
+            h = width_of_leg(forces, march, panel, blocks, room, h, False, work)
+        if not h > 0.0:
+            break
+        fine, onwards = is_whole(forces, panel, blocks, h, work)
+        if fine:
+            return blocks, h
+        if not 0 < onwards <= most:
+            break
+        blocks = onwards
+    return 0, h
 
 
 @Inner
@@ -307,20 +305,39 @@ def enter_time(record, begin, time, is_read):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
-    """Return whether data that require panels are read from a leg of the width ``h``."""
-    reads = route.reading.what
-    if reads == PASSAGE:
+    """Return whether times on a leg of the width ``h`` are read."""
+    if route.reading.what == PASSAGE:
         return 0.0 <= offset(route.target, origin, v) <= h * (1.0 + CLEARANCE_SHARE)
-    return reads == PANELS or time > route.until
+    return route.reading.what == PEAKS and time > route.until
 
 
 @Inner
-def enter_rows(record, work):  # type: ignore[no-untyped-def]
-    """Write a leg into the record as one row each of V**2 and N."""
-    load_per_mass_row(work, MEAN, N0, KAPPA, W)
-    copy(record, HEAD + NORMAL_LOAD, work, MEAN)
-    copy(record, HEAD + Y_ROW, work, W)
-    record[WHOLE] = 1.0
+def enter_rows(record, blocks, with_times, with_values, work):  # type: ignore[no-untyped-def]
+    """Write a leg into the record as rows."""
+    wide = blocks * WIDE
+    record[WHOLE] = blocks
+    if with_times:
+        to_coefficients(blocks, work, blocks * TIME_RATE, record, WHOLE_ROWS)
+    if with_values:
+        for at in range(0, wide, WIDE):
+            copy(record, WHOLE_ROWS + wide + at, work, blocks * W + at)
+            load_per_mass_row(work, blocks * MEAN + at, blocks * N0 + at, blocks * KAPPA + at, blocks * W + at)
+            copy(record, WHOLE_ROWS + 2 * wide + at, work, blocks * MEAN + at)
+
+
+@Inner
+def enter_leg(record, route, origin, v, blocks, h, work):  # type: ignore[no-untyped-def]
+    """Write a leg into the record; return whether what is read of it is resolved."""
+    to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
+    first, second, reads = work[blocks * TAILS], work[blocks * TAILS + 1], route.reading.what
+    if reads == PANELS:
+        if not enter_parts(record, h, work):
+            return False
+    else:
+        enter_rows(record, blocks, is_read(route, origin, v, h, first + second), reads == PEAKS, work)
+    enter_time(record, HEAD, first, reads == PANELS)
+    enter_time(record, HEAD + 2 * COLUMNS, second, reads == PANELS)
+    return True
 
 
 @Inner
@@ -331,32 +348,27 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
 
     Returns
     -------
-    End
+    end : End
         Its code is END_NONE if the leg must be followed panel by panel.
+    blocks : int
+        The number of blocks (`whole_tables`) that resolve the leg; 0 if there is none.
     """
     breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:
         upcoming += 1
     room = offset(route.limit if upcoming == breaks.size else breaks[upcoming], origin, v)
     march, span, nu = March(origin, v, 0.0, 1.0), span_before(breaks, upcoming, v, off), start.contact_sign
-    what, middle, h = END_NONE, origin, 0.0
+    what, middle, h, blocks = END_NONE, origin, 0.0, 0
     if nu == 0:
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
-    if nu != 0 and nu != -route.only_sign and has_space(record, HEAD + 3 * COLUMNS, 0):
-        work = panel_buffer()
-        set_nodes(work)
-        panel = Panel(0.0, 0.0, nu, span)
-        width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
-        h = width_of_leg(forces, march, panel, room, width, work)
-        if h > 0.0 and is_whole(forces, panel, h, work):
-            to_half_times(work, TIME_RATE, work, TAILS)
-            first, second = work[TAILS], work[TAILS + 1]
-            has_panels = is_read(route, origin, v, h, first + second)
-            if not has_panels:
-                enter_rows(record, work)
-            if not has_panels or enter_parts(record, h, work):
-                what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
-                enter_time(record, HEAD, first, has_panels)
-                enter_time(record, HEAD + 2 * COLUMNS, second, has_panels)
+    if nu != 0 and nu != -route.only_sign and has_space(record, WHOLE_ROWS + 3 * COLUMNS, 0):
+        work = whole_buffer()
+        # Panels of a leg with more nodes would take more time than to lay them one by one.
+        most = 1 if route.reading.what == PANELS else MAX_BLOCKS
+        blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, most, work)
+        if blocks > 0 and enter_leg(record, route, origin, v, blocks, h, work):
+            what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
+        else:
+            blocks = 0
     place = located(origin, v, h, breaks, upcoming)
-    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, 2, upcoming)
+    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, 2, upcoming), blocks

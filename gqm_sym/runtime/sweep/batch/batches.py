@@ -50,10 +50,12 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
     start_search,
     start_search_behind,
 )
+from gqm_sym.runtime.sweep.batch.wells import find_proved, wells_of
 from gqm_sym.runtime.sweep.quantities import ANSWERED, ANSWERS, NOT_PERIODIC, PERIOD, SPAN_KNOWN, SPANS, TURNING_POINTS
 
-# The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many.
-FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 3, 2, 12
+# The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
+# pieces stand for the proof that all orbits about an axis share.
+SHARED, FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 0, 3, 2, 12
 
 
 class OrbitKind(NamedTuple):
@@ -67,11 +69,14 @@ class OrbitKind(NamedTuple):
         Whether each orbit is even about an axis of symmetry.
     proved : bool
         Whether the turning points need no further proof.
+    shared : bool
+        Whether each orbit is about the axis of `Wells`.
     """
 
     kind: int
     mirrored: bool
     proved: bool
+    shared: bool
 
 
 @Inner
@@ -94,17 +99,22 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
 
 
 @Inner
-def answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Prove orbits of one kind, and fill the answers for those that are proved; ``spare`` stores the others
     meanwhile.
     """
     count = scratch.param_count
-    for pieces in (FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
+    for pieces in (SHARED, FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
+        if pieces == SHARED and not kind.shared:
+            continue
         n, rows = orbits.size, orbits.rows
         proved, unproved = n, 0
         if not kind.proved:
-            p = orbits.params[: count * n].reshape(count, n)
-            prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
+            if pieces == SHARED:
+                find_proved(fns, n, rows, wells)
+            else:
+                p = orbits.params[: count * n].reshape(count, n)
+                prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
             proved, unproved = partition(rows[STATE, :n], scratch.chosen, scratch.others)
         waiting = gather(orbits, count, scratch.others, unproved, spare, ROWS)
         orbits = shrink(orbits, count, scratch.chosen, proved, TIME_ROWS)
@@ -145,7 +155,7 @@ def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ign
 
 
 @Inner
-def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[no-untyped-def]
+def find_orbits(fns, orbits, laps, domain, monotone, wells, scratch):  # type: ignore[no-untyped-def]
     """Search both turning points of each launch; return the librations and the number of circulations.
 
     Circulations are copied to ``laps``. All other launches are dropped.
@@ -155,7 +165,7 @@ def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[n
         n, rows = orbits.size, orbits.rows
         p = orbits.params[: count * n].reshape(count, n)
         if ahead:
-            start_search(fns, n, rows, p, domain, monotone, scratch.work)
+            start_search(fns, n, rows, p, domain, monotone, wells, scratch.work)
         else:
             start_search_behind(fns, n, rows, p, monotone, scratch.work)
         search(fns, n, rows, p, scratch.work)
@@ -175,18 +185,19 @@ def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[n
 
 
 @Inner
-def kind_of_librations(fns, orbits, monotone):  # type: ignore[no-untyped-def]
+def kind_of_librations(fns, orbits, monotone, wells):  # type: ignore[no-untyped-def]
     """Return the common data of librations: whether all are even, and the fastest method for their time."""
     n, rows = orbits.size, orbits.rows
     mirrored, one_axis = not contains(rows[STATE, :n], NOWHERE), not contains(rows[TRIAL, :n], NOWHERE)
     kind = LIBRATION
     if mirrored and one_axis and (fns.time_integrand or fns.agm_arguments):
         kind = AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION
-    # If closed forms gave the turning points, V**2 is monotone on either side of the axis.
+    # If no search gave the turning points, V**2 is monotone on either side of the axis.
     known = True
     for j in range(n):
         known &= rows[ZERO_BEHIND, j] == rows[ZERO_BEHIND, j]
-    return OrbitKind(kind, mirrored, (monotone or known) and mirrored and one_axis)
+    about_axis = mirrored and one_axis
+    return OrbitKind(kind, mirrored, (monotone or known) and about_axis, about_axis and wells.proofs.size > 0)
 
 
 @entry(
@@ -221,14 +232,15 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    wells = wells_of(columns)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
         orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
         load_launches(columns, begin, number, orbits, domain, scratch)
-        orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, scratch)
+        orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
         if orbits.size:
-            kind = kind_of_librations(fns, orbits, monotone)
-            answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers)
+            kind = kind_of_librations(fns, orbits, monotone, wells)
+            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
         if lap_count:
-            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False)
-            answer_orbits(fns, kind, laps_found, spare, scratch, quantity, answers)
+            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False, False)
+            answer_orbits(fns, kind, laps_found, spare, wells, scratch, quantity, answers)

@@ -37,6 +37,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ZERO_BEHIND,
     contains,
 )
+from gqm_sym.runtime.sweep.batch.wells import is_proved
 
 # The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
@@ -110,6 +111,30 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
 
 
 @Inner
+def by_symmetry(fns, n, rows, domain, wells):  # type: ignore[no-untyped-def]
+    """Set both zeros of bodies released at rest in a well that is proved to rise on both sides of its axis.
+
+    Such a body turns at its mirror image. For others ZERO_BEHIND stays NaN.
+    """
+    start, w0, places, places_low, steps = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        domain[3, :n],
+        domain[4, :n],
+        domain[5, :n],
+    )
+    for j in range(n):
+        offset, step = (start[j] - places[j]) - places_low[j], steps[j]
+        size = fabs(offset)
+        clear = size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j])) and (
+            step == 0.0 or size < MAX_AXIS_STEP_SHARE * step
+        )
+        if w0[j] == 0.0 and clear and is_proved(fns, wells, size):
+            rows[SEARCH_DIRECTION, j] = 1.0 if offset < 0.0 else -1.0
+            rows[ZERO, j], rows[ZERO_BEHIND, j], rows[AXIS_DISTANCE, j] = 2.0 * size, 0.0, size
+
+
+@Inner
 def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
     """Let searches that would begin at a mirror image begin at the axis of symmetry if V**2 < 0 there.
 
@@ -132,7 +157,7 @@ def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
+def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead of each launch. A body at rest starts in the direction of the force.
 
     ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of `strided`. If V**2 is ``monotone`` between axes, a body released
@@ -158,6 +183,8 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
         by_closed_form(fns, n, rows, p, domain, monotone, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
+        if wells.proofs.size > 0 and not monotone:
+            by_symmetry(fns, n, rows, domain, wells)
     none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     axes = work[5, :n]
     for j in range(n):

@@ -1,7 +1,8 @@
 """Legs from turn to turn as one polynomial agree with closed forms with 28 digits."""
 
-from functools import partial
-from itertools import pairwise
+from functools import cache, partial
+from itertools import accumulate, pairwise
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -10,8 +11,9 @@ import pytest
 from mpmath import mp, mpf
 
 import generated.circle_coulomb
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS
-from gqm_sym.runtime.legs.runs import whole_leg
+import gqm_sym as gqm
+from gqm_sym.runtime.legs.panels.polynomials import SHARES
+from gqm_sym.runtime.legs.runs import whole_leg, whole_tables
 
 # The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
@@ -21,26 +23,36 @@ def _power(n: int, phi: mpf) -> mpf:
     return mp.sin(phi / 2) ** (2 * n)
 
 
-def test_tables() -> None:
+@pytest.mark.parametrize("blocks", whole_tables.BLOCKS)
+def test_tables(blocks: int) -> None:
     """The tables are those of integrals of powers; V**2 = y**n - y**(n + 1) vanishes at both turns."""
-    y, k = SHARES, np.arange(1, whole_leg.TERMS)
+    y, k = whole_tables.nodes(blocks)[0, :-1], np.arange(1, whole_tables.TERMS)
     for n in range(1, 16):
         force = n * y ** (n - 1) - (n + 1) * y**n
-        ends = whole_leg._end_terms().T @ force
+        ends = whole_tables.end_terms(blocks).T @ force
         binomial = [float(mp.binomial(n, m) - mp.binomial(n + 1, m)) for m in k]
         assert ends[0] == pytest.approx(0.0, abs=TABLE * n)
-        assert ends[1:] == pytest.approx(binomial, rel=1e-8, abs=1e-8)  # derivatives lose digits
-        assert whole_leg._factors().T @ force == pytest.approx(y ** (n - 1), abs=TABLE * n)
+        loss = 1e-8 * blocks ** (2.0 * k - 1.0)  # derivatives lose digits
+        assert (np.abs(ends[1:] - binomial) <= loss * (1.0 + np.abs(binomial))).all()
+        assert whole_tables.factors(blocks).T @ force == pytest.approx(y ** (n - 1), abs=TABLE * n)
+        assert whole_tables.means(blocks).T @ force == pytest.approx(
+            np.append(y, 1.0) ** (n - 1) - np.append(y, 1.0) ** n, abs=TABLE * n
+        )
         with mp.workdps(30):
             halves = [mp.quad(partial(_power, n), (a, a + mp.pi / 2), method="gauss-legendre") for a in (0, mp.pi / 2)]
-        assert whole_leg._half_times().T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
-        for table, begin, end in (
-            (whole_leg.TURN_PART, 0.0, whole_leg.JOINT),
-            (whole_leg.MIDDLE_PART, whole_leg.JOINT, 1.0),
-        ):
-            shares = 0.5 * (begin + (end - begin) * y) ** 2
-            assert table.T @ y**n == pytest.approx(shares**n, abs=TABLE)
-    assert np.abs(TO_COEFFICIENTS @ np.ones(COUNT) - np.eye(COUNT)[0]).max() <= TABLE
+        assert whole_tables.half_times(blocks).T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
+    assert np.abs(whole_tables.coefficients(blocks).T @ np.ones(y.size) - np.eye(y.size)[0]).max() <= TABLE
+
+
+@pytest.mark.parametrize(
+    ("table", "begin", "end"),
+    [(whole_leg.TURN_PART, 0.0, whole_leg.JOINT), (whole_leg.MIDDLE_PART, whole_leg.JOINT, 1.0)],
+)
+def test_tables_of_parts(table: Any, begin: float, end: float) -> None:
+    """Powers on the whole leg become the same powers on a part of it."""
+    shares = 0.5 * (begin + (end - begin) * SHARES) ** 2
+    for n in range(1, 16):
+        assert table.T @ SHARES**n == pytest.approx(shares**n, abs=TABLE)
 
 
 class Pendulum:
@@ -111,3 +123,119 @@ def test_a_pendulum_with_friction(start: float, mu: float) -> None:
     assert [leg.lam_end for leg in motion.legs] == pytest.approx([float(x) for x in turns[1:]], abs=9.0 * ulp)
     assert motion.lam(when) == pytest.approx(there, abs=9.0 * ulp)
     assert (np.abs(motion.lam(when) - there) <= motion.error_bound(when)).all()
+
+
+class Slope:
+    """A body that slides down a graph with friction or drag, by sums in 30 digits.
+
+    With the slope z' and the sense v of the motion, ``dW/dx = -2 g (z' + mu v) - q' W`` with ``q = 2 mu v atan z'``, or
+    with drag ``q = 2 c v s``. So ``exp(q) W`` is an integral from the last turn.
+    """
+
+    def __init__(self, slope: Any, force: str) -> None:
+        self.slope, self.mu, self.g = slope, mpf(MU if force == "friction" else 0.0), mpf("9.81")
+
+    def exponent(self, x: mpf) -> Any:
+        """Return v q; the arc length is that of the parabola z = x**2."""
+        if self.mu > 0:
+            return 2 * self.mu * mp.atan(self.slope(x))
+        return C_D * (x * mp.sqrt(1 + 4 * x * x) + mp.asinh(2 * x) / 2)
+
+    def force(self, x: mpf, v: int) -> Any:
+        """Return the rate of exp(q) W along the motion."""
+        return -2 * v * self.g * (self.slope(x) + self.mu * v) * mp.exp(v * self.exponent(x))
+
+    def gain(self, a: mpf, b: mpf, v: int, panels: int = 1) -> Any:
+        """Return the change of exp(q) W from a to b, by Gauss-Legendre rules of 24 nodes."""
+        half = (b - a) / (2 * panels)
+        middles = [a + (2 * k + 1) * half for k in range(panels)]
+        return v * half * mp.fsum(w * self.force(m + half * x, v) for m in middles for x, w in gauss_legendre())
+
+    def v2(self, a: mpf, x: mpf, v: int) -> Any:
+        """Return V**2 at x after a launch from rest at a."""
+        return self.gain(a, x, v, 8) * mp.exp(-v * self.exponent(x))
+
+    def turn(self, a: mpf, v: int) -> Any:
+        """Return where a body launched from rest at a turns, by Newton's method."""
+        b = -a
+        left = self.gain(a, b, v, 8)
+        while True:
+            step = -left / (v * self.force(b, v))
+            left, b = left + self.gain(b, b + step, v, 8), b + step
+            if abs(step) < mpf(10) ** -26:
+                return b
+
+    def time(self, a: mpf, b: mpf, v: int, share: Any = 1) -> Any:
+        """Return the time from a turn at a to this share of the way to that at b.
+
+        In a phase angle, which is pi at b, the rate of time is even and smooth. At nodes of equal steps it gives a
+        series of cosines, which is integrated. V**2 is summed from the nearer turn.
+        """
+        n, h = 90, b - a
+        phases = [mp.pi * (2 * j + 1) / (2 * n) for j in range(n)]
+        places = [a + h * mp.sin(phase / 2) ** 2 for phase in phases]
+        gained = list(accumulate(self.gain(*pair, v) for pair in pairwise([a, *places[: n // 2]])))
+        lost = list(accumulate(self.gain(*pair, v) for pair in pairwise([b, *places[: n // 2 - 1 : -1]])))
+        sums = [*gained, *reversed(lost)]
+        rates = [
+            abs(h) * mp.sin(phase) / 2 * mp.sqrt((1 + self.slope(x) ** 2) / (total * mp.exp(-v * self.exponent(x))))
+            for phase, x, total in zip(phases, places, sums, strict=True)
+        ]
+        end = 2 * mp.asin(mp.sqrt(share))
+        terms = [mp.fsum(r * mp.cos(k * phase) for r, phase in zip(rates, phases, strict=True)) / n for k in range(n)]
+        return terms[0] * end + 2 * mp.fsum(terms[k] * mp.sin(k * end) / k for k in range(1, n))
+
+
+@cache
+def gauss_legendre() -> list[tuple[mpf, mpf]]:
+    """Return nodes and weights of the Gauss-Legendre rule of 24 nodes."""
+    pairs = []
+    for guess in np.polynomial.legendre.leggauss(24)[0].tolist():
+        x = mp.findroot(lambda x: mp.legendre(24, x), guess)
+        pairs.append((x, 2 * (1 - x * x) / (24 * mp.legendre(23, x)) ** 2))
+    return pairs
+
+
+PARABOLA, WAVE = (lambda x: 2 * x), (lambda x: x + mpf(3) / 10 * mp.cos(3 * x))
+MU, C_D = 0.125, 0.0625
+
+
+@pytest.mark.parametrize(
+    ("height", "slope", "start", "force"),
+    [
+        ("x**2", PARABOLA, 0.6, "friction"),
+        ("x**2", PARABOLA, 1.125, "friction"),
+        ("x**2", PARABOLA, 1.0, "drag"),
+        ("x**2/2+sin(3*x)/10", WAVE, 1.0, "friction"),
+    ],
+)
+def test_graphs(height: str, slope: Any, start: float, force: str, generated_folder: Path) -> None:
+    """Along curves that a polynomial of degree 22 does not resolve, times, turns and extremes agree with sums."""
+    law, name = gqm.Gravity(), f"whole_{force}_{'parabola' if slope is PARABOLA else 'wave'}"
+    law = law + (gqm.CoulombFriction() if force == "friction" else gqm.QuadraticDrag(b="c_d"))
+    module = gqm.build(gqm.derive(gqm.Curve.graph(height), law), name=name, folder=generated_folder)
+    given: dict[str, Any] = {"mu": MU} if force == "friction" else {"c_d": C_D, "t_max": 10.0}
+
+    def swept(quantity: str, **more: Any) -> float:
+        return float(module.sweep(quantity, [start], 0.0, **(given | more)).values[0])
+
+    with mp.workdps(30):
+        body = Slope(slope, force)
+        places, times, v = [mpf(start)], [], -1
+        while len(times) < (1 if force == "drag" else 20) and abs(slope(places[-1])) > body.mu:
+            places.append(body.turn(places[-1], v))
+            times.append(body.time(*places[-2:], v))
+            v = -v
+        if force == "friction":
+            assert swept("t_end") == pytest.approx(float(mp.fsum(times)), rel=2e-15)
+            assert swept("rest_position") == pytest.approx(float(places[-1]), rel=0.0, abs=1e-15)
+        a, b = places[:2]
+        fastest = mp.findroot(lambda x: mp.diff(lambda y: body.v2(a, y, -1), x), 0.0)
+        assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
+        for share in map(mpf, ("0.0625", "0.375", "0.875")):
+            place = a + (b - a) * share
+            time = float(body.time(a, b, -1, share))
+            assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
+            if (place - fastest) * (a - fastest) > 0:
+                v_there = float(mp.sqrt(body.v2(a, place, -1)))
+                assert swept("v_max", t_max=time) == pytest.approx(v_there, rel=2e-15)

@@ -1,0 +1,245 @@
+"""Rows of a leg from turn to turn as one polynomial: how well they are resolved, and whether they keep their sign.
+
+Rows are those of a panel (`panels.equation`) with more nodes: with ``blocks`` blocks of numbers each (`whole_tables`),
+the row ``r`` of a panel begins at ``blocks * r``.
+"""
+
+from math import fabs, inf, log, pi
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.legs.panels.breaks import within
+from gqm_sym.runtime.legs.panels.equation import (
+    ARC_RATE,
+    DS,
+    EXPM1_Q,
+    FORCE,
+    KAPPA,
+    LOAD,
+    MAX_Q,
+    MEAN,
+    N0,
+    NODES,
+    OFFSET,
+    Q_RATE,
+    SERIES,
+    SPEED,
+    TAILS,
+    TIME_RATE,
+    W_FACTOR,
+    P,
+    Q,
+    W,
+    copy_row,
+    damped_row,
+    fill_expm1,
+    force_row,
+    linear_row,
+    load_row,
+    load_size_row,
+    product,
+)
+from gqm_sym.runtime.legs.panels.polynomials import WIDE, extent, extent_of_block, size_of, size_of_block
+from gqm_sym.runtime.legs.panels.resolution import (
+    CANCELLATION_NOISE,
+    FAR_FROM_ZERO_RATIO,
+    ONE_SIGN_RATIO,
+    TAIL_RATIO,
+    are_fine,
+)
+from gqm_sym.runtime.legs.runs.whole_tables import (
+    MAX_BLOCKS,
+    MIDDLE_DEGREES,
+    to_coefficients,
+    to_factors,
+    to_means,
+    to_nodes,
+    to_tails,
+)
+
+# The rows of a panel and of the leg, one after the other.
+ROWS = 22
+whole_buffer = on_stack(ROWS * MAX_BLOCKS * WIDE)
+
+# A bound on the Lebesgue constant for all numbers of nodes (`polynomials.LEBESGUE`).
+LEBESGUE = 4.0
+
+v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
+whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
+
+# Coefficients that decrease by the same factor with each degree as in their middle fall short of the expected size at
+# their end by this share of the nodes, because singularities of curves are mostly those of roots.
+ENOUGH_NODES = 1.25
+
+
+@Inner
+def size_of_row(blocks, work, row):  # type: ignore[no-untyped-def]
+    """Return the largest absolute value at the nodes."""
+    at = blocks * row
+    size = size_of(work, at + (blocks - 1) * WIDE)
+    for k in range(blocks - 1):
+        size = max(size, size_of_block(work, at + k * WIDE))
+    return size
+
+
+@Inner
+def extent_of_row(blocks, work, row):  # type: ignore[no-untyped-def]
+    """Return the smallest and the largest value at the nodes."""
+    at = blocks * row
+    low, high = extent(work, at + (blocks - 1) * WIDE)
+    for k in range(blocks - 1):
+        least, most = extent_of_block(work, at + k * WIDE)
+        low, high = min(low, least), max(high, most)
+    return low, high
+
+
+@Inner
+def examine_row(blocks, work, row, size):  # type: ignore[no-untyped-def]
+    """Return what `resolution.examine` does: the sizes of the last coefficients and of some in the middle, and whether
+    the function is resolved.
+    """
+    at = blocks * TAILS
+    to_tails(blocks, work, blocks * row, work, at)
+    tail = max(fabs(work[at]), max(fabs(work[at + 1]), fabs(work[at + 2])))
+    middle = max(fabs(work[at + 3]), max(fabs(work[at + 4]), fabs(work[at + 5])))
+    return tail, middle, are_fine(tail, middle, size)
+
+
+@Inner
+def keeps_sign(blocks, work, row, sign, noise):  # type: ignore[no-untyped-def]
+    """Return whether a function is proved to have a sign on the whole leg."""
+    low, high = extent_of_row(blocks, work, row)
+    least = low if sign > 0 else -high
+    if not least > noise:
+        return False
+    if 0.5 * fabs(low + high) > 0.5 * LEBESGUE * (high - low) + noise:
+        return True
+    # A series in cosines of an angle differs between nodes from a value beside it by less than this times a bound of
+    # its second derivative.
+    at, bend, spacing = blocks * SERIES, 0.0, pi / (blocks * WIDE - 1)
+    to_coefficients(blocks, work, blocks * row, work, at)
+    for k in range(1, blocks * WIDE - 1):
+        bend += k * k * fabs(work[at + k])
+    return least > 0.125 * spacing * spacing * bend + noise
+
+
+@Inner
+def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
+    """Fill in the nodes, once for all widths."""
+    work[0] = 1.0
+    to_nodes(blocks, work, 0, work, blocks * NODES)
+
+
+@Inner
+def sample_leg(forces, march, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows DS to KAPPA, EXPM1_Q and FORCE of a leg of the width ``h``; return whether resistance is small
+    enough for that.
+    """
+    wide, origin, v, nu = blocks * WIDE, march.origin, float(march.direction), float(panel.contact_sign)
+    for at in range(0, wide, WIDE):
+        product(work, blocks * OFFSET + at, blocks * NODES + at, h)
+        linear_row(work, blocks * ARC_RATE + at, blocks * OFFSET + at, origin[0] + origin[1], v)
+        copy_row(work, blocks * W + at, 0.0)
+    if panel.span[0] > -inf or panel.span[1] < inf:
+        for j in range(blocks * ARC_RATE, blocks * ARC_RATE + wide):
+            work[j] = within(work[j], panel.span)
+    rows = (blocks * ARC_RATE, blocks * W, blocks * DS)
+    call_speed_equation(forces.speed_equation, wide, work, rows, v, nu, forces.params)
+    for at in range(0, wide, WIDE):
+        product(work, blocks * Q_RATE + at, blocks * Q + at, v)
+    to_means(blocks, work, blocks * Q_RATE, work, blocks * SPEED)
+    for at in range(0, wide, WIDE):
+        product(work, blocks * SPEED + at, blocks * SPEED + at, blocks * OFFSET + at)
+    if not fabs(work[blocks * SPEED + wide - 1]) <= MAX_Q:
+        return False
+    for at in range(0, wide, WIDE):
+        fill_expm1(work, blocks * SPEED + at, blocks * EXPM1_Q + at)
+        force_row(work, blocks * FORCE + at, blocks * P + at, blocks * EXPM1_Q + at, v)
+    return True
+
+
+@Inner
+def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR, W, LOAD, and the size of the terms of LOAD in MEAN."""
+    to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+    for at in range(0, blocks * WIDE, WIDE):
+        factor, w, ds = blocks * W_FACTOR + at, blocks * W + at, blocks * DS + at
+        damped_row(work, factor, factor, blocks * EXPM1_Q + at)
+        v2_row(work, w, factor, blocks * NODES + at, h)
+        load_row(work, blocks * LOAD + at, ds, blocks * N0 + at, blocks * KAPPA + at, w)
+        load_size_row(work, blocks * MEAN + at, ds, blocks * N0 + at, blocks * KAPPA + at, w)
+
+
+@Inner
+def are_rows_resolved(blocks, h, work):  # type: ignore[no-untyped-def]
+    """Return whether the rows W_FACTOR, FORCE, Q_RATE and DS are resolved, and the largest ratio of their middle
+    coefficients to their sizes.
+    """
+    resolved, worst, resistance = True, 0.0, size_of_row(blocks, work, Q_RATE)
+    for row in (W_FACTOR, FORCE, Q_RATE, DS):
+        size = size_of_row(blocks, work, row)
+        if row == FORCE:
+            size = max(size, resistance * extent_of_row(blocks, work, W)[1])
+        if row == Q_RATE:
+            size = max(size, 1.0 / h)
+        tail, middle, fine = examine_row(blocks, work, row, size)
+        if not (tail < inf and middle < inf):
+            return False, inf
+        if not fine and size > 0.0:
+            resolved, worst = False, max(worst, middle / size)
+    return resolved, worst
+
+
+@Inner
+def is_load_resolved(blocks, contact_sign, work):  # type: ignore[no-untyped-def]
+    """Return whether N is resolved as far as its changes of sign require, and the ratio of its middle coefficients
+    (`resolution.is_load_resolved`).
+    """
+    size = extent_of_row(blocks, work, MEAN)[1]
+    tail, middle, fine = examine_row(blocks, work, LOAD, size)
+    if not (tail < inf and middle < inf):
+        return False, inf
+    if not fine and tail <= FAR_FROM_ZERO_RATIO * size:
+        limit = 4.0 * FAR_FROM_ZERO_RATIO * size
+        fine = tail <= ONE_SIGN_RATIO * size or keeps_sign(blocks, work, LOAD, contact_sign, limit)
+    return fine, middle / size
+
+
+@Inner
+def has_no_kink(blocks, work):  # type: ignore[no-untyped-def]
+    """Return whether the curvature is proved to have one sign on the whole leg, and the ratio of its middle
+    coefficients to its size where it is not resolved, else 1.
+    """
+    for at in range(0, blocks * WIDE, WIDE):
+        product(work, blocks * LOAD + at, blocks * DS + at, blocks * KAPPA + at)
+    size = size_of_row(blocks, work, LOAD)
+    sign = 1 if work[blocks * LOAD] > 0.0 else -1
+    _tail, middle, fine = examine_row(blocks, work, LOAD, size)
+    if not fine:
+        return False, middle / size
+    return keeps_sign(blocks, work, LOAD, sign, CANCELLATION_NOISE * size), 1.0
+
+
+@Inner
+def fill_times(blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the row TIME_RATE with f; return whether it is resolved, and the ratio of its middle coefficients."""
+    for at in range(0, blocks * WIDE, WIDE):
+        whole_time_row(work, blocks * TIME_RATE + at, blocks * DS + at, blocks * W_FACTOR + at, h)
+    size = size_of_row(blocks, work, TIME_RATE)
+    _tail, middle, fine = examine_row(blocks, work, TIME_RATE, size)
+    return fine, middle / size
+
+
+@Inlined
+def blocks_for(ratio, blocks):  # type: ignore[no-untyped-def]
+    """Return the number of blocks that resolve a function whose middle coefficients have this ratio to its size with
+    fewer ``blocks``; 0 if there is no such number, as for the ratio 1.
+    """
+    if not 0.0 < ratio < 1.0:
+        return 0
+    nodes = MIDDLE_DEGREES[blocks - 1] * log(TAIL_RATIO) / log(ratio)
+    needed = max(int(nodes / (ENOUGH_NODES * WIDE)) + 1, blocks + 1)
+    return needed if needed <= MAX_BLOCKS else 0

@@ -1,0 +1,74 @@
+"""Proofs that the orbits of a sweep share find each turning point, and none that is not there."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from generated import parabola_rolling
+
+ULPS = 4.0
+ROLLING = {"a": 1.0, "beta": 0.4, "rho": 0.05, "g": 9.81, "m": 1.0}
+
+
+def _half_period(amplitude: float) -> mpf:
+    """Return the half period of the ball in the parabolic bowl from the integral of ds/V."""
+    with mp.workdps(30):
+        h, rho, g, inertia = mpf(amplitude), mpf(0.05), mpf(9.81), 1 + mpf(0.4)
+
+        def height(x: mpf) -> mpf:
+            return x**2 + rho / mp.sqrt(1 + 4 * x**2)
+
+        def rate(phi: mpf) -> mpf:
+            x = h * mp.sin(phi)
+            root = mp.sqrt(1 + 4 * x**2)
+            v2 = 2 * g * (height(h) - height(x)) / inertia
+            return (root - 2 * rho / root**2) * h * mp.cos(phi) / mp.sqrt(v2)
+
+        return 2 * mp.quad(rate, [0, 0.8, mp.pi / 2], method="gauss-legendre")
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 0.24999, 0.25, 0.9, 3.0])
+def test_half_periods_in_a_proved_well(amplitude: float) -> None:
+    """Half periods on both sides of the distances at which proofs end are those of the integral."""
+    got = parabola_rolling.sweep("half_period", [amplitude, -amplitude], **ROLLING)
+    truth = _half_period(amplitude)
+    assert got.route_counts() == {"batch": 2}
+    for value in got.values:
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_a_launch_alone_has_the_same_bits() -> None:
+    """Neither other launches nor their number change an answer; nor do parameters that are arrays, but for rounding."""
+    rng = np.random.default_rng(8)
+    lam0, v0 = rng.uniform(-2, 2, 300), np.where(rng.random(300) < 0.5, 0.0, rng.uniform(0, 3, 300))
+    for quantity in ("half_period", "turning_points"):
+        together = parabola_rolling.sweep(quantity, lam0, v0, **ROLLING)
+        alone = [parabola_rolling.sweep(quantity, [x], [v], **ROLLING).values[0] for x, v in zip(lam0, v0, strict=True)]
+        assert np.array_equal(together.values, alone)
+        singly = parabola_rolling.sweep(quantity, lam0, v0, **{**ROLLING, "rho": np.full(300, 0.05)})
+        assert singly.values == pytest.approx(together.values, rel=5e-16, abs=0.0)
+
+
+def _height(x: Any) -> Any:
+    """Return the height of the bowl with dents."""
+    return x**2 / 2 + np.cos(6 * x) / 6
+
+
+def test_orbits_stay_in_their_dents(tmp_path: Path) -> None:
+    """In a bowl with dents, bodies released at rest turn at the next place of the same height, found by a search on a
+    fine grid.
+    """
+    curve = gqm.Curve.graph("x**2/2 + cos(6*x)/6", parameter="x")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="dented_bowl", folder=tmp_path)
+    lam0 = np.concatenate([np.random.default_rng(4).uniform(0.01, 3.0, 200), [0.5, 1.0, 2.0]])
+    got = module.sweep("turning_points", lam0)
+    for (low, high), start in zip(got.values.tolist(), lam0.tolist(), strict=True):
+        way = -np.sign(start - np.sin(6 * start))
+        places = start + way * np.linspace(1e-3, 7.0, 70_000)
+        turn = places[np.argmax(_height(places) > _height(start))]
+        assert (low if way < 0 else high) == pytest.approx(turn, abs=2e-4)
+        assert (high if way < 0 else low) == pytest.approx(start, rel=1e-15)

@@ -1,0 +1,106 @@
+"""The smallest and largest contact force on orbits in space, where the force has a length and no sign."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+Build = Callable[..., ModuleType]
+
+# A wire that winds about the level x axis. Its rise per radian is a run-time parameter.
+WIRE = gqm.Curve.space(x="a*t", y="sin(t)", z="-cos(t)", parameter="t", parameters={"a": None})
+
+
+def extremes_of_wire(a: float, start: float, g: float) -> tuple[Any, Any]:
+    """Return the smallest and the largest contact force per mass on the wire, from rest, with forty digits.
+
+    With s' = sqrt(1 + a**2), the square of the force is a quadratic function of c = cos(t): the curvature is 1/s'**2,
+    dz/ds = sin(t)/s', d2z/ds2 = c/s'**2, and V**2 = 2 g (c - cos(start)).
+    """
+    with mp.workdps(40):
+        s2, low, g = 1 + mpf(a) ** 2, mp.cos(mpf(start)), mpf(g)
+
+        def square(c: Any) -> Any:
+            v2 = 2 * g * (c - low)
+            return (v2 / s2) ** 2 + 2 * g * c / s2 * v2 + g**2 * (1 - (1 - c * c) / s2)
+
+        second = (square(mpf(1)) + square(mpf(-1))) / 2 - square(mpf(0))
+        vertex = -(square(mpf(1)) - square(mpf(-1))) / (4 * second)
+        places = [low, mpf(1)] + [vertex] * (low < vertex < 1)
+        values = [mp.sqrt(square(c)) for c in places]
+        return min(values), max(values)
+
+
+def test_on_a_wire_about_a_level_axis(build: Build) -> None:
+    """Both extremes are exact to a few roundings of the largest force, also where the force almost vanishes."""
+    module = build("level_wire_extremes", WIRE, gqm.Potential("0"))
+    rng = np.random.default_rng(5)
+    a, start = rng.uniform(0.05, 3.0, 300), rng.uniform(0.05, 3.0, 300)
+    found = [module.sweep(f"normal_force_{end}", start, 0.0, a=a) for end in ("min", "max")]
+    assert all((sweep.status == 0).all() and (sweep.route < 2).all() for sweep in found)
+    for k in range(a.size):
+        least, largest = extremes_of_wire(float(a[k]), float(start[k]), 9.81)
+        assert abs(found[0].values[k] - least) <= 4e-15 * largest
+        assert abs(found[1].values[k] - largest) <= 4e-15 * largest
+
+
+@pytest.mark.parametrize(
+    ("name", "curve", "force", "low", "high"),
+    [
+        ("turned_wire", WIRE, gqm.RotatingFrame(), 0.2, 2.0),
+        (
+            "knotted",
+            gqm.Curve.space(
+                x="(2+cos(3*t))*cos(2*t)",
+                y="(2+cos(3*t))*sin(2*t)",
+                z="sin(3*t)+sin(t)/5",
+                parameter="t",
+                period="2*pi",
+            ),
+            gqm.Potential("0"),
+            -0.45,
+            -0.2,
+        ),
+        (
+            "surveyed",
+            gqm.Curve.sampled([[u, 0.3 * np.sin(u), 0.5 * u * u] for u in np.linspace(-2.0, 2.0, 41).tolist()]),
+            gqm.Potential("0"),
+            3.3,
+            4.6,
+        ),
+        (
+            "half_pipe_in_space",
+            gqm.Curve.piecewise(
+                [
+                    gqm.transition(length="1"),
+                    gqm.transition(length="4", yaw="0.1", pitch="pi/8"),
+                    gqm.transition(length="4", yaw="-0.1", pitch="pi/8"),
+                    gqm.transition(length="1"),
+                ],
+                start=("0", "0", "4"),
+                heading=("0", "-pi/2"),
+            ),
+            gqm.Potential("0"),
+            0.5,
+            2.5,
+        ),
+    ],
+)
+def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low: float, high: float) -> None:
+    """The extremes are those of solved motions, which are searched on the panels of each motion."""
+    module = build(f"{name}_extremes", curve, force)
+    given = {"a": 0.4, "Omega": 0.7} if name == "turned_wire" else {}
+    for v0 in (0.0, 0.8):
+        places = np.random.default_rng(3).uniform(low, high, 12)
+        for quantity in ("normal_force_min", "normal_force_max"):
+            sweep = module.sweep(quantity, places, v0, **given)
+            assert (sweep.route < 2).all()
+            for place, value in zip(places.tolist(), sweep.values.tolist(), strict=True):
+                motion = module.solve(place, v0, 1, **given)
+                largest = motion.normal_force_max.value
+                assert abs(value - getattr(motion, quantity).value) <= 2e-13 * largest
