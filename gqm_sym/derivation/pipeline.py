@@ -148,9 +148,12 @@ def derive(
     dxds, dyds, dzds = shape.tangent
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
-    axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
+    axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam, curve.domain)
+    orbits = symmetric_orbits(2 * potential, shape.ds, lam, axes)
     if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
         axes = replace(axes, monotone=False)
+        if orbits and shape.ds.has(lam):
+            orbits = replace(orbits, turning_point=None)
     start = {lam: LAM0}
     model = Model(
         curve=curve,
@@ -176,7 +179,7 @@ def derive(
         effective_potential=potential,
         effective_potential_slope=slope,
         symmetry=axes,
-        symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
+        symmetric_orbits=orbits,
         static_normal_load=law.static_normal_load,
         normal=shape.normal,
         bend=shape.bend,
