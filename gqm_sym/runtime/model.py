@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.problem import bind, bind_all
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.rider import rider_loads
 from gqm_sym.runtime.launch.speed import (
@@ -65,6 +65,14 @@ def _solver(dissipative: bool) -> "Callable[[Formulas, ParameterValues, Launch],
     from gqm_sym.runtime.motion.conservative import solve
 
     return solve
+
+
+@cache
+def _checks_of_rolling() -> "tuple[Callable[..., None], Callable[..., None]]":
+    """Return what checks the launch and the end of a body with a radius, imported when needed."""
+    from gqm_sym.runtime.motion.rolling import check_end, check_launch
+
+    return check_launch, check_end
 
 
 class CompiledModel(Formulas):
@@ -231,9 +239,8 @@ class CompiledModel(Formulas):
         solve = _solver(self.dissipation is not None)
         if not self.rolling_radius:
             return solve(self, p, launch)
-        from gqm_sym.runtime.motion.rolling import check_end, check_launch
-
-        check_launch(self, bind(self, p, launch), launch.lam0.value)
+        check_launch, check_end = _checks_of_rolling()
+        check_launch(self, bind_all(self, p), launch.lam0.value)
         motion = solve(self, p, launch)
         if motion.kind not in ("libration", "circulation"):
             check_end(self, motion.legs)

@@ -33,6 +33,7 @@ from gqm_sym.runtime.legs.body import (
     LAM0,
     LAPS,
     LEAST_SIZE,
+    LEAST_SWING,
     MAY_REST,
     ONLY_SIGN,
     PANEL_COUNT,
@@ -94,10 +95,6 @@ MAX_TURNS = 20000
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
 
-# A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
-# doubles.
-LEAST_SWING = 1e-110
-
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
 # The data kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart. The chart is
@@ -129,7 +126,7 @@ class Track(NamedTuple):
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
-        return dissipation.linear and self.breaks.size > 0
+        return dissipation.linear and self.breaks.size > 0 and self.chart.size > 0
 
 
 class Findings(NamedTuple):

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import BudgetError, LaunchError, SolutionError
+from gqm_sym.errors import BudgetError, SolutionError
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Dissipation, ExactLaw
+from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
@@ -19,7 +19,6 @@ from gqm_sym.runtime.legs.advance import CREEPING_SHARE, END_LIFTOFF_AT_ONCE, EN
 from gqm_sym.runtime.legs.answers import (
     END_NEAR_EQUILIBRIUM,
     FIRST_LEGS,
-    LEAST_SWING,
     LEGS,
     MAX_PAUSES,
     MAX_TURNS,
@@ -37,6 +36,7 @@ from gqm_sym.runtime.legs.body import (
     LAM0,
     LAPS,
     LEAST_SIZE,
+    LEAST_SWING,
     LOW,
     MAY_REST,
     PANEL_COUNT,
@@ -53,8 +53,8 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
     launched,
 )
-from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
+from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
 from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import (
@@ -79,20 +79,12 @@ MAX_STORED = 250_000
 # are needed.
 FEW_PANELS, LEGS_PER_CALL = 12, 8
 
-# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
-# `LEAST_SWING`.
-LAST_DIGIT = ULP / 64.0
-
 # The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
 PIECE_SHARE = 2.0**-6
 
 # If a body creeps towards an equilibrium and no panel is narrow enough any more, its distance from the equilibrium is
 # at most this share of its place, or of the length of the leg.
 NEAR_EQUILIBRIUM = 1e-13
-
-# The smallest distance from an unstable equilibrium at which a body may be launched from rest, as a share of its place.
-# It applies if the resistance is not a factor times V**2 but a difference of forces that agree to a rounding.
-NEAREST_SHARE = 1e-20
 
 # Legs approach a cusp to within some 1e-8, where roundings of the place hide the decrease of ds/dlam. There ds is at
 # most this share of its value a thousandth of the first step away.
@@ -111,7 +103,11 @@ END_NAMES = {
     END_ASYMPTOTE: "asymptote",
 }
 
-# Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
+# In a frame with breaks, panels keep away from them by a share of this many times the size of the motion, which is
+# always far below the size of the motion then, and no swing is larger.
+SWINGS_AHEAD = 4.0
+
+# Curves with formulas are smooth.
 SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 
 
@@ -198,6 +194,7 @@ class Driver:
     launch_error: float | None = None
     _last_record: Array = np.empty(0)
     _frame: Frame | None = None
+    _track_in_frame, _reach_in_frame = SMOOTH, 0.0
     _is_launched = False
     # The place of a body that is followed by its distance from an equilibrium.
     _place_in_frame = 0.0
@@ -300,13 +297,17 @@ class Driver:
         if frame is not None:
             frame.move(record, 1)
             self._place_in_frame = float(record[END])
-        heading, leaves_frame = int(record[HEADING]), frame is not None and what == END_LIMIT
-        if leaves_frame:
+        heading, at_limit = int(record[HEADING]), frame is not None and what == END_LIMIT
+        is_inside = abs(self.body[0, PLACE]) < self._reach_in_frame
+        if frame is not None and frame.breaks.size and is_inside:
+            self._limit_frame(frame)
+            self.body[0, ENDING] = 0.0 if at_limit else self.body[0, ENDING]
+        elif at_limit:
             self._leave_frame(record)
         self._decide_at_equilibrium(what, float(record[START]), float(record[END]))
         if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
-        name = "" if leaves_frame else self._end_name(what, record, heading)
+        name = "" if at_limit else self._end_name(what, record, heading)
         if name == "cusp" and what == END_TOO_NARROW:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
         # At a cusp dW/dlam vanishes, so that its rounding error is large compared with it there too.
@@ -336,7 +337,7 @@ class Driver:
             if frame is None:
                 what = drive_along(track, dissipation, parameters, question, self.body, records)
             else:
-                what = drive_along(SMOOTH, frame.dissipation, frame.p[None], question, self.body, records)
+                what = drive_along(self._track_in_frame, frame.dissipation, frame.p[None], question, self.body, records)
             if what == END_NEAR_EQUILIBRIUM:
                 self._launch_nearby()
                 question = LEGS
@@ -416,44 +417,26 @@ class Driver:
 
         A body does not stay near an unstable equilibrium, so this is done only for a launch there, at ``lam0``.
         """
-        problem, line, loss = self.problem, self.body[0], self.dissipation
-        if not is_small(loss, problem.functions.p, problem.functions.breaks, line):
+        line = self.body[0]
+        entry = entry_near(self.problem, self.dissipation, line, lam0)
+        if entry is None:
             return
-        place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
-        ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
-        reach = min(starting_step(problem), float(ends.min()))
-        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach, float(line[LEAST_SIZE]))
-        if frame is None or not (frame.is_stable or lam0):
-            return
-        if isinstance(problem.formulas.exact, ExactLaw):
-            frame = sharpened(frame, FormulaLaw(problem).at_rest)
-        line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
+        self._frame, self._place_in_frame, self._reach_in_frame = entry.frame, float(line[PLACE]), entry.reach
+        frame = entry.frame
+        self._track_in_frame = Track(NOWHERE, frame.breaks, NOWHERE, NOWHERE)
         self.force_error = 0.0 if frame.is_stable else frame.error / frame.reach
-        unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact
-        if not frame.is_stable and lam0 and isinstance(exact, ExactLaw):
-            known = refined(frame, exact, problem.p, lam0)
-            if known is not None:
-                (frame, line[PLACE]), line[PLACE_LOW], unknown = known, 0.0, 0.0
-        if v2 == 0.0 and abs(line[PLACE]) < unknown:
-            line[PLACE] = 0.0  # the body stays there
-        self._check_distance(frame.size(line[PLACE], v2), frame)
-        reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame, self._place_in_frame = frame, place
-        line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
-        line[FIRST_STEP] = reach
+        line[PLACE], line[PLACE_LOW], line[LAM0] = entry.distance, entry.low, entry.distance
+        line[FIRST_STEP], line[PERIOD] = entry.reach, 0.0
+        self._limit_frame(frame)
 
-    def _check_distance(self, size: float, frame: Frame) -> None:
-        """Refuse a launch so near to an unstable equilibrium that doubles cannot represent the force that drives the
-        body away.
+    def _limit_frame(self, frame: Frame) -> None:
+        """Limit the distance from an equilibrium to which the body is followed; to the size of its motion if there are
+        breaks.
         """
-        place = float(frame.p[PLACE_IN_FRAME])
-        nearest = LEAST_SWING if self.dissipation.linear else NEAREST_SHARE * abs(place)
-        if not frame.is_stable and 0.0 < size < nearest:
-            raise LaunchError(
-                f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
-                f"{place!r} cannot be computed; launch at least {nearest:.1g} from it, faster, or, by exact text, at "
-                "the equilibrium itself"
-            )
+        line, reach = self.body[0], self._reach_in_frame
+        if frame.breaks.size:
+            reach = min(reach, SWINGS_AHEAD * frame.size(float(line[PLACE]), float(line[V2])))
+        line[LOW], line[HIGH] = -reach, reach
 
     def _leave_frame(self, record: Array) -> None:
         """Return to following the body by its place; the record has places."""

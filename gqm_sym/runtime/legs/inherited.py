@@ -112,7 +112,8 @@ class InheritedErrors:
         chart.
         """
         if self._frame is None or self._frame[0] is not frame:
-            self._frame = (frame, *error_of_chart(frame, self._driver.dissipation, self._charts))
+            charts = NO_CHARTS if frame.is_sharp else self._charts
+            self._frame = (frame, *error_of_chart(frame, self._driver.dissipation, charts))
         return self._frame[1:]
 
     def _terms_of(self, leg: int) -> Array:
