@@ -34,7 +34,7 @@ def _read_v2(given: Any) -> sp.Expr:
     return given if isinstance(given, sp.Expr) else read_expression(given, where="v2")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Model:
     """Closed forms in the parameter λ, the launch (``lam0``, ``v0``) and run-time parameters.
 
@@ -306,6 +306,9 @@ class Model:
 
         found: tuple[Equilibrium, ...] = transient(self).equilibria(between=between, **parameters)
         return found
+
+    def __repr__(self) -> str:
+        return f"<{str(self).splitlines()[0]}>"
 
     def __str__(self) -> str:
         """Describe the model in a few lines: its closed forms, and its parameters with their units."""
