@@ -268,8 +268,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             put(out[k + 1], start, found[k], 0, n, False)
 
 
-@entry(types.void(VECTOR, VECTOR, VECTOR, MATRIX))
-def phases_along(record, p, t, out):  # type: ignore[no-untyped-def]
+@Inner
+def find_phases(record, p, t, out):  # type: ignore[no-untyped-def]
     """Fill rows for times: the phase angle, the velocity, and the sign of the change of the phase angle with time.
 
     The next rows are the number of half periods (or laps) before the phase, the number of periods, and the place within
@@ -291,6 +291,12 @@ def phases_along(record, p, t, out):  # type: ignore[no-untyped-def]
             found = (phases.phi[i], motion[1, i], phases.sense[i], turns, phases.laps[i], motion[0, i])
             for k in range(6):
                 out[k, start + i] = found[k]
+
+
+@entry(types.void(VECTOR, VECTOR, VECTOR, MATRIX))
+def phases_along(record, p, t, out):  # type: ignore[no-untyped-def]
+    """Call `find_phases` from Python."""
+    find_phases(record, p, t, out)
 
 
 @entry(types.void(VECTOR, VECTOR, VECTOR, types.int64, types.int64), nogil=True)

@@ -112,7 +112,7 @@ class Sampler:
         return self._place_record
 
     @property
-    def _record(self) -> Array:
+    def record(self) -> Array:
         """The record for states, which contains more than that for places."""
         return self._make_state_record() if self._state_record is None else self._state_record
 
@@ -159,14 +159,14 @@ class Sampler:
 
     def state(self, t: float) -> tuple[float, ...]:
         """Return the time, and the items of a column of `states`."""
-        row = list(records.state_at_time(self._record, self._problem.functions.p, t))
+        row = list(records.state_at_time(self.record, self._problem.functions.p, t))
         if self._problem.formulas.chart is not None:
             row[2] = row[1]
         return tuple(row)
 
     def states(self, t: Array) -> Array:
         """Return rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
-        record, p, out = self._record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
+        record, p, out = self.record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
         run_in_threads(
             lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, MIN_STATES_PER_THREAD
         )
@@ -177,7 +177,7 @@ class Sampler:
     def phases(self, t: Array) -> Array:
         """Return the rows of `records.phases_along` at times."""
         out = np.empty((PHASE_ROWS, t.size))
-        records.phases_along(self._record, self._problem.functions.p, t, out)
+        records.phases_along(self.record, self._problem.functions.p, t, out)
         return out
 
 
