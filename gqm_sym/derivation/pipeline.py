@@ -179,7 +179,7 @@ def derive(
         symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
         static_normal_load=law.static_normal_load,
         normal=shape.normal,
-        bend=shape.bend,
+        curvature_binormal=shape.curvature_binormal,
         loads=law.loads,
         coriolis=law.coriolis,
         dissipation=loss,

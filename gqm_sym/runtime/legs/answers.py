@@ -116,14 +116,14 @@ class Track(NamedTuple):
     ----------
     chart : array
         The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
-    breaks, corners, drops : arrays
+    breaks, corners, liftoff_corners : arrays
         As in `legs.advance.Joints`.
     """
 
     chart: Array
     breaks: Array
     corners: Array
-    drops: Array
+    liftoff_corners: Array
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
@@ -319,8 +319,8 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     int
         The code for the last leg of the last body (`advance`), or END_NEAR_EQUILIBRIUM.
     """
-    breaks, corners, drops, ahead, gaps = joints
-    joints = Joints(borrowed(breaks), borrowed(corners), borrowed(drops), borrowed(ahead), borrowed(gaps))
+    breaks, corners, liftoff_corners, ahead, gaps = joints
+    joints = Joints(borrowed(breaks), borrowed(corners), borrowed(liftoff_corners), borrowed(ahead), borrowed(gaps))
     parameters, bodies, records, what = borrowed(parameters), borrowed(bodies), borrowed(records), END_REST
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
