@@ -182,7 +182,7 @@ def derive(
         symmetric_orbits=orbits,
         static_normal_load=law.static_normal_load,
         normal=shape.normal,
-        bend=shape.bend,
+        curvature_binormal=shape.curvature_binormal,
         loads=law.loads,
         coriolis=law.coriolis,
         dissipation=loss,
