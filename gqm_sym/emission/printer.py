@@ -16,6 +16,9 @@ from gqm_sym.sympy_charts import SPACE_CHARTS, TRAIN_LOADS
 # Every integer up to this is a double.
 MAX_INTEGER = 2**53
 
+# The largest number of digits of integers that are doubles.
+MAX_DIGITS = 308
+
 # The names of SymPy's functions in the standard library.
 FUNCTIONS = {
     "sin": "sin",
@@ -75,6 +78,16 @@ def _has_text(node: Basic) -> bool:
     if node.is_Add or node.is_Mul or node.is_Pow or node in (pi, Exp1()):
         return True
     return type(node).__name__ in {*FUNCTIONS, *CHARTED}
+
+
+def check_size(number: Rational) -> None:
+    """Raise an error if a number is no double, or its numerator or denominator is none: formulas over floats need
+    both.
+    """
+    as_double(number)
+    digits = max(len(str(abs(number.p))), len(str(number.q)))
+    if digits > MAX_DIGITS:
+        raise EmissionError(f"a number of {digits} digits; formulas take numbers of at most {MAX_DIGITS}")
 
 
 def as_double(number: Rational) -> float:
@@ -177,9 +190,11 @@ class ExactPrinter(CodePrinter):
         return str(StrPrinter._print_Mul(self, expr))
 
     def _print_Rational(self, expr: Rational) -> str:
+        check_size(expr)
         return f"op.mpf({expr.p})/{expr.q}"
 
     def _print_Integer(self, expr: Integer) -> str:
+        check_size(expr)
         return str(expr.p)
 
     def _print_Abs(self, expr: Expr) -> str:

@@ -59,6 +59,9 @@ _SI = {
     "J": Unit(kilogram=1, metre=2, second=-2),
 }
 
+# Numerator and denominator of a unit's size in SI units are no larger. Those of all units of physics are far smaller.
+MAX_FACTOR = 10**150
+
 # The space between a number and its unit, in a text such as "30 deg" or "30deg".
 _GAP = re.compile(
     r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])|(?<=[\d.)])(?=[A-Za-z\u00b0\u00b5])(?![eE][+-]?\d)"
@@ -78,6 +81,8 @@ def read_unit(text: str, *, where: str) -> Unit:
     unit = evaluate(parse(text, where=where), _Units(), where=where)
     if not unit.factor:
         raise InputError(f"{where}: {text} is zero, which is not a unit")
+    if max(abs(unit.factor.numerator), unit.factor.denominator) > MAX_FACTOR:
+        raise InputError(f"{where}: must be a unit of ordinary size; numbers of up to 150 digits can be converted")
     return unit
 
 

@@ -5,6 +5,7 @@ Every scalar arrives as text and stays text, so that ``9.81`` keeps meaning 981/
 
 import re
 import sys
+from ast import Constant, walk
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
 
@@ -88,7 +89,20 @@ def split_value(value: object) -> object:
 
 
 def _check_expression(text: str) -> object:
-    return split_unit(text) or parse(text, where="")
+    measured = split_unit(text)
+    tree = parse(text, where="") if measured is None else measured[1]
+    for node in walk(tree):
+        if isinstance(node, Constant) and not _is_double(node.value):
+            raise NumberError(f"column {node.col_offset + 1}: the number must be within the range of doubles")
+    return text
+
+
+def _is_double(number: Any) -> bool:
+    """Return whether a number is neither too large nor too small for a double."""
+    try:
+        return not number or float(number) != 0.0
+    except OverflowError:
+        return False
 
 
 def _in_metres(text: str) -> str:

@@ -14,6 +14,7 @@ import gqm_sym as gqm
 from gqm_sym.derivation import Model
 from gqm_sym.errors import DeclarationError, InputError, NumberError
 from gqm_sym.literals.numbers import read_number, read_numbers
+from gqm_sym.literals.units import read_unit
 from gqm_sym.parameters import Measured, read_value
 
 u = pint.UnitRegistry()
@@ -100,6 +101,13 @@ def test_another_dimension_is_refused(given: object) -> None:
     """The message names the argument, what it must be and what was given."""
     with pytest.raises(NumberError, match=r"t: must be in s .*kilo|t: must be in s .*kg"):
         read_numbers(given, where="t", unit="s")
+
+
+def test_units_of_absurd_size_are_refused() -> None:
+    """A unit may be a number, but not one whose conversion takes more digits than a number may have."""
+    with pytest.raises(InputError, match="must be a unit of ordinary size"):
+        read_unit("9" * 399, where="unit")
+    assert read_unit("1e-100*m", where="unit").factor == Fraction(1, 10**100)
 
 
 def test_where_no_dimension_is_known() -> None:

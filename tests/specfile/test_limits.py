@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 import gqm_sym as gqm
-from gqm_sym.errors import SpecFileError
+from gqm_sym.errors import EmissionError, SpecFileError
 
 HEAD, FORCE = "name: a\n", "kernel: {gravity: {}}\n"
 
@@ -58,6 +58,32 @@ def test_mistakes_inside_a_curve(curve: str, message: str, tmp_path: Path) -> No
         read(tmp_path, f"{HEAD}curve: {curve}\n{FORCE}")
     found = [mistake.removeprefix(f"{tmp_path / 'a.yaml'}:") for mistake in caught.value.mistakes]
     assert any(mistake.startswith(message) for mistake in found), found
+
+
+@pytest.mark.parametrize(
+    ("curve", "place"),
+    [
+        ("{pieces: {start: [0, 1e400], pieces: [{line: {length: 1}}]}}", "2:29: curve.pieces.start.1"),
+        ("{pieces: [{line: {length: 1e400}}]}", "2:34: curve.pieces.0.line.length"),
+        ("{pieces: [{transition: {length: 1, pitch: s - 1e-400*s}}]}", "2:54: curve.pieces.0.transition.pitch"),
+        ("{implicit: {F: x**2 + z**2 - 1, start: [0, 1e400]}}", "2:51: curve.implicit.start.1"),
+        ("{space: {x: cos(t), y: sin(t), z: 0, parameter: t, period: 1e400}}", "2:67: curve.space.period"),
+        ("{points: {file: track.csv, heartline: 1e400 m}}", "2:46: curve.points.heartline"),
+    ],
+)
+def test_numbers_beyond_doubles_in_expressions(curve: str, place: str, tmp_path: Path) -> None:
+    """A number that no double can represent is refused at its place; some of them were internal errors at launch."""
+    with pytest.raises(SpecFileError) as caught:
+        read(tmp_path, f"{HEAD}curve: {curve}\n{FORCE}")
+    found = [mistake.removeprefix(f"{tmp_path / 'a.yaml'}:") for mistake in caught.value.mistakes]
+    assert f"{place}: the number must be within the range of doubles" in found
+
+
+def test_numbers_of_too_many_digits(tmp_path: Path) -> None:
+    """A number within range whose digits are more than formulas take was an internal error at launch."""
+    model = read(tmp_path, f"{HEAD}curve: {{pieces: [{{arc: {{radius: 5.{'3' * 350}, angle: 1}}}}]}}\n{FORCE}")
+    with pytest.raises(EmissionError, match="a number of 351 digits; formulas take numbers of at most 308"):
+        gqm.emit(model, name="a")
 
 
 def test_mistakes_inside_a_launch(tmp_path: Path) -> None:
