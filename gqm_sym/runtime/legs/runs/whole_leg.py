@@ -363,8 +363,9 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and has_space(record, WHOLE_ROWS + 3 * COLUMNS, 0):
         work = whole_buffer()
-        # Panels of a leg with more nodes would take more time than to lay them one by one.
-        most = 1 if route.reading.what == PANELS else MAX_BLOCKS
+        # Panels of a leg with more nodes would take more time than to lay them one by one, as would those up to a place.
+        reads = route.reading.what
+        most = 1 if reads == PANELS else (2 if reads == PASSAGE else MAX_BLOCKS)
         blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, most, work)
         if blocks > 0 and enter_leg(record, route, origin, v, blocks, h, work):
             what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
