@@ -30,7 +30,7 @@ class SpaceOptions(TypedDict, total=False):
     title: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Curve(Declaration):
     """A curve ``(x(λ), z(λ))`` or ``(x(λ), y(λ), z(λ))``, where z is up; one of the constructors below makes it.
 
@@ -93,6 +93,9 @@ class Curve(Declaration):
         whole = replace(self, domain=ends, period=None, banking=None)
         made = Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
         return replace(made, banking=banking)
+
+    def __repr__(self) -> str:
+        return f"<{str(self).splitlines()[0]}>"
 
     def __str__(self) -> str:
         """Describe the curve in a few lines: its form, its range and the units of its parameters."""

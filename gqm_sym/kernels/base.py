@@ -57,7 +57,7 @@ KAPPA = sp.Symbol("κ", real=True)
 """Signed curvature in a resistance. No parameter has this name, because parameters have ASCII names."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Kernel:
     """A force law; ``first + second`` is the law with both forces (MATHS, section 2).
 
@@ -162,6 +162,9 @@ class Kernel:
             tangential_law=written,
             defaults=read_parameters(parameters, found=found, where="law"),
         )
+
+    def __repr__(self) -> str:
+        return f"<{str(self).splitlines()[0]}: {', '.join(name for name, _ in self.terms)}>"
 
     def __str__(self) -> str:
         """Describe the law in a few lines: every force, and the units of its parameters."""

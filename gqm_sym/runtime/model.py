@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.problem import bind, bind_all
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.rider import rider_loads
 from gqm_sym.runtime.launch.speed import (
@@ -67,6 +67,14 @@ def _solver(dissipative: bool) -> "Callable[[Formulas, ParameterValues, Launch],
     return solve
 
 
+@cache
+def _checks_of_rolling() -> "tuple[Callable[..., None], Callable[..., None]]":
+    """Return what checks the launch and the end of a body with a radius, imported when needed."""
+    from gqm_sym.runtime.motion.rolling import check_end, check_launch
+
+    return check_launch, check_end
+
+
 class CompiledModel(Formulas):
     """The compiled functions and formulas of one generated module, with the computations that use them.
 
@@ -92,7 +100,7 @@ class CompiledModel(Formulas):
 
     def pass1(
         self,
-        request: LaunchRequest,
+        request: tuple[Any, ...],
         parameters: tuple[Any, ...],
         lam: Any,
         out: Any = None,
@@ -102,8 +110,8 @@ class CompiledModel(Formulas):
 
         Parameters
         ----------
-        request : LaunchRequest
-            The launch that determines V**2.
+        request : tuple
+            The launch that determines V**2: the first fields of a `LaunchRequest`.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         lam : number or array_like
@@ -128,7 +136,7 @@ class CompiledModel(Formulas):
         if unknown:
             self.refuse("pass1", unknown)
         p = self.numbers(parameters)
-        launch = read_launch(self, p, request)
+        launch = read_launch(self, p, LaunchRequest(*request))
         if lam is None:
             raise InputError(f"lam: not given; pass one place or many, as values of {self.parameter}")
         f = bind(self, p, launch)
@@ -198,14 +206,14 @@ class CompiledModel(Formulas):
         return beyond
 
     def solve(
-        self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NO_ARGUMENTS
+        self, request: tuple[Any, ...], parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NO_ARGUMENTS
     ) -> "Motion":
         """Compute the motion that begins with a launch.
 
         Parameters
         ----------
-        request : LaunchRequest
-            The launch.
+        request : tuple
+            The launch: the fields of a `LaunchRequest`, which itself takes long to make.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         unknown : mapping, optional
@@ -231,9 +239,8 @@ class CompiledModel(Formulas):
         solve = _solver(self.dissipation is not None)
         if not self.rolling_radius:
             return solve(self, p, launch)
-        from gqm_sym.runtime.motion.rolling import check_end, check_launch
-
-        check_launch(self, bind(self, p, launch), launch.lam0.value)
+        check_launch, check_end = _checks_of_rolling()
+        check_launch(self, bind_all(self, p), launch.lam0.value)
         motion = solve(self, p, launch)
         if motion.kind not in ("libration", "circulation"):
             check_end(self, motion.legs)
@@ -242,7 +249,7 @@ class CompiledModel(Formulas):
     def sweep(
         self,
         quantity: str,
-        launches: LaunchRequest,
+        launches: tuple[Any, ...],
         parameters: tuple[Any, ...],
         *,
         lam: Any,
@@ -256,8 +263,9 @@ class CompiledModel(Formulas):
         ----------
         quantity : str
             One of `gqm_sym.runtime.launch.kinds.QUANTITIES`.
-        launches : LaunchRequest
-            Arrays or numbers, which broadcast against each other and against the parameters.
+        launches : tuple
+            The fields of a `LaunchRequest`: arrays or numbers, which broadcast against each other and against the
+            parameters.
         parameters : tuple
             Arrays or numbers, in the order of the attribute ``parameters``.
         lam : array_like or None
@@ -287,9 +295,9 @@ class CompiledModel(Formulas):
         units = {**self.units, "lam0": own, "lam": own, "v0": "m/s", "t_max": "s"}
         arguments = {
             name: without_unit(value, where=name, unit=units.get(name))
-            for name, value in {**launches._asdict(), "lam": lam, **named}.items()
+            for name, value in {**LaunchRequest(*launches)._asdict(), "lam": lam, **named}.items()
         }
-        launches, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
+        asked, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
         parameters = tuple(arguments[name] for name in self.parameters)
         del arguments["point"]
         from gqm_sym.runtime.sweep.result import with_arguments
@@ -299,7 +307,7 @@ class CompiledModel(Formulas):
 
             if client is not None:
                 raise InputError("gradient: is not available in a sweep on a cluster (client); leave one of them out")
-            swept = sweep_with_gradient(self, quantity, launches, parameters, lam, self.solve, gradient)
+            swept = sweep_with_gradient(self, quantity, asked, parameters, lam, self.solve, gradient)
             return with_arguments(swept, quantity, arguments)
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on
@@ -308,7 +316,7 @@ class CompiledModel(Formulas):
             return with_arguments(sweep_on(client, module, quantity, arguments), quantity, arguments)
         from gqm_sym.runtime.sweep.sweep import sweep
 
-        return with_arguments(sweep(self, quantity, launches, parameters, lam, self.solve), quantity, arguments)
+        return with_arguments(sweep(self, quantity, asked, parameters, lam, self.solve), quantity, arguments)
 
     def equilibria(
         self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NO_ARGUMENTS

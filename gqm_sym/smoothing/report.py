@@ -10,7 +10,7 @@ from gqm_sym.smoothing.splines import Array
 STANDARD_GRAVITY = 9.80665
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Smoothing:
     """The changes that smoothing made to surveyed points, and the accuracy of the track; lengths in metres.
 
@@ -82,4 +82,10 @@ class Smoothing:
                 f"  curvature error  {np.median(self.curvature_error):.2g} 1/m median, "
                 f"{self.curvature_error.max():.2g} 1/m at most",
             )
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"<smoothing of {len(self.points)} points: standard deviation {self.standard_deviation:.3g} m, "
+            f"largest shift {self.largest_shift:.3g} m>"
         )

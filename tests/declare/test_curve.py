@@ -164,3 +164,12 @@ def test_names_that_are_listed() -> None:
     for name in dir(gqm):
         assert getattr(gqm, name) is not None
     assert {"circle", "ellipse", "cycloid"} <= set(dir(gqm.families))
+
+
+def test_objects_are_displayed_in_one_line():
+    """Curves, laws and models are shown by what they are, however many points or terms they have."""
+    points = [[u / 100.0, (u / 100.0) ** 2] for u in range(500)]
+    track, law = gqm.Curve.sampled(points), gqm.Gravity() + gqm.CoulombFriction()
+    assert repr(track) == "<Curve: a quintic spline through 500 points, open, in arc length s [m]>"
+    assert repr(law) == "<Force law, dissipative: gravity, coulomb>"
+    assert repr(gqm.derive(track, gqm.Gravity())).startswith("<Model: sampled curve, gravity")

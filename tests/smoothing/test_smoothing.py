@@ -331,6 +331,8 @@ def test_what_is_reported() -> None:
     found = charted(curve).points(report.s)[3]
     assert np.abs(found - report.curvature).max() < 0.01 * report.curvature_error.max()
     assert "200 points, smoothed (given 0.01 m)" in str(report)
+    shown = f"standard deviation {report.standard_deviation:.3g} m, largest shift {report.largest_shift:.3g} m"
+    assert repr(report) == f"<smoothing of 200 points: {shown}>"
     other = pickle.loads(pickle.dumps(curve))
     assert other == curve
     assert other.smoothing.rms == report.rms

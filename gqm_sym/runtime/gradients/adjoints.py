@@ -5,11 +5,24 @@ passes its adjoint, times its partial derivatives, to its operands. So all first
 a few times as many operations as the formula itself, however many they are.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+
+
+class RecorderOfMore(Recorder, ABC):
+    """A tape with operations that `Recorder` does not have."""
+
+    @abstractmethod
+    def is_other(self, register: int) -> bool:
+        """Return whether a register is filled by one of these operations."""
+
+    @abstractmethod
+    def other_partials(self, register: int) -> Iterator[tuple[int, TapeNumber]]:
+        """Yield the operands of such an operation, each with the result's partial derivative by it."""
 
 
 def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> list[TapeNumber]:
@@ -30,7 +43,7 @@ def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> lis
         adjoints[result.register] = op.number(1)
     for k in range(result.register, -1, -1):
         if k in adjoints:
-            for operand, partial in _partials(op, k):
+            for operand, partial in partials(op, k):
                 part = _times(adjoints[k], partial)
                 adjoints[operand] = adjoints[operand] + part if operand in adjoints else part
     return [adjoints.get(variable.register, op.number(0)) for variable in variables]
@@ -43,10 +56,13 @@ def _times(a: TapeNumber, b: TapeNumber) -> TapeNumber:
     return a if b.known == 1 else a * b
 
 
-def _partials(op: Recorder, k: int) -> Iterator[tuple[int, TapeNumber]]:
+def partials(op: Recorder, k: int) -> Iterator[tuple[int, TapeNumber]]:
     """Yield the operands of an entry of a tape, as registers, each with the entry's partial derivative by it."""
     code, *operands = op.entries[k]
     if code in ("parameter", "place", "constant"):
+        return
+    if isinstance(op, RecorderOfMore) and op.is_other(k):
+        yield from op.other_partials(k)
         return
     out, (a, *others) = op.at(k), (op.at(operand) for operand in operands)
     if code == "cosine":

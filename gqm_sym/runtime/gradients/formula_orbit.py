@@ -32,6 +32,7 @@ from gqm_sym.runtime.gradients.programs import (
     circulation_program,
     extreme_program,
     libration_program,
+    path_program,
     turning_point_program,
 )
 from gqm_sym.runtime.gradients.second_programs import circulation_seconds, libration_seconds, turning_point_seconds
@@ -237,6 +238,11 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         rise = 0.5 * self.width * np.sin(2.0 * np.pi * (np.arange(count) + 0.5) / count)
         others = np.zeros((n - self.source.parameters, count))
         return Series(np.vstack([rates, rise * arcs, others])), np.zeros(n)
+
+    @property
+    def path_program(self) -> Program:
+        """The program of the path."""
+        return path_program(self.source.formulas, self.source.parameters, self.source.mass)
 
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` at places."""

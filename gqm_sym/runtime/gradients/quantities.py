@@ -1,6 +1,7 @@
 """Gradients of single numbers of a periodic motion: its period, its turning points, its extremes, its action."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 from math import isfinite
 from typing import Any
 
@@ -29,12 +30,22 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
     InputError
         If a name is neither a run-time parameter nor ``lam0`` or ``v0``.
     """
+    is_plain = wrt is None or type(wrt) is str or (type(wrt) is tuple and all(type(name) is str for name in wrt))
+    return dict((_known_rows if is_plain else _rows)(tuple(parameters), wrt))
+
+
+def _rows(parameters: tuple[str, ...], wrt: Any) -> dict[str, int]:
+    """Return what `selected` does."""
     rows = {name: row for row, name in enumerate((*parameters, "lam0", "v0"))}
     wanted = ("lam0", "v0", *parameters) if wrt is None else names(wrt, where="wrt")
     for name in wanted:
         if name not in rows:
             raise InputError(unknown_argument("wrt", name, rows, what="parameter"))
     return {name: rows[name] for name in wanted}
+
+
+# Plain names occur again and again.
+_known_rows = lru_cache(maxsize=256)(_rows)
 
 
 def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, Any]:

@@ -12,11 +12,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, REAL, Array
-from gqm_sym.runtime.gradients.evaluation import CUBE
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.threads import run_in_threads
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.double_double.interpreter import BLOCK as LANES
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.gradients.evaluation import CUBE, PROGRAM
+from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed, path_changes
+from gqm_sym.runtime.gradients.series import Series, add_series, fill_waves
+from gqm_sym.runtime.inversion.records import find_phases
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
@@ -32,6 +38,9 @@ DURATION, LAUNCH_DELAY, LAUNCH_ARC, LAP_ARC, LAP, LOWER, UPPER, WIDENING, CONSTA
 
 # The number of points that are evaluated together; for more of them the system would provide memory anew each time.
 BLOCK = 2048
+
+# The number of times from which on a thread is worth starting.
+MIN_TIMES_PER_THREAD = 2048
 
 # The rows of changes of states.
 LAM, S, X, V, N, Y, STATE_ROWS = 0, 1, 2, 4, 5, 6, 7
@@ -61,8 +70,8 @@ class Sensitivity(NamedTuple):
     y: Array
 
 
-@entry(types.void(MATRIX, MATRIX, CUBE, CUBE, REAL, CUBE), checked=False)
-def fill_changes(points, orbit, series, path, scale, found):  # type: ignore[no-untyped-def]
+@Inner
+def find_changes(points, orbit, series, path, scale, found):  # type: ignore[no-untyped-def]
     """Fill the changes of states at fixed times.
 
     Parameters
@@ -106,6 +115,75 @@ def fill_changes(points, orbit, series, path, scale, found):  # type: ignore[no-
     path_changes(path, points[SPEED], found[LAM], found[X:STATE_ROWS])
 
 
+@entry(types.void(MATRIX, MATRIX, CUBE, CUBE, REAL, CUBE), checked=False)
+def fill_changes(points, orbit, series, path, scale, found):  # type: ignore[no-untyped-def]
+    """Call `find_changes` from Python."""
+    find_changes(points, orbit, series, path, scale, found)
+
+
+@entry(
+    types.void(
+        *(types.UniTuple(VECTOR, 3), types.Tuple((PROGRAM, VECTOR, MATRIX, types.int64[:, ::1]))),
+        *(types.Tuple((MATRIX, CUBE, REAL)), CUBE),
+    ),
+    checked=False,
+    nogil=True,
+)
+def fill_sensitivities(motion, along, orbit, found):  # type: ignore[no-untyped-def]
+    """Fill the changes of states at times along a curve with formulas, with respect to some variables.
+
+    Parameters
+    ----------
+    motion : tuple of arrays
+        The record, the run-time parameters and the times, as for `records.find_phases`.
+    along : tuple
+        The program of the path (`programs.path_program`), its work space, its inputs, and an array of the registers of
+        each quantity of the path, its changes with each variable, and that with the place; these are negative where a
+        variable does not change the path.
+    orbit : tuple
+        The constants of the orbit for these variables, the factors of the series, and the scale of the phase.
+    found : (STATE_ROWS, variables, n) array
+        The changes of lam, s, x, z, v, N and y, which are filled.
+    """
+    (record, p, t), (program, work, inputs, outputs) = motion, along
+    (constants, table, scale), (kinds, width) = orbit, outputs.shape
+    address, operations, first, count, _ = program
+    size = min(LANES, t.size)
+    for k in range(count):
+        for i in range(size):
+            for part in range(3):
+                work[k * ROW + part * LANES + i] = inputs[part, k]
+    call_interpreter(address, operations, 0, first, work, size)
+    variables, functions, terms = found.shape[1], table.shape[1], table.shape[2]
+    rows = POINT_ROWS + terms + 2 * functions + kinds * width + STATE_ROWS * variables + 1
+    space, shares = np.empty(rows * size), np.empty(size)
+    for start in range(0, t.size, LANES):
+        n = min(LANES, t.size - start)
+        ends = POINT_ROWS * n, (POINT_ROWS + terms) * n, (POINT_ROWS + terms + 2 * functions) * n
+        points, waves = space[: ends[0]].reshape(POINT_ROWS, n), space[ends[0] : ends[1]].reshape(terms, n)
+        series = space[ends[1] : ends[2]].reshape(2, functions, n)
+        path = space[ends[2] : ends[2] + kinds * width * n].reshape(kinds, width, n)
+        changes = space[ends[2] + kinds * width * n :][: STATE_ROWS * variables * n].reshape(STATE_ROWS, variables, n)
+        find_phases(record, p, t[start : start + n], points)
+        for i in range(n):
+            shares[i] = points[PHASE, i] / scale
+            at = count * ROW + i
+            work[at], work[at + LOW], work[at + ERROR] = points[PLACE, i], 0.0, 0.0
+        fill_waves(shares[:n], waves)
+        add_series(table, waves, series)
+        call_interpreter(address, operations, first, operations.shape[0], work, n)
+        for k in range(kinds):
+            for j in range(width):
+                at = outputs[k, j]
+                for i in range(n):
+                    path[k, j, i] = work[at + i] if at >= 0 else 0.0
+        find_changes(points, constants, series, path, scale, changes)
+        for j in range(variables):
+            for i in range(n):
+                changes[LAM, j, i] += points[LAPS, i] * constants[LAP, j]
+        found[:, :, start : start + n] = changes
+
+
 def points_of(found: Any, lam: Array, v: Array) -> Array:
     """Return points on an orbit in the form that `fill_changes` takes.
 
@@ -144,6 +222,7 @@ class OrbitSensitivity:
         self._scale, self._width = 1.0 if derivatives.direction else 2.0 * np.pi, derivatives.width
         self._series, self._lap = derivatives.series
         self._orbits: dict[float, Array] = {}
+        self._chosen: dict[tuple[float, tuple[int, ...]], tuple[Any, Any]] = {}
 
     def _orbit(self, motion: Any, phi: float) -> Array:
         """Return the constants of the orbit; the launch's phase angle gains digits once the period is known exactly."""
@@ -203,6 +282,46 @@ class OrbitSensitivity:
             passed = ds / v0 * (moves - at_launch[LAM])
         delay: Array = direction * (passed + times)
         return delay
+
+    def at_times(self, motion: Any, record: Array, t: Array, phi: float, rows: tuple[int, ...]) -> Array:
+        """Return what `at` does, for times in a record of a motion along a curve with formulas."""
+        if (phi, rows) not in self._chosen:
+            self._chosen[phi, rows] = self._choose(motion, phi, rows)
+        (program, registers, *inputs), orbit = self._chosen[phi, rows]
+        found, p = np.empty((STATE_ROWS, len(rows), t.size)), motion.problem.functions.p
+
+        if t.size < 2 * MIN_TIMES_PER_THREAD:
+            fill_sensitivities((record, p, t), (program, registers, *inputs), orbit, found)
+            return found
+
+        def work(part: slice) -> None:
+            out = np.empty((STATE_ROWS, len(rows), part.stop - part.start))
+            fill_sensitivities((record, p, t[part]), (program, registers.copy(), *inputs), orbit, out)
+            found[:, :, part] = out
+
+        run_in_threads(work, t.size, MIN_TIMES_PER_THREAD)
+        return found
+
+    def _choose(self, motion: Any, phi: float, rows: tuple[int, ...]) -> tuple[Any, Any]:
+        """Return the arguments of `fill_sensitivities` for some of the variables."""
+        derivatives, series = self._derivatives, self._series
+        assert isinstance(derivatives, FormulaOrbitDerivatives)
+        assert isinstance(series, Series)
+        variables, count, program = (
+            derivatives.source.variables,
+            derivatives.source.parameters,
+            derivatives.path_program,
+        )
+        of_path = program.outputs.reshape(-1, count + 2)
+        outputs = np.full((len(of_path), len(rows) + 2), -1, dtype=np.int64)
+        outputs[:, 0], outputs[:, -1] = of_path[:, 0], of_path[:, -1]
+        for j, row in enumerate(rows):
+            if row < count:
+                outputs[:, 1 + j] = of_path[:, 1 + row]
+        functions = [0, *(1 + row for row in rows), *(1 + variables + row for row in rows)]
+        constants = np.ascontiguousarray(self._orbit(motion, phi)[:, list(rows)])
+        along = program.operands, program.work.copy(), derivatives.parameters, outputs
+        return along, (constants, series.of(functions), self._scale)
 
     def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
         """Return the derivatives of lam, s, x, z, v, N and y at times with respect to some of the variables.

@@ -1,5 +1,6 @@
 """The changes along an orbit as a series with its integrals: a Fourier series, or Legendre series on panels."""
 
+from collections.abc import Sequence
 from math import cos, pi, sin
 
 import numpy as np
@@ -7,8 +8,9 @@ from numba import types
 from numpy.polynomial.legendre import legint, legvander
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import VECTOR, Array
+from gqm_sym.runtime.double_double.interpreter import BLOCK
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 from gqm_sym.runtime.gradients.evaluation import CUBE
 
@@ -51,13 +53,16 @@ class Series:
 
     def __call__(self, share: Array) -> Array:
         """Return the values at shares, and the integrals from 0 to these: a row for each function."""
-        waves = np.empty((self._table.shape[2], share.size))
-        fill_waves(share, waves)
-        found: Array = self._table @ waves
+        found = np.empty((*self._table.shape[:2], share.size))
+        fill_series(self._table, share, found)
         return found
 
+    def of(self, functions: Sequence[int]) -> Array:
+        """Return the factors of some of the functions, and of their integrals, as `add_series` takes them."""
+        return np.ascontiguousarray(self._table[:, functions])
 
-@entry(types.void(VECTOR, MATRIX), checked=False)
+
+@Inner
 def fill_waves(shares, waves):  # type: ignore[no-untyped-def]
     """Fill rows of the cosines of multiples of the phase, from the multiple 0 on, of their sines, and of the shares."""
     n, count = shares.size, waves.shape[0] // 2
@@ -71,6 +76,40 @@ def fill_waves(shares, waves):  # type: ignore[no-untyped-def]
                 one, other = k // 2, k - k // 2
                 c, s, more_c, more_s = waves[one, i], waves[count + one, i], waves[other, i], waves[count + other, i]
                 waves[k, i], waves[count + k, i] = c * more_c - s * more_s, s * more_c + c * more_s
+
+
+@Inner
+def add_series(table, waves, found):  # type: ignore[no-untyped-def]
+    """Fill the values and integrals of functions, given the waves at each place."""
+    for part in range(2):
+        for j in range(table.shape[1]):
+            line = found[part, j]
+            line[:] = 0.0
+            for k in range(table.shape[2]):
+                factor, wave = table[part, j, k], waves[k]
+                for i in range(line.size):
+                    line[i] += factor * wave[i]
+
+
+@entry(types.void(CUBE, VECTOR, CUBE), checked=False)
+def fill_series(table, shares, found):  # type: ignore[no-untyped-def]
+    """Fill the values and integrals of functions at shares.
+
+    Parameters
+    ----------
+    table : (2, k, m) array
+        The factors of all cosines, of all sines, and of the share, for the k functions and for their integrals.
+    shares : (n,) array
+        The shares.
+    found : (2, k, n) array
+        Filled with the values, and with the integrals.
+    """
+    for start in range(0, shares.size, BLOCK):
+        some = shares[start : start + BLOCK]
+        waves, part = np.empty((table.shape[2], some.size)), np.empty((2, table.shape[1], some.size))
+        fill_waves(some, waves)
+        add_series(table, waves, part)
+        found[:, :, start : start + some.size] = part
 
 
 class PanelSeries:

@@ -1,7 +1,7 @@
 """Gradients of periods, turning points and extremes of many launches, by compiled loops in threads."""
 
 from math import fabs, inf, nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -17,8 +17,11 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
 from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, begin, evaluate_block, fill_means_of
 from gqm_sym.runtime.gradients.formula_orbit import source_of
+from gqm_sym.runtime.gradients.lanes.evaluation import ANSWERED, OPEN, PASSES, fill_lane_gradients
+from gqm_sym.runtime.gradients.lanes.programs import end_programs, swing_program
 from gqm_sym.runtime.gradients.programs import (
     Program,
+    Source,
     circulation_program,
     extreme_program,
     libration_program,
@@ -43,6 +46,9 @@ NEWTON_STEPS = 2
 LAP_SHARES = np.arange(BLOCK) / BLOCK
 WIDTH_SHARES = np.sin(0.5 * np.pi * np.arange(BLOCK) / (BLOCK - 1)) ** 2
 MAX_STEPS, LAST_STEP = 8, 1e-12
+
+# The largest distance of the middle of an even orbit from its axis of symmetry, as a share of the places.
+EVEN_TOLERANCE = 4.0 * 2.0**-52
 
 # The largest error of a derivative, as a share of it or of the extreme, and the largest difference between the extreme
 # found here and that of the sweep, as a share of the largest value on the grid.
@@ -237,11 +243,14 @@ class Launches(NamedTuple):
         The sign of ds/dt at launch.
     spans : (m, 2) array
         The turning points of each launch; NaN for a circulation.
+    mirrored : (m,) array
+        Whether each orbit is even about an axis of symmetry.
     """
 
     given: Array
     directions: Array
     spans: Array
+    mirrored: NDArray[np.bool_]
 
     @property
     def table(self) -> Array:
@@ -253,6 +262,18 @@ class Launches(NamedTuple):
         """Whether each motion is a circulation."""
         circulates: NDArray[np.bool_] = np.isnan(self.spans[:, 0])
         return circulates
+
+
+def mirrored(formulas: Formulas, parameters: Array, spans: Array) -> NDArray[np.bool_]:
+    """Return which librations are even about an axis of symmetry of the curve and the forces on it."""
+    found = np.zeros(len(spans), dtype=np.bool_)
+    place, step = formulas.axes(ARRAYS, tuple(parameters.T))
+    if place is not None:
+        middle = 0.5 * (spans[:, 0] + spans[:, 1]) - place
+        axis = 0.0 if step is None else step * np.rint(middle / step)
+        rounding = EVEN_TOLERANCE * (np.abs(spans).sum(axis=1) + np.abs(place))
+        found |= np.abs(middle - axis) <= rounding
+    return found
 
 
 def launch_gradients(
@@ -311,10 +332,36 @@ def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, .
 
         run_in_threads(work, which.size, MIN_LAUNCHES_PER_THREAD)
 
-    fill(libration_program(source, rows), LIBRATION, ~circulates)
+    swings = np.flatnonzero(~circulates)
+    found[swings] = in_lanes(source, rows, launches, swings)
+    is_open = np.isnan(found).any(axis=1)
+    fill(libration_program(source, rows), LIBRATION, ~circulates & is_open)
     for direction in (1, -1):
         if (chosen := circulates & (launches.directions == direction)).any():
             fill(circulation_program(source, direction, rows), CIRCULATION, chosen)
+    return found
+
+
+def in_lanes(source: Source, rows: tuple[int, ...], launches: Launches, which: NDArray[np.intp]) -> Array:
+    """Return the derivatives of half periods in double precision, with NaN where that does not suffice."""
+    found, program = np.full((which.size, len(rows)), nan), swing_program(source, rows)
+    if program is None or not rows:
+        return found
+    step, moves = end_programs(source, rows)
+    table, mirrored, waiting = launches.table[which], launches.mirrored[which], np.arange(which.size)
+    for most in PASSES:
+        some, even = table[waiting], mirrored[waiting]
+        out, states = np.empty((waiting.size, len(rows))), np.empty(waiting.size, dtype=np.int8)
+
+        def work(part: slice, most: int = most, given: Any = (some, even, out, states)) -> None:
+            launched, symmetric, answers, kinds = (array[part] for array in given)
+            works = step.work.copy(), moves.work.copy()
+            programs = (step.operands, moves.operands), works, program.operands, program.work.copy()
+            fill_lane_gradients(*programs, (most, PASSES[-1]), launched, symmetric, (answers, kinds))
+
+        run_in_threads(work, waiting.size, MIN_LAUNCHES_PER_THREAD)
+        found[waiting[states == ANSWERED]] = out[states == ANSWERED]
+        waiting = waiting[states == OPEN]
     return found
 
 

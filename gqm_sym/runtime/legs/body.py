@@ -53,6 +53,10 @@ ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = 
 LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
 UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, SIZE = range(34, 38)
 
+# A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
+# doubles.
+LEAST_SWING = 1e-110
+
 
 def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:
     """Return bodies at their launch.

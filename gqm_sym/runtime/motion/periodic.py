@@ -1,6 +1,6 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
-from functools import cached_property, partial
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -20,7 +20,7 @@ from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
-from gqm_sym.runtime.motion.locking import lock_of, locked
+from gqm_sym.runtime.motion.locking import computed_once, lock_of, locked
 from gqm_sym.runtime.motion.periodic_times import PeriodicTimes, Times
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
@@ -57,7 +57,7 @@ class PeriodicMotion(PeriodicTimes):
 
     _sampler: Sampler | None = None
 
-    @cached_property
+    @computed_once
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
         direction = self.direction if self.kind == "circulation" else 0
@@ -84,7 +84,7 @@ class PeriodicMotion(PeriodicTimes):
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
         return ChartOrbitDerivatives(self.problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
-    @cached_property
+    @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:
         return OrbitSensitivity(self._derivatives)
 
@@ -115,6 +115,11 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
+        sampled = self._sampled_times(t) if self.problem.formulas.chart is None else None
+        if sampled is not None:
+            sampler, times, phi, shape = sampled
+            made = self._orbit_sensitivity.at_times(self, sampler.record, times, phi, tuple(rows.values()))
+            return Sensitivity(tuple(rows), *made.reshape(len(made), len(rows), *shape))
         points, phi, shape = self._orbit_points(t)
         found = self._orbit_sensitivity.at(self, points, phi, list(rows.values()))
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
@@ -130,16 +135,26 @@ class PeriodicMotion(PeriodicTimes):
         found = self._orbit_sensitivity.places_at(self, points, phi, ds)
         return found[list(rows.values())].reshape(len(rows), *shape)
 
-    def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
-        """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""
+    def _sampled_times(self, t: Any) -> tuple[Sampler, Array, float, tuple[int, ...]] | None:
+        """Return the sampler for times, these, the phase angle of the launch, and their shape; None if there is no
+        sampler.
+        """
         time = plain_time(t)
         given = plain_times(t) if time is None else (np.array([time]), time, time)
         # The speeds of some segments can be computed from their panels only.
         from_panels = given is None or self._segment.from_multiprecision
         sampler = None if given is None or from_panels else self._sampler_for(*given[1:])
-        if given is not None and sampler is not None:
-            trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
-            return sampler.phases(given[0].reshape(-1)), trajectory.segments[0].phi_start, shape
+        if given is None or sampler is None:
+            return None
+        trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
+        return sampler, given[0].reshape(-1), trajectory.segments[0].phi_start, shape
+
+    def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
+        """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""
+        sampled = self._sampled_times(t)
+        if sampled is not None:
+            sampler, sampled_times, phi, sampled_shape = sampled
+            return sampler.phases(sampled_times), phi, sampled_shape
         times, low, shape = self._times(t)
         found = self._phase_points(times, low)
         points = points_of(found, self._places(found), self._velocities(found))

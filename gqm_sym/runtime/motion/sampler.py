@@ -85,11 +85,8 @@ class Sampler:
         ends = (segment.a, segment.b, problem.lam0, lap)
         self._v0, self._of_states = direction * problem.launch.v0.value, of_states
         own_times = (*segment.total_time, segment.stop, time_scale_error)
-        self._sections = {
-            records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
-            records.WAVE: np.array([*period, *_inverse(period), start, start_low, *ends]),
-            records.TIMING: np.array([*period, start, start_low, *own_times]),
-        }
+        self._timing = (*period, start, start_low, *own_times)
+        self._sections = {records.WAVE: np.array([*period, *_inverse(period), start, start_low, *ends])}
         f = problem.functions
         if not f.between(f.breaks, segment.a, segment.b).size:
             series = fit_wave(segment.edges, *segment.edge_times, segment.panels[3], there_and_back)
@@ -101,8 +98,12 @@ class Sampler:
         self._state_record: Array | None = None
 
     def _tabulate(self) -> None:
-        names = (records.MIDDLES, records.LOWS, records.SCALES, records.POWERS, records.INDEX, records.ENDS)
-        self._sections.update(zip(names, self._segment.table[:6], strict=True))
+        """Add the table, and what it is read with."""
+        segment, names = self._segment, range(records.MIDDLES, records.ENDS + 1)
+        self._sections.update(zip(names, segment.table[:6], strict=True))
+        functions = (*self._problem.functions.addresses, segment.kind)
+        self._sections[records.FUNCTIONS] = np.array(functions, dtype=np.int64)
+        self._sections[records.TIMING] = np.array(self._timing)
 
     @property
     def _record_of_places(self) -> Array:
@@ -112,7 +113,7 @@ class Sampler:
         return self._place_record
 
     @property
-    def _record(self) -> Array:
+    def record(self) -> Array:
         """The record for states, which contains more than that for places."""
         return self._make_state_record() if self._state_record is None else self._state_record
 
@@ -159,14 +160,14 @@ class Sampler:
 
     def state(self, t: float) -> tuple[float, ...]:
         """Return the time, and the items of a column of `states`."""
-        row = list(records.state_at_time(self._record, self._problem.functions.p, t))
+        row = list(records.state_at_time(self.record, self._problem.functions.p, t))
         if self._problem.formulas.chart is not None:
             row[2] = row[1]
         return tuple(row)
 
     def states(self, t: Array) -> Array:
         """Return rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
-        record, p, out = self._record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
+        record, p, out = self.record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
         run_in_threads(
             lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, MIN_STATES_PER_THREAD
         )
@@ -177,7 +178,7 @@ class Sampler:
     def phases(self, t: Array) -> Array:
         """Return the rows of `records.phases_along` at times."""
         out = np.empty((PHASE_ROWS, t.size))
-        records.phases_along(self._record, self._problem.functions.p, t, out)
+        records.phases_along(self.record, self._problem.functions.p, t, out)
         return out
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from gqm_sym.errors import GQMError, InputError
 from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
-from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients
+from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients, mirrored
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.sweep.columns import as_doubles
@@ -58,12 +58,12 @@ def sweep_with_gradient(
     gradient, route = np.full((found.status.size, *shape), nan), found.route.reshape(-1)
     is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
     if quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None:
-        spans, periods = (
-            sweep(formulas, name, launches, parameters, None, solve) for name in ("turning_points", "period")
-        )
+        spans = sweep(formulas, "turning_points", launches, parameters, None, solve)
+        periods = found if quantity in PERIODS else sweep(formulas, "period", launches, parameters, None, solve)
         which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
         table = np.stack(columns[:-1], axis=1)[which]
-        several = Launches(table[:, :-1], table[:, -1], spans.values.reshape(-1, 2)[which])
+        ends = spans.values.reshape(-1, 2)[which]
+        several = Launches(table[:, :-1], table[:, -1], ends, mirrored(formulas, table[:, :-3], ends))
         values = found.values.reshape(found.status.size, *shape[:-1])[which]
         if which.size:
             gradient[which] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))

@@ -183,3 +183,19 @@ def test_places_alone(name: str, launch: dict[str, float]) -> None:
     motion, times = generated(name).solve(**launch), np.linspace(0.0, 2.0, 9)
     wanted = motion.sensitivity(times, ("g", "lam0")).lam
     np.testing.assert_allclose(motion.place_changes(times, ("g", "lam0")), wanted, rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize(("name", "v0"), [("ellipse", 0.0), ("circle", 9.0)])
+def test_one_time_and_many(name: str, v0: float) -> None:
+    """At many times, in one thread or several and in any shape, states change by the same bits as at each time alone;
+    with respect to some names as with respect to all.
+    """
+    motion, times = generated(name).solve(0.7, v0), np.linspace(0.0, 40.0, 5000)
+    everything = motion.sensitivity(times)
+    some = motion.sensitivity(times.reshape(50, 100), ("lam0", "g"))
+    rows = [everything.wrt.index(key) for key in some.wrt]
+    for field in everything._fields[1:]:
+        whole = getattr(everything, field)
+        np.testing.assert_array_equal(getattr(some, field).reshape(2, -1), whole[rows])
+        for k in (0, 1, 1777, 4999):
+            np.testing.assert_array_equal(getattr(motion.sensitivity(times[k]), field), whole[:, k])

@@ -24,6 +24,7 @@ from gqm_sym.runtime.legs.variations.equation import (
     CONTACT_SIGN,
     CUBE,
     MARKS,
+    MOVES,
     OUTWARD,
     PANEL_BEGIN,
     PANEL_HEADING,
@@ -147,6 +148,8 @@ def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends): 
                     origin[Y, i] = 0.0
             origins[2 * k] = origin
             go_ahead(origin, solutions[middle - 1].reshape(rows), n)
+            for i in range(n + 2):
+                origin[SIGMA, i] *= panels[middle - 1, MOVES]
         if record[BACK] > 0.0:
             speed, step = sqrt(v2), 0.0
             if was_ahead:
@@ -210,7 +213,7 @@ def fill_along(laid, series, origins, halves, points, rows, found, states):  # t
             before, wave = wave, 2.0 * x * wave - before
         direction = panel[PANEL_HEADING] * panel[OUTWARD]
         for j in range(n + 2):
-            found[SIGMA, j, i] = origin[SIGMA, j]
+            found[SIGMA, j, i] = origin[SIGMA, j] * panel[MOVES]
             found[Y, j, i] = mixed(origin, sums, n + 2, 1, n, j) if whole else 0.0
             found[DELAY, j, i] = origin[DELAY, j] + direction * mixed(origin, sums, 0, 1, n, j)
             found[ARC, j, i] = origin[ARC, j] + (sums[2 * n + 4 + j] if whole and j < n else 0.0)

@@ -29,11 +29,19 @@ BLOCK = 4096
 
 
 class ChartLaw(Law):
-    """The law along a charted curve."""
+    """The law along a charted curve.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch with its module.
+    shaping : tuple of int, optional
+        The parameters by which the curve's shape is varied; by default all that shape it.
+    """
 
     by_arc_length = True
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, shaping: tuple[int, ...] | None = None) -> None:
         super().__init__(problem)
         formulas = problem.formulas
         maker, chart = formulas.chart, formulas.charted(problem.p)
@@ -41,7 +49,9 @@ class ChartLaw(Law):
         pieces = true_pieces_of(maker, problem.p, chart)
         if not isinstance(formulas.exact, ExactChartLaw) or pieces is None:
             raise without_formulas()
-        self._forces = ChartForces(formulas.exact, self.count, self.mass, shaping_of(formulas))
+        self._forces = ChartForces(
+            formulas.exact, self.count, self.mass, shaping_of(formulas) if shaping is None else shaping
+        )
         self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
         self._launch = problem.launch.lam0
 

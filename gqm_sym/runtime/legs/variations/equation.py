@@ -11,10 +11,16 @@ change of the time per w, ``dt/dw (ds_p/ds + ds_lam sigma/ds - y/(2 W))``, are s
 The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for y = 1 at the origin are found for all
 panels; the change of a leg is a linear combination of them (`chain`).
 
+A body that comes to no turn may slow down on its way to an equilibrium, where the change of the time grows as the speed
+decreases: the place of the body would be a small difference of two large changes. From the panel on which the speed
+decreases, sigma is therefore replaced by the changes of W and of the time at a given *place*, which are ``y - F sigma``
+and ``delay - v sigma ds/V`` (`chain`); the origin does not move any more.
+
 Each run has two *halves*: number 2k is that of run k from its start, 2k + 1 that from its end. Either may have no
 panels. A panel is a row of PANEL_COLUMNS numbers: the march variable at its beginning, its width, the place of the
-origin as two doubles, u, the signs of dlam/dt and of N, and c/2 of the march variable (infinite if that is the
-distance); from SPEEDS on, Y at its nodes.
+origin as two doubles, u, the signs of dlam/dt and of N, c/2 of the march variable (infinite if that is the distance),
+and 1 if sigma moves the origin (0 from the panel on which a body slows down without a turn); from SPEEDS on, Y at its
+nodes.
 
 The solutions on a panel are rows of WIDE numbers, for its nodes and for its end: for each solution the change of the
 time from the origin, then for each solution y/W at the nodes and y at the end, then for each parameter the integral of
@@ -61,7 +67,7 @@ TO_START, TO_END = (-1.0) ** np.arange(COUNT) @ TO_COEFFICIENTS, TO_COEFFICIENTS
 # A panel that begins this near to a break of the curve, as a share of the place, counts as beginning there.
 AT_BREAK = 1e-12
 
-PANEL_BEGIN, PANEL_WIDTH, ORIGIN, ORIGIN_LOW, OUTWARD, PANEL_HEADING, CONTACT_SIGN, PANEL_HALF_C = range(8)
+PANEL_BEGIN, PANEL_WIDTH, ORIGIN, ORIGIN_LOW, OUTWARD, PANEL_HEADING, CONTACT_SIGN, PANEL_HALF_C, MOVES = range(9)
 SPEEDS, PANEL_COLUMNS = WIDE, 2 * WIDE
 
 # The rows of states (`law.states_of`).
@@ -143,6 +149,14 @@ def lay_half(records, at, count, head, panels, k):  # type: ignore[no-untyped-de
 
 
 @Inner
+def fix_places(panels, begin, end):  # type: ignore[no-untyped-def]
+    """Let the origin move no more from the first panel on, after the one at ``begin``, on which the speed decreases."""
+    for k in range(begin + 1, end):
+        slows_down = panels[k - 1, MOVES] == 0.0 or end_speed(panels[k]) < end_speed(panels[k - 1])
+        panels[k, MOVES] = 0.0 if slows_down else 1.0
+
+
+@Inner
 def mark_state(states, at, record, mark, v2, panel):  # type: ignore[no-untyped-def]
     """Fill the state at a place of a record, on the side of a panel."""
     states[PLACE, at], states[PLACE_LOW, at], states[W, at] = record[mark], record[mark + 1], v2
@@ -170,13 +184,15 @@ def lay_panels(records, begins, first, panels):  # type: ignore[no-untyped-def]
         The states at the start of each run, at the end of each, in the middle of each, and at the nodes of all panels.
     """
     runs, head = begins.size, np.zeros(WIDE)
-    first[0] = 0
+    first[0], head[MOVES] = 0, 1.0
     for k in range(runs):
         record = records[begins[k] :]
         ahead, back, v = int(record[AHEAD]), int(record[BACK]), record[HEADING]
         head[ORIGIN], head[ORIGIN_LOW], head[OUTWARD], head[PANEL_HEADING] = record[START], record[START + 1], v, v
         head[PANEL_HALF_C] = record[HALF_C]
         first[2 * k + 1] = lay_half(records, begins[k] + HEAD, ahead, head, panels, first[2 * k])
+        if back == 0:
+            fix_places(panels, first[2 * k], first[2 * k + 1])
         head[ORIGIN], head[ORIGIN_LOW], head[OUTWARD], head[PANEL_HALF_C] = record[END], record[END + 1], -v, 0.0
         back_from = begins[k] + HEAD + ahead * COLUMNS
         first[2 * k + 2] = lay_half(records, back_from, back, head, panels, first[2 * k + 1])
@@ -275,7 +291,8 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
     for row in range(n + 2):
         # A row for each parameter, for sigma, and for the solution that begins with y = 1, which has no source.
         force, strain = (n + 5 + row, 2 + row) if row < n else (n + 3, 1)
-        if row <= n:
+        has_source = row < n or (row == n and panel[MOVES] > 0.0)
+        if has_source:
             for j in range(COUNT):
                 work[source + j] = law[force, at + j] / work[factor + j]
             integrate(panel, work, source, work, gained)
@@ -287,7 +304,7 @@ def solve_panel(panel, law, at, parameters, start, before, arcs, out):  # type: 
             share = y / (panel[SPEEDS + j] * work[growth + j]) ** 2
             # No solution begins with y = 1 where V**2 is 0.
             out[shares + j] = share if by_distance or row <= n else 0.0
-            strain_share = law[strain, at + j] / law[0, at + j] if row <= n else 0.0
+            strain_share = law[strain, at + j] / law[0, at + j] if has_source else 0.0
             work[rate + j] = twice * law[0, at + j] / panel[SPEEDS + j] * (strain_share - 0.5 * out[shares + j])
         start[row] = work[factor + COUNT] * (work[gained + COUNT] + start[row])
         out[shares + COUNT] = start[row]
@@ -316,7 +333,11 @@ def solve_panels(panels, first, law, parameters, breaks, solutions):  # type: ig
         start[:], before[:], arcs[:] = 0.0, 0.0, 0.0
         start[n + 1] = 1.0
         for k in range(first[half], first[half + 1]):
-            if k > first[half]:
+            if k > first[half] and panels[k, MOVES] > 0.0:
                 start[n] += jump(panels, forces, breaks, k - 1, k, TO_START)
+            elif k > first[half] and panels[k - 1, MOVES] > 0.0:
+                start[n] -= value_at_end(TO_END, forces, (k - 1) * COUNT)
+                ds = value_at_end(TO_END, law[0, states:], (k - 1) * COUNT)
+                before[n] -= panels[k, PANEL_HEADING] * ds / end_speed(panels[k - 1])
             out = solutions[k].reshape(solutions.shape[1] * WIDE)
             solve_panel(panels[k], law, states + k * COUNT, n, start, before, arcs, out)

@@ -150,6 +150,13 @@ def chart_law_program(forces: ChartForces) -> Program:
 
 
 @lru_cache(maxsize=64)
+def chart_force_program(forces: ChartForces) -> Program:
+    """Return the program of dW/ds at a point of a chart, and its derivative with respect to arc length."""
+    chart_point = _ChartPoint(forces)
+    return assemble(chart_point.op, [chart_point.slope, chart_point.partials(chart_point.slope)[0]])
+
+
+@lru_cache(maxsize=64)
 def chart_load_program(forces: ChartForces) -> Program:
     """Return the program of the slope of the contact force per mass along a motion, and of its derivatives with respect
     to the place and W.

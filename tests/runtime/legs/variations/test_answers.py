@@ -140,6 +140,43 @@ def test_a_law_that_is_not_linear(build: Build, launch: Launch) -> None:
     assert_states(motion, times, lambda t, **at: Damped(**at).at(t), launch, ("lam", "v"))
 
 
+@pytest.mark.parametrize(
+    ("lam0", "v0", "direction", "k", "c"),
+    [(2.33, 3.92, -1, 2.298, 3.126), (0.507, 10.4, -1, 0.7481, 1.555), (2.88, 7.21, -1, 1.708, 2.558)],
+)
+def test_a_damped_spring_that_dies_away(
+    lam0: float, v0: float, direction: int, k: float, c: float, build: Build
+) -> None:
+    """Derivatives of late places have all their digits, relative to the largest of them at the same time.
+
+    They were small differences of the launch's shift and that of the time, off by up to 3e-11 of the largest.
+    """
+    force = gqm.Potential("k*x**2/2") + gqm.Kernel.law("-c*direction*sqrt(W)")
+    motion = build("dying_damper", gqm.Curve.graph("0*x", domain=(None, None)), force).solve(
+        lam0, v0, direction, k=k, c=c
+    )
+    given = {"lam0": mpf(lam0), "v0": mpf(v0), "k": mpf(k), "c": mpf(c)}
+
+    def place(t: float, **at: mpf) -> Any:
+        decay = at["c"] / 2
+        rate = mp.sqrt(mp.mpc(at["k"] - decay**2))
+        swing = at["lam0"] * mp.cos(rate * t) + (direction * at["v0"] + decay * at["lam0"]) / rate * mp.sin(rate * t)
+        return (mp.exp(-decay * t) * swing).real
+
+    for t in (1.0, 3.0, 5.0, 7.5, 9.2):
+        with mp.workdps(60):
+            true = []
+            for name in given:
+                step = mpf(10) ** -20
+                ends = [place(t, **{**given, name: given[name] + sign * step}) for sign in (-1, 1)]
+                true.append((ends[1] - ends[0]) / (2 * step))
+            errors = [
+                abs(mpf(float(one)) - other)
+                for one, other in zip(motion.sensitivity(t, list(given)).lam, true, strict=False)
+            ]
+            assert max(errors) <= 3.0 * TOLERANCE * max(map(abs, true))
+
+
 def test_the_papers_second_example() -> None:
     """The turn on a cubic track with friction, passed with N of either sign, has the right derivatives (22 digits, by
     differences).

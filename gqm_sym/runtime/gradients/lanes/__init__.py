@@ -1,0 +1,1 @@
+"""Gradients of many orbits at once in double precision, one orbit in each lane of a vector register."""

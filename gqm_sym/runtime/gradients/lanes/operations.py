@@ -1,0 +1,156 @@
+"""A tape for double precision: the operations of other tapes, and divided differences of waves without cancellation.
+
+With ``S(t**2) = sin(t)/t``, the divided differences of sines and cosines are products of these and of S and its divided
+difference in the squares of half the gaps; for exponentials the squares are negative (MATHS, section 3). Each of the
+two operations below also gives its derivatives, so that formulas with them can be differentiated.
+"""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+from gqm_sym.runtime.double_double.interpreter import ABSOLUTE, ADD, DIVIDE, MULTIPLY, SINE_COSINE, SUBTRACT
+from gqm_sym.runtime.double_double.recording import TapeNumber
+from gqm_sym.runtime.gradients.adjoints import RecorderOfMore
+
+# Operations after those of the interpreter in double-double arithmetic. SINC gives S(p) and its derivative. SINC_PAIR
+# gives S(p) + S(q), the divided difference S[p, q], and the derivatives of both: S'(p), S'(q), S[p, p, q], S[p, q, q].
+SINC, SINC_PAIR = ABSOLUTE + 1, ABSOLUTE + 2
+
+# The operation that gives the bound on the error of a number in double-double arithmetic, in units of ROUNDING: a
+# typical rounding error of a double near 1.
+ERROR_BOUND, ROUNDING = SINC_PAIR + 1, 0.3 * 2.0**-52
+
+# The number of results of each operation that has several; they are in consecutive registers.
+RESULTS = {SINE_COSINE: 2, SINC: 2, SINC_PAIR: 6}
+
+# For the two results of SINC_PAIR that have derivatives: the results that are those with respect to p and to q.
+PAIR_PARTIALS = {0: (2, 3), 1: (4, 5)}
+
+
+class LaneRecorder(RecorderOfMore):
+    """A tape that is being recorded, with the operations SINC and SINC_PAIR.
+
+    Attributes
+    ----------
+    uncertain : set of int
+        The registers of numbers in double-double arithmetic of which many digits may have cancelled.
+    """
+
+    def __init__(self, parameters: int, coordinates: int) -> None:
+        self.uncertain = set[int]()
+        self._depends: list[bool] = []
+        self.exact: dict[int, Fraction | str] = {}
+        super().__init__(parameters, coordinates)
+
+    def _entry(self, *entry: Any) -> int:
+        is_new = entry not in self._known
+        register = super()._entry(*entry)
+        if is_new and entry[0] in (SINC, SINC_PAIR):
+            self.entries += [("result", register, k) for k in range(1, RESULTS[entry[0]])]
+        return register
+
+    def depends(self, register: int) -> bool:
+        """Return whether a register depends on the place."""
+        found = self._depends
+        for code, *operands in self.entries[len(found) :]:
+            if code == ERROR_BOUND:
+                found.append(True)
+            elif code == "result":
+                found.append(found[operands[0]])
+            else:
+                is_operation = not isinstance(code, str) or code == "cosine"
+                found.append(any(found[k] for k in operands) if is_operation else code == "place")
+        return found[register]
+
+    def result(self, code: int, *operands: TapeNumber) -> TapeNumber:
+        """Record an operation in its simplest form.
+
+        A quotient by what does not depend on the place becomes a product with its inverse; products with constants are
+        joined, and negative signs move into sums.
+        """
+        simple = self._simplified(code, *operands) if len(operands) == 2 else None
+        return super().result(code, *operands) if simple is None else simple
+
+    def _simplified(self, code: int, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
+        """Return the result of an operation with two operands in another form; None if there is no simpler one."""
+        if code == MULTIPLY:
+            return self._product(*((a, b) if a.known is not None else (b, a)))
+        if code in (ADD, SUBTRACT):
+            if b.known == 0:
+                return a
+            if a.known == 0:
+                return b if code == ADD else -b
+            negative = self._negated(b)
+            if negative is not None:
+                return a - negative if code == ADD else a + negative
+            negative = self._negated(a) if code == ADD else None
+            return None if negative is None else b - negative
+        if code == DIVIDE and a.known == 0:
+            return a
+        if code == DIVIDE and self.depends(self.register(a)) and not self.depends(self.register(b)):
+            return a * (self.number(1) / b)
+        return None
+
+    def _product(self, factor: TapeNumber, other: TapeNumber) -> TapeNumber | None:
+        """Return the product with a constant in its simplest form."""
+        if factor.known is None:
+            return None
+        if factor.known in (0, 1):
+            return other if factor.known else factor
+        code, *operands = self.entries[other.register]
+        if code == MULTIPLY:
+            for one, rest in (operands, operands[::-1]):
+                constant = self.exact.get(one)
+                if isinstance(constant, Fraction):
+                    return self.number(constant * factor.known) * self.at(rest)
+        return None
+
+    def _negated(self, number: TapeNumber) -> TapeNumber | None:
+        """Return minus a number that was recorded as a product with -1; None for other numbers."""
+        if number.known is not None:
+            return None
+        code, *operands = self.entries[number.register]
+        if code == MULTIPLY:
+            for one, rest in (operands, operands[::-1]):
+                if self.exact.get(one) == -1:
+                    return self.at(rest)
+        return None
+
+    def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
+        """Record sin(t)/t, or sinh(t)/t for the sign -1."""
+        if not self.depends(self.register(t)):
+            return (self.sin(t) if sign > 0 else self.sinh(t)) / t
+        return self.result(SINC, sign * (t * t))
+
+    def sinc_pair(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record S(p) + S(q) and S[p, q]."""
+        both = self.result(SINC_PAIR, p, q)
+        return both, self.at(both.register + 1)
+
+    def error_bound(self, register: int) -> TapeNumber:
+        """Record the bound on the error of a number that does not depend on the place."""
+        return self.result(ERROR_BOUND, self.at(register))
+
+    def base(self, register: int) -> tuple[int, int]:
+        """Return the register of the operation that fills a register, and the number of the result among its
+        results.
+        """
+        code, *operands = self.entries[register]
+        if code == "cosine":
+            return register - 1, 1
+        return (operands[0], operands[1]) if code == "result" else (register, 0)
+
+    def is_other(self, register: int) -> bool:
+        """Return whether a register is filled by SINC or SINC_PAIR."""
+        return self.entries[self.base(register)[0]][0] in (SINC, SINC_PAIR)
+
+    def other_partials(self, register: int) -> Iterator[tuple[int, TapeNumber]]:
+        """Yield the operands of a result of SINC or SINC_PAIR, each with the result's partial derivative by it."""
+        base, which = self.base(register)
+        code, *operands = self.entries[base]
+        if code == SINC:
+            yield operands[0], self.at(base + 1)
+        else:
+            for operand, result in zip(operands, PAIR_PARTIALS[which], strict=True):
+                yield operand, self.at(base + result)
