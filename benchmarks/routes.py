@@ -45,7 +45,7 @@ FORCES = {
 REQUIRED = 1.0
 
 
-class Swept(NamedTuple):
+class SweptModule(NamedTuple):
     """A module, what it is asked with, and the range of places on which wells are looked for."""
 
     name: str
@@ -55,7 +55,7 @@ class Swept(NamedTuple):
     high: float
 
 
-def famous(curve: str, force: str) -> Iterator[Swept]:
+def famous(curve: str, force: str) -> Iterator[SweptModule]:
     """Yield each curve of the corpus that has formulas, with each force."""
     for entry in json.loads((ROOT / "tests/data/curves.json").read_text()):
         for law, (made, parameters) in FORCES.items():
@@ -68,20 +68,20 @@ def famous(curve: str, force: str) -> Iterator[Swept]:
             model = gqm.derive(declared, made(), parameters=entry["params"])
             name = "".join(c if c.isalnum() else "_" for c in f"routes_{entry['name']}_{law}".lower())
             low, high = map(float, entry["domain"])
-            yield Swept(f"{entry['name']}, {law}", gqm.build(model, name=name), parameters, low, high)
+            yield SweptModule(f"{entry['name']}, {law}", gqm.build(model, name=name), parameters, low, high)
 
 
-def examples(curve: str, force: str) -> Iterator[Swept]:
+def examples(curve: str, force: str) -> Iterator[SweptModule]:
     """Yield each example curve that has formulas and loses no energy."""
     for path in sorted((ROOT / "curves").glob("*.yaml")):
         module = importlib.import_module(f"generated.{path.stem}")
         model, asked_for = module.MODEL, curve in path.stem and force in "own"
         if asked_for and model.chart is None and model.dissipation is None and model.signed:
             given = {name: REQUIRED for name, value in module.PARAMETERS.items() if value is None}
-            yield Swept(path.stem, module, given, -REACH, REACH)
+            yield SweptModule(path.stem, module, given, -REACH, REACH)
 
 
-def wells(swept: Swept) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def wells(swept: SweptModule) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return places and potentials from one hilltop to the next."""
     places = np.linspace(swept.low, swept.high, PLACES)[1:-1]
     lam0 = float(places[PLACES // 2]) if swept.low < 0.0 else float(places[PLACES // 3])
@@ -93,7 +93,7 @@ def wells(swept: Swept) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float6
             yield places[part], level[part]
 
 
-def launches(swept: Swept, most: float, rng: np.random.Generator) -> list[NDArray[np.float64]]:
+def launches(swept: SweptModule, most: float, rng: np.random.Generator) -> list[NDArray[np.float64]]:
     """Return places, speeds and directions of launches, and a place that each body passes."""
     found = [np.empty((4, 0))]
     for places, level in wells(swept):
@@ -112,7 +112,7 @@ def launches(swept: Swept, most: float, rng: np.random.Generator) -> list[NDArra
     return list(np.concatenate(found, axis=1))
 
 
-def shares(swept: Swept, quantity: str, some: list[NDArray[np.float64]], **given: Any) -> tuple[float, float]:
+def shares(swept: SweptModule, quantity: str, some: list[NDArray[np.float64]], **given: Any) -> tuple[float, float]:
     """Return the shares of launches that were solved one by one, and singly."""
     lam0, v0, direction, place = some
     extra = {"lam": place} if quantity == "time_at" else {}

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 12, input 2558bd3a8d44, body cf289de013c1
+# interface 12, input 2558bd3a8d44, body 6f4af55d0a83
 """Bead on a hanging chain
 
 x              = x
@@ -30,8 +30,8 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
-    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cosh,
-    divdiff1_cosh, divdiff2_cosh, divdiff2_cosh_near, iconst, icosh, idiv, imul, isinh, place_from_ends, sinh,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cosh, divdiff1_cosh,
+    divdiff2_cosh, divdiff2_cosh_near, iconst, icosh, idiv, imul, isinh, place_from_ends, sinh,
     speed_squared_from_potential,
 )
 
@@ -172,7 +172,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (c, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (c, g, m), lam, out, unknown)
 
 
 def solve(
@@ -201,7 +201,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (c, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (c, g, m), unknown)
 
 
 def sweep(
@@ -233,7 +233,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (c, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

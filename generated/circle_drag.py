@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 12, input f2f11f54325e, body 41d5d6108abf
+# interface 12, input f2f11f54325e, body 6538102d0b7e
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -30,7 +30,7 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, imul, isin, sin,
+    CompiledModel, DissipativeFunctions, ExactLaw, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, b, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (L, b, g, m), lam, out, unknown)
 
 
 def solve(
@@ -191,7 +191,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, b, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (L, b, g, m), unknown)
 
 
 def sweep(
@@ -223,7 +223,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, b, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 12, input 350ae6cf923a, body b7b4c2bfd450
+# interface 12, input 350ae6cf923a, body 0ed159c32e7c
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -28,11 +28,11 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
-    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, cos_of_sum, divdiff1_cos,
-    divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iconst, icos, idiv, imul, isin,
-    place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, cos_of_sum,
+    divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iconst, icos,
+    idiv, imul, isin, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def exact_domain(op, p):
 
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next (None if there is no other)."""
-    return -op.pi, 2*op.pi
+    return op.pi, op.pi
 
 
 def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
@@ -170,7 +170,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (R, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (R, g, m), lam, out, unknown)
 
 
 def solve(
@@ -199,7 +199,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (R, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (R, g, m), unknown)
 
 
 def sweep(
@@ -231,7 +231,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (R, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
@@ -313,6 +313,35 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
         out[3, i] = rest
 
 
+@compiled(TIME_INTEGRAND_BATCH)
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    p, out = carray(p, (7, n)), carray(out, (2, n))
+    for i in range(n):
+        R, g, t, one_minus_t, one_minus_tt, cosine_fourth = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = 4*R
+        out[0, i] = -_t1*(cosine2 + one_minus_t*sine2)**2/(_t0*cosine_fourth*g*(sine2*t + 1)**2)
+        out[1, i] = -_t0*_t1*g
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = cos(half/2)
+        _t4 = _t1**4
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t3
+        out[2, i] = _t3/_t4
+        out[3, i] = _t4
+
+
 @compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
@@ -336,7 +365,8 @@ MODEL = CompiledModel(
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=4,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=4, integrand_rows=4,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 12, input f2717a5ad91f, body 260f31ea0b60
+# interface 12, input f2717a5ad91f, body 9aeb72ab646b
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
+    CompiledModel, DissipativeFunctions, ExactLaw, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
 )
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, b_air, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, b, b_air, g, m), lam, out, unknown)
 
 
 def solve(
@@ -205,7 +205,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, b_air, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, b, b_air, g, m), unknown)
 
 
 def sweep(
@@ -237,7 +237,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input 3f2dfaf376e9, body cda24fd9972b
+# interface 12, input 3f2dfaf376e9, body 7a78a2848bda
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -31,8 +31,7 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, STATIC_BALANCE,
-    CompiledFunctions, CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1InSpace, cos, iadd, imul,
-    ipow, isqrt, sin,
+    CompiledFunctions, CompiledModel, DissipativeFunctions, ExactLaw, Pass1InSpace, cos, iadd, imul, ipow, isqrt, sin,
 )
 
 if TYPE_CHECKING:
@@ -236,7 +235,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1InSpace
         Arrays x, z, ds, kappa, v2 and normal_force; y, normal_x, normal_y and normal_z.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (R, c, mu, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (R, c, mu, g, m), lam, out, unknown)
 
 
 def solve(
@@ -266,7 +265,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (R, c, mu, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (R, c, mu, g, m), unknown)
 
 
 def sweep(
@@ -298,7 +297,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (R, c, mu, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 12, input a0162e77d64e, body f33211796d36
+# interface 12, input a0162e77d64e, body 3b35a4c8bf43
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -30,8 +30,8 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
-    cos_of_sum, divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sin, divdiff1_sin_of_sum,
+    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, cos_of_sum,
+    divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sin, divdiff1_sin_of_sum,
     divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iabs, iadd, iconst, icos, imul, ipow, isin, isqrt,
     place_from_ends, sin, sin_of_sum, sinc_near, speed_squared_from_potential,
 )
@@ -238,7 +238,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, ecc, k, m), lam, out, unknown)
 
 
 def solve(
@@ -267,7 +267,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, ecc, k, m), unknown)
 
 
 def sweep(
@@ -299,7 +299,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 12, input 702c9ef6b67b, body 63403455d3a3
+# interface 12, input 702c9ef6b67b, body 276380c819be
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -30,8 +30,8 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TURNING_POINT_BATCH,
-    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul,
-    ipow, speed_squared_from_potential,
+    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, iadd, iconst, idiv, imul, ipow,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (w, m), lam, out, unknown)
 
 
 def solve(
@@ -186,7 +186,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (w, m), unknown)
 
 
 def sweep(
@@ -217,7 +217,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

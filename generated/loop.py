@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 12, input a497e433309c, body 77495cf24df0
+# interface 12, input a497e433309c, body f2082dbd7e3e
 """Loop of a roller coaster
 
 x              = x(s)
@@ -28,8 +28,8 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, LaunchRequest, Pass1, Rail, SeparatedTerms, chart_of, chart_rows,
-    cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, Rail, SeparatedTerms, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, c, R, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, c, R, g, m), lam, out, unknown)
 
 
 def solve(
@@ -174,7 +174,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, c, R, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, c, R, g, m), unknown)
 
 
 def sweep(
@@ -206,7 +206,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, c, R, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

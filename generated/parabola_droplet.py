@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 12, input 016fa3c6503a, body a2cfe625d6ff
+# interface 12, input 016fa3c6503a, body 525cd17a08c0
 """Droplet in a parabolic channel
 
 x              = x
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    CompiledModel, DissipativeFunctions, ExactLaw, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, gamma, ell_c, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, gamma, ell_c, g, m), lam, out, unknown)
 
 
 def solve(
@@ -203,7 +203,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, gamma, ell_c, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, gamma, ell_c, g, m), unknown)
 
 
 def sweep(
@@ -235,7 +235,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 12, input 1c6e3a707056, body e2ffdd99f054
+# interface 12, input 1c6e3a707056, body 399c4e6bdfc9
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -28,8 +28,8 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, LaunchRequest, Pass1, Sampled, SeparatedTerms, chart_of,
-    chart_rows, cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, Sampled, SeparatedTerms, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (g, m), lam, out, unknown)
 
 
 def solve(
@@ -231,7 +231,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (g, m), unknown)
 
 
 def sweep(
@@ -262,7 +262,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

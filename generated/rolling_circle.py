@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 12, input 2a76ceb4277a, body e4c2273299d1
+# interface 12, input 2a76ceb4277a, body f865dd51c60a
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -30,9 +30,9 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, atan,
-    cos, cos_of_sum, divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos,
-    iadd, iconst, idiv, imul, isin, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, atan, cos, cos_of_sum,
+    divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iadd, iconst,
+    idiv, imul, isin, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, beta, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (L, beta, g, m), lam, out, unknown)
 
 
 def solve(
@@ -200,7 +200,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, beta, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (L, beta, g, m), unknown)
 
 
 def sweep(
@@ -232,7 +232,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, beta, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 12, input 33421e752297, body 9785f08710c6
+# interface 12, input 33421e752297, body 0a2b46940765
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -31,8 +31,8 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
-    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd,
-    iconst, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, iadd, iconst, imul,
+    ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, Omega, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, Omega, g, m), lam, out, unknown)
 
 
 def solve(
@@ -198,7 +198,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, Omega, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, Omega, g, m), unknown)
 
 
 def sweep(
@@ -230,7 +230,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, Omega, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

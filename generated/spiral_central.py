@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 12, input cd2a37956d84, body b6c96e7ce0ba
+# interface 12, input cd2a37956d84, body 768da4973fb3
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -30,8 +30,8 @@ compiled = compiler(__file__, interface=12)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_exp, divdiff2_exp, exp, iabs,
-    iadd, iconst, idiv, iexp, imul, ipow, isqrt, place_from_ends, sin, speed_squared_from_potential,
+    CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, divdiff1_exp, divdiff2_exp, exp, iabs, iadd, iconst,
+    idiv, iexp, imul, ipow, isqrt, place_from_ends, sin, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, k, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (r0, b, k, m), lam, out, unknown)
 
 
 def solve(
@@ -205,7 +205,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, k, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (r0, b, k, m), unknown)
 
 
 def sweep(
@@ -237,7 +237,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (r0, b, k, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

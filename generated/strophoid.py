@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 12, input 761b603021f8, body 8373c9c3d10b
+# interface 12, input 761b603021f8, body 5813a05fa888
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -36,8 +36,8 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, FIELD, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, LaunchRequest, Pass1, SeparatedTerms, Traced, chart_of,
-    chart_rows, cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, SeparatedTerms, Traced, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, g, m), lam, out, unknown)
 
 
 def solve(
@@ -211,7 +211,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, g, m), unknown)
 
 
 def sweep(
@@ -243,7 +243,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

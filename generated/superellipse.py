@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 12, input fe6d2f95d843, body b26754d97d49
+# interface 12, input fe6d2f95d843, body 5518abcbebac
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -36,8 +36,8 @@ compiled = compiler(__file__, interface=12)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, FIELD, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, LaunchRequest, Pass1, SeparatedTerms, Traced, chart_of,
-    chart_rows, cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, SeparatedTerms, Traced, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -175,7 +175,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, b, g, m), lam, out, unknown)
 
 
 def solve(
@@ -204,7 +204,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, b, g, m), unknown)
 
 
 def sweep(
@@ -236,7 +236,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

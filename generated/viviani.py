@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 12, input c93b8a64a5a5, body 205b92f12f1d
+# interface 12, input c93b8a64a5a5, body 09c457c66760
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -31,9 +31,9 @@ from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2,
     POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions,
-    CompiledModel, ExactFormulas, LaunchRequest, Pass1InSpace, atan, cos, cos_of_sum, divdiff1_cos_in_square,
-    divdiff1_sin, divdiff1_sin_of_sum, divdiff1_sinc_in_square, divdiff2_sin, iadd, iconst, icos, idiv, imul, ipow,
-    isqrt, place_from_ends, sin, sin_of_sum, sinc_near, speed_squared_from_potential,
+    CompiledModel, ExactFormulas, Pass1InSpace, atan, cos, cos_of_sum, divdiff1_cos_in_square, divdiff1_sin,
+    divdiff1_sin_of_sum, divdiff1_sinc_in_square, divdiff2_sin, iadd, iconst, icos, idiv, imul, ipow, isqrt,
+    place_from_ends, sin, sin_of_sum, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def pass1(lam: Any = None, lam0: Any = None, v0: Any = 0.0, direction: int = 1, 
     Pass1InSpace
         Arrays x, z, ds, kappa, v2 and normal_force; y, normal_x, normal_y and normal_z.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, g, m), lam, out, unknown)
+    return MODEL.pass1((lam0, v0, direction), (a, g, m), lam, out, unknown)
 
 
 def solve(
@@ -249,7 +249,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, g, m), unknown)
+    return MODEL.solve((lam0, v0, direction, point, t_max, contact), (a, g, m), unknown)
 
 
 def sweep(
@@ -281,7 +281,7 @@ def sweep(
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
         ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
-    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    launches = (lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 

@@ -65,7 +65,7 @@ def period(module: ModuleType) -> Callable[..., Any]:
 def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
     import torch
 
-    class Swept(torch.autograd.Function):  # type: ignore[misc, unused-ignore]
+    class SweepFunction(torch.autograd.Function):  # type: ignore[misc, unused-ignore]
         """A sweep as one step of PyTorch: the values or, with names ``wrt``, the derivatives with respect to these,
         with one more axis.
         """
@@ -86,7 +86,7 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
         def vmap(info: Any, in_dims: tuple[Any, ...], names: Any, wrt: Any, *given: Any) -> Any:
             pairs = zip(given, in_dims[2:], strict=True)
             mapped = [t.expand(info.batch_size, *t.shape) if d is None else t.movedim(d, 0) for t, d in pairs]
-            return Swept.apply(names, wrt, *mapped), 0
+            return SweepFunction.apply(names, wrt, *mapped), 0
 
         @staticmethod
         def backward(ctx: Any, gradient: Any) -> Any:
@@ -104,13 +104,13 @@ def _for_torch(module: ModuleType, quantity: str) -> Callable[..., Any]:
     def _slopes(ctx: Any, wrt: tuple[str, ...]) -> Any:
         if ctx.wrt:
             raise SolutionError(f"torch.{quantity}: second derivatives by PyTorch are not there")
-        return Swept.apply(ctx.names, wrt, *ctx.saved_tensors)
+        return SweepFunction.apply(ctx.names, wrt, *ctx.saved_tensors)
 
     def function(lam0: Any, v0: Any = 0.0, **parameters: Any) -> Any:
         given = launch_arguments(f"torch.{quantity}", module.PARAMETERS, lam0, v0, parameters)
         devices = [value.device for value in given.values() if isinstance(value, torch.Tensor)]
         doubles = [torch.as_tensor(value, dtype=torch.float64, device="cpu") for value in given.values()]
-        found = Swept.apply(tuple(given), (), *torch.broadcast_tensors(*doubles))
+        found = SweepFunction.apply(tuple(given), (), *torch.broadcast_tensors(*doubles))
         return found.to(devices[0]) if devices else found
 
     return function

@@ -76,9 +76,9 @@ class Model:
         n₀ in m/s², with N/m = κ W + n₀; its length for a curve in no vertical plane.
     normal
         The unit vector along which N is positive; empty for a curve in no vertical plane.
-    bend, loads
-        The components of t × dt/ds and of -t × F for a curve in no vertical plane, with t × N/m = W·bend + loads;
-        otherwise empty.
+    curvature_binormal, loads
+        The components of t × dt/ds and of -t × F for a curve in no vertical plane, with t × N/m =
+        W·curvature_binormal + loads; otherwise empty.
     coriolis
         In a rotating frame the vector that ds/dt adds to that sum for such a curve, for each unit of ds/dt; otherwise
         empty.
@@ -147,7 +147,7 @@ class Model:
     symmetric_orbits: SymmetricOrbits | None
     static_normal_load: sp.Expr
     normal: tuple[sp.Expr, ...]
-    bend: tuple[sp.Expr, ...]
+    curvature_binormal: tuple[sp.Expr, ...]
     loads: tuple[sp.Expr, ...]
     coriolis: tuple[sp.Expr, ...]
     dissipation: Dissipation | None
@@ -174,6 +174,7 @@ class Model:
             {
                 **{"climb": "2*effective_potential", "climb_slope": "2*effective_potential_slope"},
                 **{"kernel": "tangential_acceleration", "reaction": "static_normal_load", "swing": "symmetric_orbits"},
+                **{"bend": "curvature_binormal"},
             },
             "a model",
         )
@@ -238,7 +239,7 @@ class Model:
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
         """Return the vector t × N/m, which has the length of N/m."""
-        return turned_force(self.bend, self.loads, self.coriolis, v2)
+        return turned_force(self.curvature_binormal, self.loads, self.coriolis, v2)
 
     @property
     def units(self) -> dict[str, str]:

@@ -36,8 +36,8 @@ from gqm_sym.derivation.geometry.level_set import level_set
 from gqm_sym.derivation.geometry.offset_curve import offset_curve
 from gqm_sym.derivation.model import Model, units_of
 from gqm_sym.derivation.reality import check_somewhere_real
-from gqm_sym.derivation.wells.symmetric_orbits import symmetric_orbits
-from gqm_sym.derivation.wells.symmetry import symmetry
+from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric_orbits
+from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.errors import ArgumentError, DeclarationError, DerivationError
 from gqm_sym.kernels.base import DIRECTION, KAPPA, MASS, Kernel, X, Y, Z
 from gqm_sym.parameters import Given, check_measured, is_positive
@@ -148,9 +148,7 @@ def derive(
     dxds, dyds, dzds = shape.tangent
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
-    axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
-    if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
-        axes = replace(axes, monotone=False)
+    axes, orbits = (None, None) if loss or curve.charted else _symmetry(curve, kernel, law, shape)
     start = {lam: LAM0}
     model = Model(
         curve=curve,
@@ -176,10 +174,10 @@ def derive(
         effective_potential=potential,
         effective_potential_slope=slope,
         symmetry=axes,
-        symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
+        symmetric_orbits=orbits,
         static_normal_load=law.static_normal_load,
         normal=shape.normal,
-        bend=shape.bend,
+        curvature_binormal=shape.curvature_binormal,
         loads=law.loads,
         coriolis=law.coriolis,
         dissipation=loss,
@@ -236,6 +234,20 @@ def _refuse_of_train(kernel: Kernel) -> None:
     for name, given, what in refused:
         if given:
             raise DeclarationError(f"derive: {name}: {what} is not known of a train; leave it out")
+
+
+def _symmetry(
+    curve: Curve, kernel: Kernel, law: Forces, shape: Geometry
+) -> tuple[Symmetry | None, SymmetricOrbits | None]:
+    """Return the axes of symmetry and the time of orbits about them."""
+    lam, potential = curve.parameter, law.effective_potential
+    axes = symmetry(potential, law.effective_potential_slope, shape.ds, lam, curve.domain)
+    orbits = symmetric_orbits(2 * potential, shape.ds, lam, axes)
+    if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
+        axes = replace(axes, monotone=False)
+        if orbits and shape.ds.has(lam):
+            orbits = replace(orbits, turning_point=None)
+    return axes, orbits
 
 
 def _losses(

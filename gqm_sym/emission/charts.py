@@ -132,7 +132,7 @@ def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR
     """
     shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
     tangent = (shape.dxds, shape.dyds, shape.dzds)
-    bends = cross(shape.bend, tangent)
+    bends = cross(shape.curvature_binormal, tangent)
     changes = (differentiate(bend, curve.parameter) / shape.ds for bend in bends)
     rows = (curve.x, curve.y, curve.z, shape.ds, *tangent, *bends, *changes)
     what = f"x, y, z, ds/d{curve.parameter} and the first three derivatives of the coordinates by arc length"

@@ -235,7 +235,9 @@ class _ModelLowering(Lowering):
         found: list[tuple[str, str, tuple[Expr, ...]]] = [("y", "Second horizontal coordinate.", (model.y,))]
         if model.loads and not model.coriolis:
             doc = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
-            product = Add(*(bend * load for bend, load in zip(model.bend, model.loads, strict=True)))
+            product = Add(
+                *(curvature * load for curvature, load in zip(model.curvature_binormal, model.loads, strict=True))
+            )
             found.append(("load_along_curvature", doc, (product,)))
         return tuple(found)
 

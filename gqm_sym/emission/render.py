@@ -23,7 +23,7 @@ INTERFACE = 12
 # Functions that the runtime has in vectorised forms; all others are those of the standard library.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
-_RUNTIME = ("CompiledFunctions", "CompiledModel", "LaunchRequest")
+_RUNTIME = ("CompiledFunctions", "CompiledModel")
 # The width of the emitted import list.
 _WIDTH = 116
 # The functions of one motion, as the interface orders them.

@@ -100,7 +100,7 @@ class CompiledModel(Formulas):
 
     def pass1(
         self,
-        request: LaunchRequest,
+        request: tuple[Any, ...],
         parameters: tuple[Any, ...],
         lam: Any,
         out: Any = None,
@@ -110,8 +110,8 @@ class CompiledModel(Formulas):
 
         Parameters
         ----------
-        request : LaunchRequest
-            The launch that determines V**2.
+        request : tuple
+            The launch that determines V**2: the first fields of a `LaunchRequest`.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         lam : number or array_like
@@ -136,7 +136,7 @@ class CompiledModel(Formulas):
         if unknown:
             self.refuse("pass1", unknown)
         p = self.numbers(parameters)
-        launch = read_launch(self, p, request)
+        launch = read_launch(self, p, LaunchRequest(*request))
         if lam is None:
             raise InputError(f"lam: not given; pass one place or many, as values of {self.parameter}")
         f = bind(self, p, launch)
@@ -206,14 +206,14 @@ class CompiledModel(Formulas):
         return beyond
 
     def solve(
-        self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NO_ARGUMENTS
+        self, request: tuple[Any, ...], parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NO_ARGUMENTS
     ) -> "Motion":
         """Compute the motion that begins with a launch.
 
         Parameters
         ----------
-        request : LaunchRequest
-            The launch.
+        request : tuple
+            The launch: the fields of a `LaunchRequest`, which itself takes long to make.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         unknown : mapping, optional
@@ -249,7 +249,7 @@ class CompiledModel(Formulas):
     def sweep(
         self,
         quantity: str,
-        launches: LaunchRequest,
+        launches: tuple[Any, ...],
         parameters: tuple[Any, ...],
         *,
         lam: Any,
@@ -263,8 +263,9 @@ class CompiledModel(Formulas):
         ----------
         quantity : str
             One of `gqm_sym.runtime.launch.kinds.QUANTITIES`.
-        launches : LaunchRequest
-            Arrays or numbers, which broadcast against each other and against the parameters.
+        launches : tuple
+            The fields of a `LaunchRequest`: arrays or numbers, which broadcast against each other and against the
+            parameters.
         parameters : tuple
             Arrays or numbers, in the order of the attribute ``parameters``.
         lam : array_like or None
@@ -294,9 +295,9 @@ class CompiledModel(Formulas):
         units = {**self.units, "lam0": own, "lam": own, "v0": "m/s", "t_max": "s"}
         arguments = {
             name: without_unit(value, where=name, unit=units.get(name))
-            for name, value in {**launches._asdict(), "lam": lam, **named}.items()
+            for name, value in {**LaunchRequest(*launches)._asdict(), "lam": lam, **named}.items()
         }
-        launches, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
+        asked, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
         parameters = tuple(arguments[name] for name in self.parameters)
         del arguments["point"]
         from gqm_sym.runtime.sweep.result import with_arguments
@@ -306,7 +307,7 @@ class CompiledModel(Formulas):
 
             if client is not None:
                 raise InputError("gradient: is not available in a sweep on a cluster (client); leave one of them out")
-            swept = sweep_with_gradient(self, quantity, launches, parameters, lam, self.solve, gradient)
+            swept = sweep_with_gradient(self, quantity, asked, parameters, lam, self.solve, gradient)
             return with_arguments(swept, quantity, arguments)
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on
@@ -315,7 +316,7 @@ class CompiledModel(Formulas):
             return with_arguments(sweep_on(client, module, quantity, arguments), quantity, arguments)
         from gqm_sym.runtime.sweep.sweep import sweep
 
-        return with_arguments(sweep(self, quantity, launches, parameters, lam, self.solve), quantity, arguments)
+        return with_arguments(sweep(self, quantity, asked, parameters, lam, self.solve), quantity, arguments)
 
     def equilibria(
         self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NO_ARGUMENTS

@@ -47,7 +47,7 @@ _NAMES_BY_HOME = {
         "POTENTIAL_DIVDIFF2_BATCH RIDER_LOADS SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
         "TIME_INTEGRAND_BATCH TURNING_POINT_BATCH"
     ),
-    "launch.request": "LaunchRequest",
+    "launch.request": "LaunchRequest",  # only older modules import it; newer ones give its fields
     "launch.speed": "Pass1 Pass1InSpace Pass1OfRider",
     "model": "CompiledModel",
     "motion.motion": "Motion",

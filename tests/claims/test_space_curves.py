@@ -245,7 +245,7 @@ def test_a_vertical_plane_is_the_planar_case(h: str, z: str, cosine: str, sine: 
     for name in ("z", "ds", "dzds", "kappa", "static_normal_load", "effective_potential", "speed_squared", "notes"):
         assert getattr(turned, name) == getattr(flat, name), name
     assert turned.dissipation == flat.dissipation
-    assert (turned.bend, turned.loads) == ((), ())
+    assert (turned.curvature_binormal, turned.loads) == ((), ())
     assert turned.normal == tuple(
         part * sp.Rational(share)
         for part, share in zip((-flat.dzds, -flat.dzds, flat.dxds), (cosine, sine, "1"), strict=True)

@@ -60,14 +60,14 @@ def potential_gradient(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
 
 
 def turned_force(
-    bend: Sequence[sp.Expr],
+    curvature_binormal: Sequence[sp.Expr],
     loads: Sequence[sp.Expr],
     coriolis: Sequence[sp.Expr],
     w: sp.Expr,
     direction: sp.Expr = DIRECTION,
 ) -> tuple[sp.Expr, ...]:
     """Return the vector t × N/m at V² = w, which has the length of N/m; ``direction`` is the sign of ds/dt."""
-    fixed = (turn * w + load for turn, load in zip(bend, loads, strict=True))
+    fixed = (turn * w + load for turn, load in zip(curvature_binormal, loads, strict=True))
     return tuple(
         part + direction * sp.sqrt(w) * aside for part, aside in zip(fixed, coriolis or (0, 0, 0), strict=True)
     )

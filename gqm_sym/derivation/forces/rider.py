@@ -152,7 +152,7 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
 
 def _turned(shape: Geometry, law: Forces, w: sp.Expr, forwards: sp.Expr = DIRECTION) -> Place:
     """Return the vector t × N/m at V² = w, for a motion forwards (1) or backwards (-1)."""
-    along_x, along_y, along_z = turned_force(shape.bend, law.loads, law.coriolis, w, forwards)
+    along_x, along_y, along_z = turned_force(shape.curvature_binormal, law.loads, law.coriolis, w, forwards)
     return along_x, along_y, along_z
 
 

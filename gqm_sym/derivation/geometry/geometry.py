@@ -119,7 +119,7 @@ class Geometry:
         return -self.dzds * cosine, -self.dzds * sine, self.dxds
 
     @property
-    def bend(self) -> tuple[sp.Expr, ...]:
+    def curvature_binormal(self) -> tuple[sp.Expr, ...]:
         """The components of t × dt/ds, the curvature as a vector along the binormal; empty in a vertical plane."""
         return tuple(part / self.ds for part in self.turning)
 

@@ -13,12 +13,12 @@ _WAVES = (sp.sin, sp.cos)
 
 @dataclass(frozen=True, slots=True)
 class Symmetry:
-    """Places about which an effective potential and σ are even functions of the distance.
+    """Places about which an effective potential and σ² are even functions of the distance.
 
     Attributes
     ----------
     place
-        One such place.
+        One such place about which σ is even.
     step
         The distance from each place to the next, None for a single one; two places of symmetry imply one at every
         multiple of their distance.
@@ -32,20 +32,36 @@ class Symmetry:
     monotone: bool
 
 
-def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
-    """Return the places about which the effective potential and ds are even; None if none was found.
+def symmetry(
+    potential: sp.Expr,
+    slope: sp.Expr,
+    ds: sp.Expr,
+    lam: sp.Symbol,
+    domain: tuple[sp.Expr | None, sp.Expr | None] = (None, None),
+) -> Symmetry | None:
+    """Return the places about which the effective potential and ds**2 are even; None if ds is even about none of them.
 
     The candidates are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines,
-    0, and the centre that follows from the two highest powers of a polynomial.
+    0, and the centre that follows from the two highest powers of a polynomial. `Symmetry.place` is one about which ds
+    is even, inside the domain if possible. The others may be cusps, about which ds is odd and which no body passes.
     """
     forms = (potential, ds)
     if any(_is_longer(form, MAX_LENGTH) for form in forms):
         return None
-    found = [place for place in dict.fromkeys(_candidates(forms, lam)) if all(_is_even(f, lam, place) for f in forms)]
-    if not found:
+    candidates = dict.fromkeys(_candidates(forms, lam))
+    found = [place for place in candidates if all(_is_even(form, lam, place) for form in (potential, ds**2))]
+    passable = [place for place in found if _is_even(ds, lam, place)]
+    if not passable:
         return None
-    step = min((abs(place - found[0]) for place in found[1:]), key=_size, default=None)
-    return Symmetry(found[0], step, _vanishes_only_at(slope, lam, found[0], step))
+    known = min(passable, key=lambda place: not _is_inside(place, domain))
+    step = min((abs(place - known) for place in found if place != known), key=_size, default=None)
+    monotone = len(passable) == len(found) and _vanishes_only_at(slope, lam, known, step)
+    return Symmetry(known, step, monotone)
+
+
+def _is_inside(place: sp.Expr, domain: tuple[sp.Expr | None, sp.Expr | None]) -> bool:
+    low, high = domain
+    return (low is None or bool((place - low).is_positive)) and (high is None or bool((high - place).is_positive))
 
 
 def _is_longer(form: sp.Expr, length: int) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
-from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
+from gqm_sym.runtime.compiled.types import REAL, VECTOR
 
 # The distance from 1.0 to the next double.
 ULP = 2.220446049250313e-16
@@ -63,19 +63,6 @@ def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
             count += 1.0
             remainder, remainder_low = over, over_low
     return count, remainder, remainder_low
-
-
-def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
-    """Return the running totals of the panels' times as two doubles each, scaled to end at the last of ``times``."""
-    own = terms.sum(axis=1)  # all Legendre polynomials are 1 at the right edge
-    own *= times[-1] / (own.sum() or 1.0)  # all times are 0 if both ends are the same place
-    high, low = [0.0], [0.0]
-    for part in own.tolist():
-        total, error = two_sum.py_func(high[-1], part)
-        high.append(total)
-        low.append(low[-1] + error)
-    high[-1], low[-1] = float(times[-1]), 0.0
-    return np.array(high), np.array(low)
 
 
 Pair = tuple[float, float]

@@ -213,10 +213,10 @@ class Chart:
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
 
 
-IN_BLOCK = (2, 0, 1, 3)
+BLOCK_ORDER = (2, 0, 1, 3)
 """The coordinates, followed by the roll angle, in the order of their charts in the block of a `SpaceChart`."""
 
-BY_ORDER = (1, 2, 3, 0)
+DERIVATIVE_ROWS = (1, 2, 3, 0)
 """The rows of such a chart that have a coordinate and its derivatives."""
 
 
@@ -252,9 +252,9 @@ class SpaceChart(Chart):
             The order of the derivatives, 0 (the functions themselves) to 3.
         """
         places, size = np.ascontiguousarray(s, dtype=np.float64).reshape(-1), int(self.block[0])
-        order_in_block = IN_BLOCK[: 3 + self.banked]
+        order_in_block = BLOCK_ORDER[: 3 + self.banked]
         blocks = self.block[: len(order_in_block) * size].reshape(-1, size)
-        return np.stack([_read(blocks[k], places)[BY_ORDER[order]] for k in np.argsort(order_in_block)])
+        return np.stack([_read(blocks[k], places)[DERIVATIVE_ROWS[order]] for k in np.argsort(order_in_block)])
 
 
 class PieceData(NamedTuple):
@@ -347,7 +347,7 @@ def assemble_in_space(
     left = np.asarray(anchors, dtype=np.float64)
     blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), derivatives, period)
     return SpaceChart(
-        block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
+        block=np.concatenate([blocks[axis] for axis in BLOCK_ORDER[: len(blocks)]]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),

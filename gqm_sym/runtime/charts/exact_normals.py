@@ -36,7 +36,9 @@ class TrueCurve(Protocol):
 
     start: tuple[Any, Any]
 
-    def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
+    def intersect_normal(
+        self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
+    ) -> tuple[Any, Any, Any, Any]:
         """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the unit
         tangent there.
 
@@ -309,7 +311,7 @@ class ChartTrack:
         middle, scale, rows = self._polynomials[k] = self._polynomials[k] or self._read(k)
         u = (c - middle) * scale
         (x, dx, ddx), (z, dz, ddz) = ((value, first * scale, second * scale**2) for value, first, second in rows(u))
-        at_x, at_z, tx, tz = self._curve.meet(k, float(u), x, z, dx, dz, self._size(k))
+        at_x, at_z, tx, tz = self._curve.intersect_normal(k, float(u), x, z, dx, dz, self._size(k))
         ds = (dx * dx + dz * dz - (at_x - x) * ddx - (at_z - z) * ddz) / (tx * dx + tz * dz)
         return CurvePoint(at_x, at_z, tx, tz, ds)
 

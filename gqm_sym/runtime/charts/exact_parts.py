@@ -52,7 +52,9 @@ class Parts:
         at = self._part(part)
         return samples_between(self._context, lambda place: at(place)[:2], low, high)
 
-    def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
+    def intersect_normal(
+        self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
+    ) -> tuple[Any, Any, Any, Any]:
         """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
         there.
         """

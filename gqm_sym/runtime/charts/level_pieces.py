@@ -56,7 +56,7 @@ _FIT = (2.0 / TERMS) * np.cos(np.pi * np.outer(np.arange(TERMS), np.arange(TERMS
 _FIT[0] *= 0.5
 
 
-def _gains() -> np.ndarray:
+def _integrals() -> np.ndarray:
     """Return the integrals of the Chebyshev polynomials from -1 to the nodes and to 1, accurate near -1 too.
 
     With x = -cos(phi), the integral of T_k is (-1)**k (S(k+1) - S(k-1)), where S(n) = sin(n phi/2)**2/n.
@@ -67,11 +67,11 @@ def _gains() -> np.ndarray:
     return (-1.0) ** np.arange(TERMS) * (waves[:, 2:] - waves[:, :-2])
 
 
-_ALONG = _gains()
+_INTEGRALS = _integrals()
 
 # 1 + x at the nodes, and the matrix from values at the nodes to the integral from the left end.
-_BEYOND = np.ascontiguousarray(_ALONG[:, 0])
-_GAIN = np.ascontiguousarray(_ALONG @ _FIT)
+_FROM_LEFT = np.ascontiguousarray(_INTEGRALS[:, 0])
+_INTEGRATION = np.ascontiguousarray(_INTEGRALS @ _FIT)
 
 # The matrix from values at the nodes to those at the left and the right end.
 _ENDS = np.ascontiguousarray(np.array([(-1.0) ** np.arange(TERMS), np.ones(TERMS)]) @ _FIT)
@@ -153,7 +153,7 @@ def solve_piece(curve, start, length, piece):  # type: ignore[no-untyped-def]
         return False
     kappa = piece[4, ANCHOR]
     for i in range(TERMS + 1):
-        s = half * _BEYOND[i]
+        s = half * _FROM_LEFT[i]
         piece[0, i] = s * (piece[2, ANCHOR] - 0.5 * s * kappa * piece[3, ANCHOR])
         piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * kappa * piece[2, ANCHOR])
     before, moved = inf, False
@@ -166,8 +166,8 @@ def solve_piece(curve, start, length, piece):  # type: ignore[no-untyped-def]
             for i in range(TERMS + 1):
                 gained = 0.0
                 for j in range(TERMS):
-                    gained += _GAIN[i, j] * (piece[2 + row, j] - base)
-                offset = half * (_BEYOND[i] * base + gained)
+                    gained += _INTEGRATION[i, j] * (piece[2 + row, j] - base)
+                offset = half * (_FROM_LEFT[i] * base + gained)
                 change = max(change, fabs(offset - piece[row, i]))
                 piece[row, i] = offset
         converged = change <= MAX_LAST_CHANGE * length or (

@@ -58,7 +58,7 @@ def _rows_at(field, p, sign, at):  # type: ignore[no-untyped-def]
     return out
 
 
-class Side(NamedTuple):
+class Branch(NamedTuple):
     """Pieces on one side of the start, in the order and the direction of increasing arc length.
 
     Attributes
@@ -85,12 +85,12 @@ class Side(NamedTuple):
     jumps: Array
     end: int
 
-    def parted(self, at: int) -> tuple["Side", "Side"]:
+    def split(self, at: int) -> tuple["Branch", "Branch"]:
         """Return the pieces before an edge, and those after it."""
         return self._between(0, at), self._between(at, self.edges.size - 1)
 
-    def _between(self, one: int, two: int) -> "Side":
-        return Side(
+    def _between(self, one: int, two: int) -> "Branch":
+        return Branch(
             self.edges[one : two + 1],
             self.anchors[one:two],
             self.tangents[one:two],
@@ -216,7 +216,7 @@ class Traced:
             raise LaunchError(f"{what}: it is {away:.3g} from it; the nearest point is ({point[0]!r}, {point[2]!r})")
         raise LaunchError(f"{what}, and no point of the curve was found near it; give a point with F = 0")
 
-    def _side(self, values: Array, start: Array, direction: int, limit: float) -> Side:
+    def _side(self, values: Array, start: Array, direction: int, limit: float) -> Branch:
         """Return the pieces ahead of the start (direction 1), or behind it (-1)."""
         sign = float(direction * self.tangent)
         end, edges, anchors, nodes, jumps, last = trace_one_way(self.field, values, sign, start, limit, direction > 0)
@@ -244,7 +244,7 @@ class Traced:
             tangents, curvatures = -tangents[::-1, :, ::-1], -curvatures[::-1, ::-1]
         # The nodes of a piece are in decreasing order.
         angles = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0])[:, ::-1].ravel()).reshape(-1, TERMS)[:, ::-1]
-        return Side(edges, anchors, tangents, angles, curvatures, jumps, end)
+        return Branch(edges, anchors, tangents, angles, curvatures, jumps, end)
 
 
 class Zeros:
@@ -271,7 +271,9 @@ class Zeros:
         """Return None: the ends of pieces are not prescribed."""
         return
 
-    def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
+    def intersect_normal(
+        self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
+    ) -> tuple[Any, Any, Any, Any]:
         """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
         there.
         """
@@ -365,7 +367,7 @@ def _what(end: int) -> str:
     return "singular-point" if end == SINGULAR else "domain-end"
 
 
-def _closed(loop: Side) -> Chart:
+def _closed(loop: Branch) -> Chart:
     """Return the chart of a closed curve, from half a period before the start to half a period after it.
 
     In this way places on both sides of the start keep all their digits. The edges are moved without rounding.
@@ -373,17 +375,17 @@ def _closed(loop: Side) -> Chart:
     period = float(loop.edges[-1])
     turn = 2.0 * pi * round((loop.angles[-1, 0] - loop.angles[0, -1]) / (2.0 * pi))
     far = np.where((loop.jumps == SMOOTH) & (loop.edges >= 0.5 * period), loop.edges, inf)
-    ahead, behind = loop.parted(int(np.argmin(far)))
+    ahead, behind = loop.split(int(np.argmin(far)))
     behind = behind._replace(edges=behind.edges - period)
     return assemble(**_pieces(_joined(behind, ahead)), period=period, turn=turn)
 
 
-def _joined(behind: Side, ahead: Side) -> Side:
+def _joined(behind: Branch, ahead: Branch) -> Branch:
     """Join both sides of the start; the angle is continuous, and between -pi and pi just after it."""
     angles = behind.angles
     if angles.size and ahead.angles.size:
         angles = angles + 2.0 * pi * round((ahead.angles[0, -1] - angles[-1, 0]) / (2.0 * pi))
-    return Side(
+    return Branch(
         np.append(behind.edges[:-1], ahead.edges),
         np.append(behind.anchors, ahead.anchors, axis=0),
         np.append(behind.tangents, ahead.tangents, axis=0),
@@ -394,7 +396,7 @@ def _joined(behind: Side, ahead: Side) -> Side:
     )
 
 
-def _pieces(side: Side) -> dict[str, Any]:
+def _pieces(side: Branch) -> dict[str, Any]:
     """Return the arguments of `assemble` that every chart has."""
     return {
         "edges": side.edges,

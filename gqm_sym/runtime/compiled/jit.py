@@ -169,8 +169,9 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
     nogil : bool
         Whether other threads of Python may run while the function does.
     checked : bool
-        Whether numba checks that arrays are contiguous and of doubles, which takes half a microsecond. The check is
-        switched off for the functions that every launch calls, each of which is called in a single place.
+        Whether numba checks that arrays are contiguous and of doubles, which takes half a microsecond, or two where
+        named tuples are given. The check is switched off for the functions that every launch or its first question
+        calls, each of which is called in a single place.
     """
 
     def decorate(function: Any) -> Callable[..., Any]:

@@ -237,14 +237,9 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
                     found[j, part, start + i] = work[outputs[j] + part * BLOCK + i]
 
 
-@entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX, CUBE), checked=False)
-def fill_signed_values(program, work, inputs, places, states, found):  # type: ignore[no-untyped-def]
-    """Fill the results of a program as `fill_values` does, for signs of dlam/dt and of N at each place.
-
-    These signs are the last two inputs of the program, and the last two rows of ``states``.
-
-    The places of the same signs are evaluated together.
-    """
+@Inner
+def fill_signed_values_of(program, work, inputs, places, states, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program in states, as `fill_signed_values` does."""
     (address, operations, first, count, outputs), n = program, places.shape[1]
     coordinates, headings, signs = places.shape[0] // 2, states[states.shape[0] - 2], states[states.shape[0] - 1]
     chosen, some = np.empty(n, dtype=np.int64), np.empty((2, BLOCK))
@@ -269,6 +264,17 @@ def fill_signed_values(program, work, inputs, places, states, found):  # type: i
                 for part in range(found.shape[1]):
                     for i in range(size):
                         found[j, part, chosen[start + i]] = work[outputs[j] + part * BLOCK + i]
+
+
+@entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX, CUBE), checked=False)
+def fill_signed_values(program, work, inputs, places, states, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program as `fill_values` does, for signs of dlam/dt and of N at each place.
+
+    These signs are the last two inputs of the program, and the last two rows of ``states``.
+
+    The places of the same signs are evaluated together.
+    """
+    fill_signed_values_of(program, work, inputs, places, states, found)
 
 
 def values(

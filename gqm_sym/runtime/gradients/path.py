@@ -89,7 +89,7 @@ def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
         The changes of x, z, v, N and y. That of v is given; the others are filled.
     """
     in_space, signed, spare = path.shape[0] > SPACE_Y, path.shape[0] <= PRODUCT, np.empty((2, v.size))
-    kappa, still, bend, product = path[CURVATURE, 0], path[LOAD, 0], spare[0], spare[1]
+    kappa, still, kappa_change, product = path[CURVATURE, 0], path[LOAD, 0], spare[0], spare[1]
     for j in range(places.shape[0]):
         faster, force = found[CHANGED_V, j], found[CHANGED_FORCE, j]
         fill_changed(path[X], j, places[j], found[CHANGED_X, j])
@@ -98,16 +98,16 @@ def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
             fill_changed(path[SPACE_Y], j, places[j], found[CHANGED_Y, j])
         else:
             found[CHANGED_Y, j] = 0.0
-        fill_changed(path[CURVATURE], j, places[j], bend)
+        fill_changed(path[CURVATURE], j, places[j], kappa_change)
         fill_changed(path[LOAD], j, places[j], force)
         if signed:
             for i in range(v.size):
-                force[i] += v[i] * v[i] * bend[i] + 2.0 * v[i] * kappa[i] * faster[i]
+                force[i] += v[i] * v[i] * kappa_change[i] + 2.0 * v[i] * kappa[i] * faster[i]
         else:
             fill_changed(path[PRODUCT], j, places[j], product)
             for i in range(v.size):
                 w, level = v[i] * v[i], path[PRODUCT, 0, i]
-                half_square = kappa[i] * w * w * bend[i] + w * product[i] + still[i] * force[i]
+                half_square = kappa[i] * w * w * kappa_change[i] + w * product[i] + still[i] * force[i]
                 half_square += 2.0 * v[i] * (kappa[i] * kappa[i] * w + level) * faster[i]
                 # |N| has a kink where it vanishes.
                 force[i] = half_square / sqrt((kappa[i] * w) ** 2 + 2.0 * level * w + still[i] * still[i])

@@ -96,7 +96,7 @@ def circular_sum(values, table, k, begin):  # type: ignore[no-untyped-def]
     return total + lost
 
 
-@entry(_SERIES(VECTOR, VECTOR, VECTOR, types.float64[:, ::1], types.boolean))
+@entry(_SERIES(VECTOR, VECTOR, VECTOR, types.float64[:, ::1], types.boolean), checked=False)
 def fit_wave(edges, times, times_low, terms, is_libration):  # type: ignore[no-untyped-def]
     """Fit a Fourier series.
 

@@ -13,7 +13,7 @@ LAUNCH                   place, signed speed, length of a lap, arc length at lau
 WAVE                     the constants of `fourier.sum_wave`
 COSINES, SINES           Fourier coefficients of the place; none where the table is to be used
 TIMING                   the constants of `phase_angles_at`
-MIDDLES ... ENDS         the table (`table.Table`)
+MIDDLES ... ENDS         the table (`table.Table`), which comes with FUNCTIONS and TIMING
 EDGES, LENGTHS, ARCS     panels of the arc length: edges, lengths there, and Legendre coefficients
 TIME_ERRORS              error of the time on each panel
 TABLE_ERRORS, OWNERS     error of the table on each of its segments, and the panel of each segment: integers
@@ -77,10 +77,16 @@ class Phases(NamedTuple):
 
 def record(sections: Mapping[int, Array | NDArray[np.int64]]) -> Array:
     """Return a record of some sections; the others are empty."""
-    sizes = [sections[k].size if k in sections else 0 for k in range(SECTIONS)]
-    marks = np.array([*accumulate(sizes, initial=SECTIONS + 1)])
-    parts = (marks, *(sections[k].reshape(-1) for k in sorted(sections)))
-    return np.concatenate([part if part.dtype.kind == "f" else part.view(np.float64) for part in parts])
+    sizes = [0] * SECTIONS
+    for k, contents in sections.items():
+        sizes[k] = contents.size
+    marks = [*accumulate(sizes, initial=SECTIONS + 1)]
+    found = np.empty(marks[-1])
+    integers = found.view(np.int64)
+    integers[: SECTIONS + 1] = marks
+    for k, contents in sections.items():
+        (found if contents.dtype.kind == "f" else integers)[marks[k] : marks[k + 1]] = contents.ravel()
+    return found
 
 
 @Inner

@@ -43,7 +43,7 @@ class BoundFunctions(NamedTuple):
     chart: Array = NOWHERE
     joints: Array = NOWHERE
 
-    def drops(self, only_sign: int) -> Array:
+    def liftoff_corners(self, only_sign: int) -> Array:
         """Return the corners at which a moving body leaves a track that can push with one sign of N only (0: with
         both).
         """

@@ -74,8 +74,8 @@ class Launch(NamedTuple):
     point: tuple[Number, Number] | None = None
 
 
-def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) -> Launch:
-    """Check a launch and read its numbers.
+def read_launch(formulas: Formulas, p: ParameterValues, request: tuple[Any, ...]) -> Launch:
+    """Check a launch, given by the fields of a `LaunchRequest`, and read its numbers.
 
     Raises
     ------

@@ -121,8 +121,8 @@ class Joints(NamedTuple):
     ----------
     breaks, corners : arrays
         All such places, and those at which the tangent jumps, within one lap.
-    drops : array
-        The corners at which a body that moves leaves the track, which can only push (`BoundFunctions.drops`).
+    liftoff_corners : array
+        The corners at which a body that moves leaves the track, which can only push (`BoundFunctions.liftoff_corners`).
     ahead : array
         A buffer for the breaks ahead of a body; `room_ahead` returns the length that it must have.
     gaps : array
@@ -132,7 +132,7 @@ class Joints(NamedTuple):
 
     breaks: Array
     corners: Array
-    drops: Array
+    liftoff_corners: Array
     ahead: Array
     gaps: Array = NO_NUMBERS
 
@@ -305,8 +305,8 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     end = body[HIGH] if direction > 0 else body[LOW]
     gaps = gaps_on_leg(dissipation, joints, reading)
     limit = place + direction * (LAPS_AHEAD if joints.gaps.size == 0 else 1) * period if period > 0.0 else end
-    drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
-    limit = drops[0] if drops.size else limit
+    liftoff_corners, _ = breaks_before(joints.liftoff_corners, joints.ahead, period, direction, place, limit)
+    limit = liftoff_corners[0] if liftoff_corners.size else limit
     # Breaks a little behind the body show on which piece of the curve it is, and one at the limit shows the end of that
     # piece.
     begin, beyond = place - direction * body[FIRST_STEP], direction * clearance(place, limit)
@@ -371,7 +371,7 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     """
     found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
-    if what == END_LIMIT and is_break(joints.drops, period, place):
+    if what == END_LIMIT and is_break(joints.liftoff_corners, period, place):
         what = END_LIFTOFF
     if what == END_RECORD_FULL or body[ENDING] == END_LIFTOFF_AT_ONCE:
         return END_LIFTOFF_AT_ONCE if body[ENDING] == END_LIFTOFF_AT_ONCE else END_RECORD_FULL

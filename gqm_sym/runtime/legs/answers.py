@@ -48,7 +48,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
-from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
+from gqm_sym.runtime.legs.leg_reading import LENGTH, LOAD, SPEED, passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -79,6 +79,7 @@ from gqm_sym.runtime.legs.runs.route import Reading
 # The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
 # equilibrium. RUN_AGAIN means to follow a leg, or a part of it, once more for its panels.
 FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
+LEAST_LENGTH, MOST_LENGTH = 10, 11
 
 # The code for a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
 END_NEAR_EQUILIBRIUM = 14
@@ -115,14 +116,14 @@ class Track(NamedTuple):
     ----------
     chart : array
         The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
-    breaks, corners, drops : arrays
+    breaks, corners, liftoff_corners : arrays
         As in `legs.advance.Joints`.
     """
 
     chart: Array
     breaks: Array
     corners: Array
-    drops: Array
+    liftoff_corners: Array
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
@@ -159,10 +160,11 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
 
 @Inner
 def sought_extreme(question):  # type: ignore[no-untyped-def]
-    """Return whether a question is about the contact force, and 1 if it is about the largest value, -1 if about the
-    smallest.
+    """Return the function that a question is about, and 1 if it is about the largest value, -1 if about the smallest
+    one.
     """
-    return question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0
+    sign = 1.0 if question in (MOST_SPEED, MOST_LOAD, MOST_LENGTH) else -1.0
+    return SPEED if question < LEAST_LOAD else LOAD if question < LEAST_LENGTH else LENGTH, sign
 
 
 @Inner
@@ -216,7 +218,7 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
         return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
     if body[ENDING] == END_ASYMPTOTE:
         return np.nan, LEFT
-    return findings.peak if question in (MOST_SPEED, MOST_LOAD) else 0.0 - findings.peak, FOUND
+    return sought_extreme(question)[1] * findings.peak, FOUND
 
 
 @Inner
@@ -224,16 +226,16 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     """Return the answer for one body with its status."""
     findings = Findings(inf, -inf)
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
-    force, sign = sought_extreme(question)
+    function, sign = sought_extreme(question)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, Reading(reads, force, sign, findings.peak), record)
+        what = advance(dissipation, p, joints, body, Reading(reads, function != SPEED, sign, findings.peak), record)
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
         if what in (END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_OUT_OF_DOMAIN, END_OVERFLOW):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
         findings = after_leg(body, question, findings, record)
-        if findings.arrival != findings.arrival:
+        if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         if not goes_on(body, question, findings.arrival):
             return conclude(body, question, findings)
@@ -302,9 +304,9 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         A row of run-time parameters for each body, or one for all of them.
     joints : Joints
     question : int
-        FIRST_LEGS to MOST_LOAD. From END_TIME on, the answers are in VALUE and STATUS of each body; LEAST_LOAD and
-        MOST_LOAD mean the contact force per mass. After FIRST_LEGS and LEGS, VALUE is the number of legs that have been
-        followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
+        FIRST_LEGS to MOST_LENGTH. From END_TIME on, the answers are in VALUE and STATUS of each body; LEAST_LOAD to
+        MOST_LENGTH mean the contact force per mass, which has a sign or a length. After FIRST_LEGS and LEGS, VALUE is
+        the number of legs that have been followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
     bodies : (n, SIZE) array
         The bodies (`legs.body`), which are moved on. For questions up to RUN_AGAIN there is one body, in the first row;
         if data of gaps are kept, the other rows become copies of it before each leg.
@@ -317,8 +319,8 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     int
         The code for the last leg of the last body (`advance`), or END_NEAR_EQUILIBRIUM.
     """
-    breaks, corners, drops, ahead, gaps = joints
-    joints = Joints(borrowed(breaks), borrowed(corners), borrowed(drops), borrowed(ahead), borrowed(gaps))
+    breaks, corners, liftoff_corners, ahead, gaps = joints
+    joints = Joints(borrowed(breaks), borrowed(corners), borrowed(liftoff_corners), borrowed(ahead), borrowed(gaps))
     parameters, bodies, records, what = borrowed(parameters), borrowed(bodies), borrowed(records), END_REST
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]

@@ -1,8 +1,6 @@
 """A body with losses, driven leg after leg along the curve, or by its distance from an equilibrium close by."""
 
-from contextlib import suppress
-from math import inf, nan
-from typing import NamedTuple
+from math import inf
 
 import numpy as np
 
@@ -11,14 +9,11 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
-from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_at_once, starting_step
+from gqm_sym.runtime.launch.ends import leaving_at_once, starting_step
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.request import ONLY_SIGN
-from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.legs.advance import CREEPING_SHARE, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW, END_REST
+from gqm_sym.runtime.legs.advance import CREEPING_SHARE, END_OUT_OF_DOMAIN, END_OVERFLOW, END_REST
 from gqm_sym.runtime.legs.answers import (
     END_NEAR_EQUILIBRIUM,
-    FIRST_LEGS,
     LEGS,
     MAX_PAUSES,
     MAX_TURNS,
@@ -32,7 +27,6 @@ from gqm_sym.runtime.legs.body import (
     ENDING,
     FIRST_STEP,
     HIGH,
-    HORIZON,
     LAM0,
     LAPS,
     LEAST_SIZE,
@@ -44,22 +38,21 @@ from gqm_sym.runtime.legs.body import (
     PERIOD,
     PLACE,
     PLACE_LOW,
-    PREFERRED,
     REACH,
     STATUS,
     STEP,
     TURNS,
     V2,
     VALUE,
-    launched,
 )
+from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
+from gqm_sym.runtime.legs.endings import END_NAMES, cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
 from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
-    END_LIFTOFF,
     END_LIMIT,
     END_PAUSE,
     END_RECORD_FULL,
@@ -68,92 +61,24 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_NARROW,
     END_TURN,
 )
-from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
 # The largest number of panels of legs that are stored; each takes some kilobytes.
 MAX_STORED = 250_000
 
-# The number of panels for which a record has space in addition to one for each break; a leg with more is followed again
-# with a larger record. The number of legs that are followed in one call for a motion with a horizon, all legs of which
-# are needed.
-FEW_PANELS, LEGS_PER_CALL = 12, 8
-
-# The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
-PIECE_SHARE = 2.0**-6
 
 # If a body creeps towards an equilibrium and no panel is narrow enough any more, its distance from the equilibrium is
 # at most this share of its place, or of the length of the leg.
 NEAR_EQUILIBRIUM = 1e-13
 
-# Legs approach a cusp to within some 1e-8, where roundings of the place hide the decrease of ds/dlam. There ds is at
-# most this share of its value a thousandth of the first step away.
-CUSP_SHARE = 1e-2
 
 # The codes for the end of a leg that may have been followed without panels, by the data kept of gaps
 # (`answers.follow_leg`).
 PASSED = END_TURN, END_REST, END_LIMIT
 
-# The names of the ends of runs that the code alone determines.
-END_NAMES = {
-    END_TURN: "turn",
-    END_REST: "rest",
-    END_LIFTOFF: "liftoff",
-    END_LIFTOFF_AT_ONCE: "liftoff",
-    END_ASYMPTOTE: "asymptote",
-}
-
 # In a frame with breaks, panels keep away from them by a share of this many times the size of the motion, which is
 # always far below the size of the motion then, and no swing is larger.
 SWINGS_AHEAD = 4.0
-
-# Curves with formulas are smooth.
-SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
-
-
-class Conditions(NamedTuple):
-    """The arguments of compiled code that all launches with the same run-time parameters and contact share.
-
-    Attributes
-    ----------
-    dissipation : Dissipation
-        The forces on the body.
-    track : Track
-        The curve, with all places at which the curve or its chart is not smooth.
-    parameters : (1, n) array
-        The run-time parameters, followed by the curve's chart if it has one.
-    passes : bool
-        Whether legs are followed by the data kept of gaps, and may have to be followed again.
-    space : int
-        The number of panels for which a record has space.
-    lines : array
-        The lines of a body (`legs.body`) without its launch.
-    """
-
-    dissipation: Dissipation
-    track: Track
-    parameters: Array
-    passes: bool
-    space: int
-    lines: Array
-
-
-def _conditions(problem: Problem) -> Conditions:
-    """Return the conditions of a launch, which are kept with the run-time parameters."""
-    p, contact = problem.p, problem.launch.contact
-    known: Conditions | None = p.conditions.get(contact)
-    if known is None:
-        f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
-        assert f.dissipation is not None
-        track = Track(f.chart, f.joints, f.corners, f.drops(only_sign)) if f.chart.size else SMOOTH
-        passes = track.is_kept(f.dissipation)
-        given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
-        lines = launched((given,), LEGS_PER_CALL if passes else 0)
-        if f.chart.size:
-            lines[0, LEAST_SIZE] = PIECE_SHARE * float(f.chart[3] - f.chart[2]) / float(f.chart[1])
-        space = FEW_PANELS + (0 if passes else track.breaks.size)
-        known = p.conditions[contact] = Conditions(f.dissipation, track, f.p[None], passes, space, lines)
-    return known
 
 
 def turned(record: Array, before: Array | None) -> Run:
@@ -170,6 +95,8 @@ class Driver:
         The launch.
     horizon : float
         The time in s up to which all legs are needed; infinite if there is none.
+    first : FirstLeg
+        The first leg of the launch.
 
     Attributes
     ----------
@@ -195,20 +122,16 @@ class Driver:
     _last_record: Array = np.empty(0)
     _frame: Frame | None = None
     _track_in_frame, _reach_in_frame = SMOOTH, 0.0
-    _is_launched = False
     # The place of a body that is followed by its distance from an equilibrium.
     _place_in_frame = 0.0
     # The number of panels for which a record has space, if it is not that of the conditions.
     _space = 0
 
-    def __init__(self, problem: Problem, horizon: float) -> None:
-        launch, self.problem, self._horizon = problem.launch, problem, horizon
-        self._conditions = conditions = _conditions(problem)
+    def __init__(self, problem: Problem, horizon: float, first: FirstLeg) -> None:
+        self.problem, self._horizon, self.body = problem, horizon, first.body
+        self._conditions = conditions_of(problem)
         self.runs: list[Run] = []
-        self.body = body = conditions.lines.copy()
-        body[0, LAM0], body[0, PREFERRED], body[0, V2] = launch.lam0.value, launch.direction, problem.w0
-        if horizon < inf:
-            body[0, HORIZON] = horizon
+        self._store(*self._completed(first.what, first.records))
 
     @property
     def dissipation(self) -> Dissipation:
@@ -257,7 +180,11 @@ class Driver:
                 f"motion: {number(PANEL_COUNT):.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        what, records = self._followed()
+        self._store(*self._completed(*self._drive(LEGS_PER_CALL if self._horizon < inf else 1)))
+
+    def _store(self, what: int, records: Array) -> None:
+        """Store the runs of some legs, given the code for the end of the last of them (`advance`)."""
+        number = self.body.item
         if what != END_TURN and not number(DIRECTION) and not number(TURNS):
             return  # the body stays where it is
         count = 1 if len(records) == 1 else int(number(VALUE))
@@ -307,9 +234,9 @@ class Driver:
         self._decide_at_equilibrium(what, float(record[START]), float(record[END]))
         if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
-        name = "" if at_limit else self._end_name(what, record, heading)
+        name = "" if at_limit else end_name(problem, what, record)
         if name == "cusp" and what == END_TOO_NARROW:
-            record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
+            record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = cusp_ahead(problem, record), 0.0
         # At a cusp dW/dlam vanishes, so that its rounding error is large compared with it there too.
         if what == END_TOO_MANY_PANELS or (what == END_TOO_NARROW and name != "cusp" and self._force_cancels(record)):
             raise self._failure(record)
@@ -322,31 +249,28 @@ class Driver:
                 "give a shorter t_max"
             )
 
-    def _followed(self) -> tuple[int, Array]:
-        """Return the code for the end of the last of the next legs (`advance`), and an array that begins with their
-        records.
+    def _drive(self, legs: int) -> tuple[int, Array]:
+        """Follow the next legs; return the code for the end of the last of them (`advance`), and their records."""
+        (dissipation, track, parameters, *_), frame = self._conditions, self._frame
+        if frame is not None:
+            legs, track, dissipation, parameters = 1, self._track_in_frame, frame.dissipation, frame.p[None]
+        records = np.empty((legs, (self._space or self._conditions.space) * COLUMNS))
+        return drive_along(track, dissipation, parameters, LEGS, self.body, records), records
+
+    def _completed(self, what: int, records: Array) -> tuple[int, Array]:
+        """Return the code and an array that begins with the records, after launching the body next to an equilibrium,
+        or with larger records, if that is necessary.
         """
-        dissipation, track, parameters, _, space, _ = self._conditions
-        legs, question = 1, FIRST_LEGS
-        if self._is_launched:
-            legs, question = LEGS_PER_CALL if self._horizon < inf else 1, LEGS
-        self._is_launched = True
         while True:
-            frame = self._frame
-            records = np.empty((legs if frame is None else 1, (self._space or space) * COLUMNS))
-            if frame is None:
-                what = drive_along(track, dissipation, parameters, question, self.body, records)
-            else:
-                what = drive_along(self._track_in_frame, frame.dissipation, frame.p[None], question, self.body, records)
             if what == END_NEAR_EQUILIBRIUM:
                 self._launch_nearby()
-                question = LEGS
             elif what != END_RECORD_FULL:
                 return what, records
             elif self.body[0, VALUE]:
                 return END_TURN, records
             else:
-                legs, self._space = 1, 4 * (self._space or space)
+                self._space = 4 * (self._space or self._conditions.space)
+            what, records = self._drive(1)
 
     def _decide_at_equilibrium(self, what: int, start: float, end: float) -> None:
         """Decide whether a run has come so close to an equilibrium that the motion ends there, or is followed in a
@@ -365,27 +289,11 @@ class Driver:
 
     def _failure(self, record: Array) -> SolutionError:
         """Return the error that says why a leg could not be followed."""
-        place = f"V**2 beyond {self.problem.formulas.parameter} = {float(record[END])!r}"
-        if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:
-            return SolutionError(
-                f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
-                "equilibrium, or faster"
-            )
-        if self._force_cancels(record):
-            return SolutionError(
-                f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "
-                "declare the sum of such forces as one, or make them smaller"
-            )
-        return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
+        return failure(self.problem, record, cancels=self._force_cancels(record))
 
     def _force_cancels(self, record: Array) -> bool:
-        """Return whether terms of the force cancel at the end or the start of a leg, so that doubles do not
-        resolve it.
-        """
-        with suppress(SolutionError):  # without formulas, or with very long ones, there is no bound on its rounding
-            law, heading = FormulaLaw(self.problem), int(record[HEADING])
-            return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
-        return False
+        """Return whether terms of the force cancel on a leg; in a frame they do not."""
+        return self._frame is None and force_cancels(self.problem, record)
 
     def _has_died_away(self, start: float, end: float) -> bool:
         """Return whether the body is, or swings, so close to an equilibrium that its place does not show it any
@@ -446,23 +354,3 @@ class Driver:
         line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period
         line[FIRST_STEP], line[REACH] = step, domain.period or step
-
-    def _cusp_ahead(self, record: Array, heading: int) -> float:
-        """Return the place of a cusp close ahead of the end of a run; the time to it is less than a rounding of the
-        time.
-        """
-        f, place, near = self.problem.functions, float(record[END]), 0.01 * NEAR_CUSP * starting_step(self.problem)
-        places = place - heading * near * np.array([0.0, 1.0, 2.0])
-        ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
-        slope, bend = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
-        distance = float(ds[0] / slope)
-        return place + heading * distance * (1.0 + float(0.5 * bend / slope) * distance)
-
-    def _end_name(self, what: int, record: Array, heading: int) -> str:
-        """Return the name of the end of a run."""
-        problem = self.problem
-        if what == END_LIMIT and not problem.period:
-            return domain_end(problem, heading).what
-        if what == END_TOO_NARROW:
-            return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
-        return END_NAMES.get(what, "")

@@ -3,7 +3,6 @@ begin.
 """
 
 from contextlib import suppress
-from functools import cached_property
 from math import inf, isfinite
 
 import numpy as np
@@ -12,13 +11,16 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import DIRECTION, TURNS
+from gqm_sym.runtime.legs.body import DIRECTION, STATUS, TURNS
+from gqm_sym.runtime.legs.conditions import follow_first_leg
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
 from gqm_sym.runtime.legs.leg_record import BEGIN, HEADING
 from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.runs.ends import END_TURN
 from gqm_sym.runtime.motion.events import Leg, passages
+from gqm_sym.runtime.motion.locking import computed_once
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 
@@ -31,10 +33,19 @@ class FollowedMotion(Motion):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "dissipative", problem.launch.direction)
-        self._driver = Driver(problem, self._horizon)
-        self._driver.go_on()
+        self._first = first = follow_first_leg(problem, self._horizon)
+        if first.what == END_TURN and not first.body.item(STATUS):
+            heading = first.records.item(HEADING)
+        else:  # the leg is stored at once, so that an impossible launch is refused
+            runs = self._driver.runs
+            heading = runs[0].record[HEADING] if runs else 0
         if problem.w0 == 0.0:
-            self.direction = int(self._driver.runs[0].record[HEADING]) if self._driver.runs else 0
+            self.direction = int(heading)
+
+    @computed_once
+    def _driver(self) -> Driver:
+        """The body, which has been driven along the first leg."""
+        return Driver(self.problem, self._horizon, self._first)
 
     # -- what `Motion` needs ------------------------------------------------------------------
 
@@ -100,12 +111,12 @@ class FollowedMotion(Motion):
 
     # -- leg after leg ------------------------------------------------------------------------
 
-    @cached_property
+    @computed_once
     def _layout(self) -> Layout:
         """The segments so far of runs that have been laid."""
         return Layout(self.problem.functions)
 
-    @cached_property
+    @computed_once
     def _inherited(self) -> InheritedErrors:
         """The errors with which the legs begin."""
         return InheritedErrors(self._driver, self._layout.runs)

@@ -8,7 +8,6 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import END_REST
 from gqm_sym.runtime.legs.driver import Driver
@@ -36,6 +35,17 @@ def _changed_charts(problem: Problem) -> Array:
     return np.hstack([np.broadcast_to(problem.p.values, (len(charts), problem.p.values.size)), charts])
 
 
+def _law_of(problem: Problem) -> FormulaLaw | None:
+    """Return the law of motion, if there is a bound on the rounding of its force: not without formulas, or with very
+    long ones.
+    """
+    with suppress(SolutionError):
+        law = FormulaLaw(problem)
+        if law.force is not None:
+            return law
+    return None
+
+
 class InheritedErrors:
     """The errors with which legs begin, computed as far as required.
 
@@ -50,8 +60,7 @@ class InheritedErrors:
     def __init__(self, driver: Driver, runs: list[Run]) -> None:
         self._driver, self._runs = driver, runs
         self._errors = [self._at_launch()]
-        # For each panel of the runs, the size of the terms of the force that may cancel.
-        self._terms: list[Array] = []
+        self._law = _law_of(driver.problem)
         self._charts = _changed_charts(driver.problem)
         self._frame: tuple[Frame, float, float] | None = None
 
@@ -93,14 +102,16 @@ class InheritedErrors:
         """
         run, before, driver = self._runs[leg], self._errors[leg], self._driver
         frame, turns = run.frame, run.what in (END_TURN, END_REST)
-        share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
+        share = rounding_share(driver.dissipation.linear)
         if frame is None:
             p = driver.problem.functions.p
+            terms = self._law.force_errors_on(run, share) if self._law is not None else np.zeros(run.ahead + run.back)
             return _known(carry(driver.dissipation, p, turns, before, share, terms, self._charts, run.record))
         of_place, of_force = self._errors_of(frame)
         if leg == 0 or self._runs[leg - 1].frame is None:
             before = before._replace(place=before.place + of_place)
         frame.move(run.record, -1)
+        terms = np.zeros(run.ahead + run.back)
         share += of_force + (0.0 if frame.is_stable else driver.force_error)
         after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, NO_CHARTS, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
@@ -115,17 +126,3 @@ class InheritedErrors:
             charts = NO_CHARTS if frame.is_sharp else self._charts
             self._frame = (frame, *error_of_chart(frame, self._driver.dissipation, charts))
         return self._frame[1:]
-
-    def _terms_of(self, leg: int) -> Array:
-        """Return, for each panel of a leg, the size of the terms of the force that may cancel; 0 if it is not known."""
-        missing, driver = self._runs[len(self._terms) :], self._driver
-        if missing:
-            terms = [np.zeros(run.ahead + run.back) for run in missing]
-            by_place = [k for k, run in enumerate(missing) if run.frame is None]
-            if by_place and isinstance(driver.problem.formulas.exact, ExactLaw):
-                with suppress(SolutionError):  # formulas may be too long
-                    errors = FormulaLaw(driver.problem).force_errors_along([missing[k] for k in by_place])
-                    for k, of_panels in zip(by_place, errors, strict=True):
-                        terms[k] = of_panels / rounding_share(driver.dissipation.linear)
-            self._terms += terms
-        return self._terms[leg]

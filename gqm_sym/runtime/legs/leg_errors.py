@@ -7,7 +7,7 @@ middle of the run. From b to the middle the same holds with the direction revers
 units in the last place of the sum of all gains and losses by its terms, reduced by the resistance since then; it also
 changes the time. The driving and the resisting forces may nearly cancel: the sum of their sizes is the larger one of
 the forces on bodies that move in either direction. Terms of the force on a body at rest may cancel too: their size
-follows from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). Along
+follows from a running bound on the roundings of the module's formulas (`variations.force_errors`). Along
 a chart it follows from the forces on charts that are changed by the possible errors of their rows (`Chart.rounded`). If
 the law is not linear in V**2, it contains a square root at the turn. Panels that run into the turn then may have nine
 digits only, while those that are followed back from it have all digits. The difference between both in the middle gives
@@ -214,11 +214,11 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
             remains = 1.0 / (1.0 + work[EXPM1_Q + j])
             kept = damping * remains
             grows = (right - left) * (slope_at(left, march) + 2.0 * march.g * work[OFFSET + j])
-            bend = work[MEAN + j] / (grows * work[DS + j])
+            ds_growth = work[MEAN + j] / (grows * work[DS + j])
             by_parameter = work[P + j] - work[Q + j] * work[W + j]
             least, most = min(least, by_parameter), max(most, by_parameter)
             change = (u * by_parameter - slope * kept) / work[W + j]
-            work[LOAD + j] = work[TIME_RATE + j] * (bend - 0.5 * change)
+            work[LOAD + j] = work[TIME_RATE + j] * (ds_growth - 0.5 * change)
             work[MEAN + j] = work[TIME_RATE + j] * kept / work[W + j]
             rounding = remains * (gained + size * work[D + j])
             work[GRADED + j] = work[TIME_RATE + j] * rounding / work[W + j]
@@ -256,7 +256,8 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
 @entry(
     types.UniTuple(REAL, 3)(
         DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, MATRIX, VECTOR
-    )
+    ),
+    checked=False,
 )
 def carry(dissipation, p, turns, before, share, terms, charts, record):  # type: ignore[no-untyped-def]
     """Return the errors at the end of a leg, with which the next one begins.

@@ -2,7 +2,7 @@
 contact force.
 """
 
-from math import asin, cos, fabs, inf, pi, sin, sqrt
+from math import asin, cos, fabs, inf, nan, pi, sin, sqrt
 
 import numpy as np
 from numba import types
@@ -73,6 +73,12 @@ terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(3 * MAX_BLOCKS * WIDE
 
 # The largest number of steps of a search within a panel, and the share of the panel at which the search stops.
 MAX_STEPS, LAST_STEP = 60, 4e-16
+
+# The functions whose extremes are read: the speed, and the contact force per mass, which has a sign or a length.
+SPEED, LOAD, LENGTH = range(3)
+
+# The largest share of the last two coefficients of a function that a panel resolves.
+MAX_TAIL = 1e-13
 
 # An extreme is located to this share of a panel, which suffices because the function is flat there.
 FLAT_PART = 1e-9
@@ -244,6 +250,27 @@ def peak_of_values(blocks, values, first, last, sign, best):  # type: ignore[no-
 
 
 @Inner
+def peak_of_function(blocks, values, part, asked, best):  # type: ignore[no-untyped-def]
+    """Return `peak_of_values` for a function on a part of a panel; NaN for a length whose square is not resolved.
+
+    The square of a length is smooth also where the length almost vanishes. The panels of a leg resolve its law, of
+    which the contact force is a small part if friction is small.
+    """
+    (function, sign), (first, last), wide = asked, part, blocks * WIDE
+    if function != LENGTH:
+        return peak_of_values(blocks, values, first, last, sign, best)
+    largest = 0.0
+    for j in range(wide - 1):
+        values[j] *= values[j]
+        largest = max(largest, values[j])
+    to_coefficients(blocks, values, 0, values, wide)
+    if not fabs(values[2 * wide - 2]) + fabs(values[2 * wide - 3]) <= MAX_TAIL * largest:
+        return nan
+    square = peak_of_values(blocks, values, first, last, sign, best * fabs(best))
+    return sqrt(square) if square >= 0.0 else -sqrt(-square)
+
+
+@Inner
 def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[no-untyped-def]
     """Return the larger of ``best`` and the peak of some panels between two values of the march variable.
 
@@ -254,12 +281,12 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
     half_c : float
         c/2 of their march variable; infinite if that is the distance.
     between : (float, float)
-    asked : (bool, float)
-        Whether the contact force per mass is asked for instead of the speed; 1 for the largest, -1 for the smallest.
+    asked : (int, float)
+        SPEED, LOAD or LENGTH; 1 for the largest, -1 for the smallest.
     """
-    (begin, count), (low, high), (force, sign) = panels, between, asked
+    (begin, count), (low, high), (function, sign) = panels, between, asked
     values = sample_buffer()
-    if half_c == 0.0 and low == 0.0 and sign < 0.0 and not force:
+    if half_c == 0.0 and low == 0.0 and sign < 0.0 and function == SPEED:
         return max(best, 0.0)  # the body is slowest where it turns
     for k in range(count):
         at, left = begin + k * COLUMNS, edge(record, begin, k)
@@ -269,8 +296,10 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
             continue
         for j in range(COUNT):
             growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
-            values[j] = record[at + NORMAL_LOAD + j] if force else growth * record[at + Y_ROW + j]
-        best = peak_of_values(1, values, max(first, -1.0), min(last, 1.0), sign, best)
+            values[j] = growth * record[at + Y_ROW + j] if function == SPEED else record[at + NORMAL_LOAD + j]
+        best = peak_of_function(1, values, (max(first, -1.0), min(last, 1.0)), (function, sign), best)
+        if best != best:
+            break
     return best
 
 
@@ -319,14 +348,14 @@ def place_in_rows(record, time):  # type: ignore[no-untyped-def]
 @Inner
 def peak_of_rows(record, until, asked, best):  # type: ignore[no-untyped-def]
     """Return `peak_of_leg` for a leg from turn to turn whose record has rows."""
-    values, (force, sign), blocks = sample_buffer(), asked, int(record[WHOLE])
-    if sign < 0.0 and not force:
+    values, (function, sign), blocks = sample_buffer(), asked, int(record[WHOLE])
+    if sign < 0.0 and function == SPEED:
         return max(best, 0.0)  # the body is slowest where it turns
     for at in range(0, blocks * WIDE, WIDE):
-        copy(values, at, record, WHOLE_ROWS + (2 if force else 1) * blocks * WIDE + at)
+        copy(values, at, record, WHOLE_ROWS + (1 if function == SPEED else 2) * blocks * WIDE + at)
     last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
-    if force:
-        return peak_of_values(blocks, values, -1.0, last, sign, best)
+    if function != SPEED:
+        return peak_of_function(blocks, values, (-1.0, last), asked, best)
     return max(best, sqrt(peak_of_values(blocks, values, -1.0, last, sign, max(best, 0.0) ** 2)))
 
 
@@ -345,7 +374,7 @@ def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
         last = edge(record, HEAD, ahead) if whole else marched_in(record, HEAD, ahead, max(until, 0.0))
         best = peak_between(record, (HEAD, ahead), record[HALF_C], (0.0, last), asked, best)
     remaining = record[TIME_FROM_START] + record[TIME_FROM_END] - until
-    if back > 0 and remaining <= record[TIME_FROM_END]:
+    if back > 0 and remaining <= record[TIME_FROM_END] and best == best:
         begin = HEAD + ahead * COLUMNS
         first = marched_in(record, begin, back, remaining) if remaining > 0.0 else 0.0
         best = peak_between(record, (begin, back), 0.0, (first, edge(record, begin, back)), asked, best)

@@ -8,7 +8,7 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE
 from gqm_sym.runtime.legs.frames.local_frame import Frame
@@ -29,7 +29,6 @@ from gqm_sym.runtime.legs.leg_record import (
     LAPS_BEFORE,
     RIGHT,
     START,
-    TIME,
     TIME_ERROR,
     TIME_FROM_END,
     TIME_FROM_START,
@@ -39,6 +38,7 @@ from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_PAUSE
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segments.segment import Segment
+from gqm_sym.runtime.quadrature.running_totals import totals_of
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 
@@ -47,21 +47,24 @@ from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 MAX_PHASE_ANGLE = 690.0
 
 
-@entry(types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, types.float64))(MATRIX, types.float64))
+@entry(
+    types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, VECTOR, MATRIX))(MATRIX, REAL),
+    checked=False,
+)
 def read_panels(panels, time):  # type: ignore[no-untyped-def]
     """Return a leg's panels in the form of `time_panels.lay`; their times add up to ``time``.
 
     Returns
     -------
-    edges, edge_times, lengths, time_terms, length_terms : arrays
+    edges, edge_times, lengths, time_terms, length_terms, error
         As in `time_panels.lay`; the last phase angle is 1.
+    low_times : array
+        The low parts of the times at the edges, as two doubles.
     speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
-    error : float
-        Estimated relative error of the time.
     """
     n = panels.shape[0]
-    edges, edge_times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    edges, lengths = np.zeros(n + 1), np.zeros(n + 1)
     time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
     out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, RIGHT]
     for k in range(n):
@@ -76,10 +79,11 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
             speed_terms[k, j] = out[2 * WIDE + j]
             length += length_terms[k, j]
         edges[k + 1] = panels[k, RIGHT] / last
-        edge_times[k + 1], lengths[k + 1] = edge_times[k] + panels[k, TIME], lengths[k] + length
+        lengths[k + 1] = lengths[k] + length
         error += panels[k, TIME_ERROR]
-    edge_times[n] = time
-    return edges, edge_times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+    edge_times, low_times = totals_of(time_terms, time)
+    error = error / time + ULP if time > 0.0 else ULP
+    return edges, edge_times, lengths, time_terms, length_terms, error, low_times, speed_terms
 
 
 class Run(NamedTuple):
@@ -186,7 +190,7 @@ def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float
 
     ``half_c`` is c/2 of the march variable of the panels; it is infinite if that is the distance.
     """
-    *laid, speed_terms, error = read_panels(panels, time)
+    *laid, low_times, speed_terms = read_panels(panels, time)
     last = float(panels[-1, RIGHT])
     return Segment(
         functions=f,
@@ -195,7 +199,8 @@ def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float
         b=b[0],
         low_parts=(a[1], b[1]),
         turn_offset=0.0 if half_c == inf else half_c / last,
-        stored_panels=(*laid, error, 1.0, CONVERGED),
+        stored_panels=(*laid, 1.0, CONVERGED),
+        known_edge_times=(laid[1], low_times),
         speed_series=(last, speed_terms),
     )
 

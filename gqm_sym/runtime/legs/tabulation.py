@@ -102,7 +102,7 @@ def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
 TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)
 
 
-@entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, TIMING))
+@entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, TIMING), checked=False)
 def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # type: ignore[no-untyped-def]
     """Return the arrays of a `TabulatedPiece`.
 

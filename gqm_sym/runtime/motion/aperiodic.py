@@ -1,7 +1,7 @@
 """Motions that do not repeat: those to an end of the curve, to an equilibrium, to infinity or to a pole, and rest."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 
 import numpy as np
@@ -24,7 +24,7 @@ from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segments.conditioning import v2_correction
 from gqm_sym.runtime.motion.segments.kinds import through, toward_equilibrium
 from gqm_sym.runtime.motion.segments.segment import Segment
-from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
+from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, stop_time
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 
 # The number of segments of a motion to infinity that `legs` and `events` cover, and the number of panels; its end is
@@ -119,6 +119,7 @@ class AperiodicMotion(Motion):
                 phi_start=phi_start,
                 phi_stop=phi_stop,
                 t_start=t,
+                t_stop=stop_time(sense, start, stop, t),
                 s_a=s_a,
                 end=end,
             )
@@ -141,7 +142,8 @@ class AperiodicMotion(Motion):
         side = ONLY_SIGN[self.problem.launch.contact]
         lost = liftoff(self.problem.formulas, timed, side, first=not self._segments) if side else None
         if lost is not None:
-            timed = replace(timed, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
+            t_stop = stop_time(timed.sense, timed.r_start, lost[0], timed.t_start)
+            timed = timed._replace(r_stop=lost[0], phi_stop=lost[1], t_stop=t_stop, end="liftoff")
             self.kind, self.open_end = "transit", None
         self._segments.append(timed)
 
@@ -277,7 +279,7 @@ class AperiodicMotion(Motion):
 
     def _end_here(self) -> None:
         """End the motion at a singular point, because the rest of it has no duration and no length within rounding."""
-        self._segments[-1] = replace(self._segments[-1], end="singular-point")
+        self._segments[-1] = self._segments[-1]._replace(end="singular-point")
         self.open_end = None
 
     def _time_error(self, t: Array) -> Array:

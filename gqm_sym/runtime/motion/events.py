@@ -272,7 +272,7 @@ def liftoff(formulas: "Formulas", timed: TimedSegment, side: int, *, first: bool
         here, then = contact_signs(formulas, timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
-    lost = sorted([*crossed, *corner_crossings(timed, timed.segment.functions.drops(side), 0.0)])
+    lost = sorted([*crossed, *corner_crossings(timed, timed.segment.functions.liftoff_corners(side), 0.0)])
     if not lost:
         return None
     phi = lost[0][1]

@@ -4,11 +4,40 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import wraps
 from threading import RLock
-from typing import Any, Concatenate, ParamSpec, TypeVar, cast
+from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, cast, overload
 
 P = ParamSpec("P")
 R = TypeVar("R")
 T = TypeVar("T")
+
+
+class computed_once(Generic[T, R]):
+    """A property that is computed when it is first needed, and then kept in its object's dictionary.
+
+    It is for methods that run under the object's own lock. `functools.cached_property` has a lock in Python 3.11 that
+    all objects of a class share, so that threads with different motions would wait for each other.
+    """
+
+    def __init__(self, compute: Callable[[T], R]) -> None:
+        self._compute = compute
+        self.__doc__ = compute.__doc__
+
+    def __set_name__(self, owner: type[T], name: str) -> None:
+        """Note the name of the property."""
+        self._name = name
+
+    @overload
+    def __get__(self, owner: None, kind: type[T]) -> Self: ...
+
+    @overload
+    def __get__(self, owner: T, kind: type[T]) -> R: ...
+
+    def __get__(self, owner: T | None, kind: type[T]) -> Self | R:
+        """Compute the property; Python reads it from the dictionary afterwards."""
+        if owner is None:
+            return self
+        found = owner.__dict__[self._name] = self._compute(owner)
+        return found
 
 
 def lock_of(owner: Any) -> AbstractContextManager[Any]:

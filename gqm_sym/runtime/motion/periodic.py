@@ -1,6 +1,6 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
-from functools import cached_property, partial
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -20,7 +20,7 @@ from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
-from gqm_sym.runtime.motion.locking import lock_of, locked
+from gqm_sym.runtime.motion.locking import computed_once, lock_of, locked
 from gqm_sym.runtime.motion.periodic_times import PeriodicTimes, Times
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
@@ -57,7 +57,7 @@ class PeriodicMotion(PeriodicTimes):
 
     _sampler: Sampler | None = None
 
-    @cached_property
+    @computed_once
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
         direction = self.direction if self.kind == "circulation" else 0
@@ -84,7 +84,7 @@ class PeriodicMotion(PeriodicTimes):
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
         return ChartOrbitDerivatives(self.problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
-    @cached_property
+    @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:
         return OrbitSensitivity(self._derivatives)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 
 import numpy as np
@@ -14,7 +13,7 @@ from gqm_sym.runtime.double_double.orbit_time import Orbit
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import computed_once, locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.sampler import Sampler
 from gqm_sym.runtime.motion.segments import errors
@@ -80,13 +79,13 @@ class PeriodicTimes(Motion):
         super().__init__(problem, kind, direction)
         self._given_segment, self._offsets = segment, offsets
 
-    @cached_property
+    @computed_once
     def _segment_in_doubles(self) -> Segment:
         """Its segment between the turning points that doubles have found."""
         given = self._given_segment
         return given if isinstance(given, Segment) else given()
 
-    @cached_property
+    @computed_once
     def _segment(self) -> Segment:
         """The segment, which ends at the doubles nearest to the true turning points.
 
@@ -137,12 +136,12 @@ class PeriodicTimes(Motion):
         f, s = self.problem.functions, self._segment
         return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MAX_CHART_PIECES
 
-    @cached_property
+    @computed_once
     def _is_exact(self) -> bool:
         """Whether the period can be computed to more digits than doubles hold."""
         return self._has_multiprecision or self._orbit is not None
 
-    @cached_property
+    @computed_once
     def _orbit_by_rule(self) -> Orbit | None:
         """The orbit of a launch from a turning point, or of a circulation, for which the trapezoidal rule has converged
         in doubles; None for others, and along charts.
@@ -152,7 +151,7 @@ class PeriodicTimes(Motion):
             return None
         return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets)
 
-    @cached_property
+    @computed_once
     def _orbit(self) -> Orbit | None:
         """Duration and turning points in double-double arithmetic; None if that does not suffice."""
         launch = self.problem, self.kind, self.direction, self._offsets
@@ -161,12 +160,12 @@ class PeriodicTimes(Motion):
             return orbit
         return timing.orbit_of(*launch, timing.times_along(self._segment, is_thrown=False))
 
-    @cached_property
+    @computed_once
     def _in_doubles(self) -> Times:
         times = timing.in_doubles(self.kind, self._segment, self._offsets)
         return Times(times, self._repeated(times), (-inf, self._latest_in_doubles if self._is_exact else inf))
 
-    @cached_property
+    @computed_once
     def _in_double_double(self) -> Times | None:
         if not self._is_exact:
             return None
@@ -174,7 +173,7 @@ class PeriodicTimes(Motion):
         times = timing.in_double_double(*launch, segment, self._offsets, self._orbit_by_rule)
         return None if times is None else Times(times, self._repeated(times), (-inf, times.max_time))
 
-    @cached_property
+    @computed_once
     def _in_multiprecision(self) -> Times:
         launch, known = (self.problem, self.kind, self.direction), self._in_double_double
         times = timing.in_multiprecision(*launch, self._segment)

@@ -85,11 +85,8 @@ class Sampler:
         ends = (segment.a, segment.b, problem.lam0, lap)
         self._v0, self._of_states = direction * problem.launch.v0.value, of_states
         own_times = (*segment.total_time, segment.stop, time_scale_error)
-        self._sections = {
-            records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
-            records.WAVE: np.array([*period, *_inverse(period), start, start_low, *ends]),
-            records.TIMING: np.array([*period, start, start_low, *own_times]),
-        }
+        self._timing = (*period, start, start_low, *own_times)
+        self._sections = {records.WAVE: np.array([*period, *_inverse(period), start, start_low, *ends])}
         f = problem.functions
         if not f.between(f.breaks, segment.a, segment.b).size:
             series = fit_wave(segment.edges, *segment.edge_times, segment.panels[3], there_and_back)
@@ -101,8 +98,12 @@ class Sampler:
         self._state_record: Array | None = None
 
     def _tabulate(self) -> None:
-        names = (records.MIDDLES, records.LOWS, records.SCALES, records.POWERS, records.INDEX, records.ENDS)
-        self._sections.update(zip(names, self._segment.table[:6], strict=True))
+        """Add the table, and what it is read with."""
+        segment, names = self._segment, range(records.MIDDLES, records.ENDS + 1)
+        self._sections.update(zip(names, segment.table[:6], strict=True))
+        functions = (*self._problem.functions.addresses, segment.kind)
+        self._sections[records.FUNCTIONS] = np.array(functions, dtype=np.int64)
+        self._sections[records.TIMING] = np.array(self._timing)
 
     @property
     def _record_of_places(self) -> Array:

@@ -1,10 +1,9 @@
 """The period of a motion, and the time from a turning point to the launch, in doubles or in extended precision."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from math import ceil, inf, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,8 +37,7 @@ MAX_TURN_ERROR = 2.0**-54
 EXACT_ERROR = 2.0**-104
 
 
-@dataclass(frozen=True, slots=True)
-class Timing:
+class Timing(NamedTuple):
     """Times of a periodic motion, each as two doubles.
 
     Attributes

@@ -11,8 +11,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.motion.segments.segment import Segment
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TimedSegment:
+class TimedSegment(NamedTuple):
     """A segment, or a part of one, that the body moves through once, with its times.
 
     Attributes
@@ -25,8 +24,8 @@ class TimedSegment:
         Time in s from the segment's end ``a`` at the start and at the stop, each as two doubles.
     phi_start, phi_stop : float
         The phase angles there.
-    t_start : pair of float
-        Time in s from launch at the start, as two doubles.
+    t_start, t_stop : pair of float
+        Time in s from launch at the start and at the stop, each as two doubles (`stop_time`).
     s_a : float
         Arc length in m from the launch to the segment's end ``a``.
     end : str
@@ -44,21 +43,22 @@ class TimedSegment:
     phi_start: float
     phi_stop: float
     t_start: Pair
+    t_stop: Pair
     s_a: float
     end: str
     laps: int = 0
     leg: int = 0
 
     @property
-    def t_stop(self) -> Pair:
-        """Time in s from launch at the stop, as two doubles."""
-        spent = minus(self.r_stop, self.r_start)
-        return plus(self.t_start, (self.sense * spent[0], self.sense * spent[1]))
-
-    @property
     def direction(self) -> int:
         """The sign of ds/dt."""
         return self.sense * self.segment.direction
+
+
+def stop_time(sense: int, r_start: Pair, r_stop: Pair, t_start: Pair) -> Pair:
+    """Return the time from launch at the stop of a timed segment, whose attributes the arguments are."""
+    spent = minus(r_stop, r_start)
+    return plus(t_start, (sense * spent[0], sense * spent[1]))
 
 
 class Repeated(NamedTuple):
@@ -143,6 +143,7 @@ def libration(
     for sense, (start, phi_start), (stop, phi_stop), end in runs:
         if start == stop:
             continue
+        t_start, t = t, stop_time(sense, start, stop, t)
         timed = TimedSegment(
             segment=segment,
             sense=sense,
@@ -150,12 +151,12 @@ def libration(
             r_stop=stop,
             phi_start=phi_start,
             phi_stop=phi_stop,
-            t_start=t,
+            t_start=t_start,
+            t_stop=t,
             s_a=s_a,
             end=end,
         )
         segments.append(timed)
-        t = timed.t_stop
     return tuple(segments)
 
 
@@ -169,6 +170,7 @@ def circulation(segment: Segment, duration: Pair) -> TimedSegment:
         phi_start=0.0,
         phi_stop=segment.stop,
         t_start=ZERO,
+        t_stop=stop_time(1, ZERO, duration, ZERO),
         s_a=0.0,
         end="horizon",
     )

@@ -315,7 +315,7 @@ def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ign
 PANELS_TYPE = types.NamedTuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64), Panels)
 
 
-@entry(PANELS_TYPE(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR))
+@entry(PANELS_TYPE(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR), checked=False)
 def lay_panels(fns, p, kind, a, b, ref, w0, marks):  # type: ignore[no-untyped-def]
     """Call `lay` from Python; the arguments are those of `Integrand`."""
     return lay(Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0))), marks)

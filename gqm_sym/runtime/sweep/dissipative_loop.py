@@ -68,10 +68,14 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     loss = formulas.dissipation
     if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
+    question = QUESTIONS[quantity]
     if quantity.startswith("normal_force") and not formulas.signed:
-        return None  # the panels of a leg resolve its law of motion, which may not contain the contact force
+        # The rows of a leg hold the length of the contact force only if its law depends on it.
+        if loss.linear or formulas.sided or formulas.directed:
+            return None
+        question = legs.LEAST_LENGTH if question == legs.LEAST_LOAD else legs.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
-    return Question(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
+    return Question(question, horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 
 
 def answer_driven(
@@ -112,7 +116,7 @@ def answer_driven(
         rows = _rows(some[PARAMETERS:], track.chart)
         legs.drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
-        if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
+        if asked.question >= legs.LEAST_LOAD:
             values *= some[mass]
         status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
         without = ended != legs.FOUND

@@ -42,7 +42,7 @@ class Group(NamedTuple):
     ----------
     columns : list of arrays
         The launches, in the order of `strided`; each array has one number, or one for each launch.
-    chart, joints, corners, drops : arrays
+    chart, joints, corners, liftoff_corners : arrays
         The chart, which compiled code reads after the parameters; and the places within one period at which the curve
         is not smooth or pieces of the chart meet, at which the tangent jumps, and at which contact is lost. All are
         empty for a curve with formulas.
@@ -58,7 +58,7 @@ class Group(NamedTuple):
     chart: Array = NOWHERE
     joints: Array = NOWHERE
     corners: Array = NOWHERE
-    drops: Array = NOWHERE
+    liftoff_corners: Array = NOWHERE
     table: CurveTable = NO_TABLE
     factors: list[Array] = _WHOLE
     ends: int = NO_ENDS
@@ -79,11 +79,11 @@ def groups_of(
             table, ends = _tabulated_range(formulas, columns, domain, only_sign)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
         return
-    held, factors = _held(formulas, len(columns) - 4), _WHOLE
+    common, factors = _common_parameters(formulas, len(columns) - 4), _WHOLE
     if formulas.separated is not None and formulas.dissipation is None:
         factors = [widen(factor, shape) for factor in formulas.separated_factors(columns[4:])]
-    for found, chosen in _distinct([columns[4 + k] for k in held], shape):
-        given = dict(zip(held, found, strict=True))
+    for found, chosen in _distinct([columns[4 + k] for k in common], shape):
+        given = dict(zip(common, found, strict=True))
         values = tuple(given.get(k, 1.0) for k in range(len(columns) - 4))
         try:
             chart = chart_with(formulas.chart, values)
@@ -100,13 +100,13 @@ def groups_of(
             some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
         has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
         ends = CURVE_ENDS if has_ends else NO_ENDS
-        launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
+        launches, liftoff_corners = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
         # Bodies that lose energy pass the chart piece by piece.
         joints = chart.breaks if not formulas.dissipation else chart.inner_edges
-        yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
+        yield Group(launches, chart.block, joints, chart.corners, liftoff_corners, table, theirs, ends), chosen
 
 
-def _held(formulas: "Formulas", count: int) -> list[int]:
+def _common_parameters(formulas: "Formulas", count: int) -> list[int]:
     """Return the indices of the run-time parameters, and of the chart after them, that the launches of one group have
     in common.
 

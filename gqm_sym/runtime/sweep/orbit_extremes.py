@@ -52,7 +52,7 @@ FUNCTIONS, COORDINATES = 4, 3
 # The number of highest peaks of a grid that are kept, and the number of values for each: the top of the parabola, the
 # point of the grid, and the values before, at and after it. Peaks within the third share of the range from the highest
 # are refined, because the grid does not distinguish them.
-PEAKS, PEAK_ROW, TIED = 4, 5, 0.02
+PEAKS, PEAK_ROW, PEAK_MARGIN = 4, 5, 0.02
 line_buffer, pair_buffer, frame_buffer, vector_buffer, point_buffer, sum_buffer, peak_buffer = (
     on_stack(n)
     for n in (
@@ -242,7 +242,7 @@ def highest_top(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore
     least, largest = sums[LEAST], sums[LARGEST]
     size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
     for k in range(PEAKS):
-        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
+        if peaks[k * PEAK_ROW] >= peaks[0] - PEAK_MARGIN * (largest - least):
             value = top_of(curve, orbit, sought, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
             if value != value:
                 return value

@@ -112,11 +112,11 @@ def sweep(
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
     if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
-            if asked is None and group.drops.size:
+            if asked is None and group.liftoff_corners.size:
                 continue  # tables do not contain corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
-                track = Track(group.chart, group.joints, group.corners, group.drops)
+                track = Track(group.chart, group.joints, group.corners, group.liftoff_corners)
                 work, least = partial(answer_driven, formulas, asked, track, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 last = inf if t_max is None else as_doubles(t_max, "t_max").item()

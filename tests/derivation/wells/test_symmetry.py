@@ -13,6 +13,7 @@ CASES = {
     "parabola": (gqm.Curve.graph("x**2", parameter="x"), 0, None, True),
     "parabola, shifted": (gqm.Curve.graph("3*x**2 - x", parameter="x"), sp.Rational(1, 6), None, False),
     "double well": (gqm.Curve.graph("x**4 - 2*x**2", parameter="x"), 0, None, False),
+    "cycloid": (gqm.families.cycloid(R=1, inverted=True), sp.pi, sp.pi, False),  # inside its domain, between cusps
     "catenary": (gqm.Curve.graph("cosh(x/2)", parameter="x"), 0, None, True),
     "wave": (gqm.Curve.graph("sin(3*x)", parameter="x"), -sp.pi / 6, sp.pi / 3, True),
     "two waves": (gqm.Curve.graph("cos(x) + cos(2*x)", parameter="x"), 0, sp.pi, False),
@@ -34,7 +35,8 @@ def test_symmetry(name: str) -> None:
     assert found is not None
     assert (found.place, found.step, found.monotone) == (place, step, monotone)
     values = {
-        sp.Symbol(key, real=True): value for key, value in (("L", sp.Rational(7, 5)), ("g", sp.Rational(981, 100)))
+        sp.Symbol(key, real=True): value
+        for key, value in (("L", sp.Rational(7, 5)), ("R", sp.S.One), ("g", sp.Rational(981, 100)))
     }
     with mp.workdps(30):
         potential, ds, slope = (
@@ -44,7 +46,8 @@ def test_symmetry(name: str) -> None:
         axes = [mpf(sp.N(place + k * (step or 0), 40)) for k in (0, 1, -3)]
         for axis in axes:
             for away in map(mpf, ("0.3", "1.7", "2.9")):
-                for form in (potential, ds):
+                for form in (potential, lambda place: ds(place) ** 2):
                     assert abs(form(axis + away) - form(axis - away)) <= mpf("1e-25") * (1 + abs(form(axis + away)))
+                assert abs(ds(axes[0] + away) - ds(axes[0] - away)) <= mpf("1e-25") * (1 + abs(ds(axes[0] + away)))
         signs = {mp.sign(slope(axes[0] + (axes[1] - axes[0] or 9) * mpf(k) / 10)) for k in range(1, 10)}
     assert not monotone or len(signs) == 1

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym.runtime.motion.locking import lock_of
+from gqm_sym.runtime.motion.locking import computed_once, lock_of
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -105,3 +105,27 @@ def test_a_motion_is_copied_while_it_answers(module_named: ModuleOf) -> None:
     with lock_of(motion), ThreadPoolExecutor(1) as pool:
         for other in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
             assert pool.submit(lock_of(other).__enter__).result(60.0)
+
+
+class Slow:
+    """An object whose answer takes until another thread computes the answer of another object."""
+
+    def __init__(self, both: Barrier) -> None:
+        self._both, self.count = both, 0
+
+    @computed_once
+    def answer(self) -> int:
+        """The answer."""
+        self._both.wait(timeout=60.0)
+        self.count += 1
+        return self.count
+
+
+def test_objects_compute_at_the_same_time() -> None:
+    """Objects of one class do not wait for each other (with `functools.cached_property` of Python 3.11 they did)."""
+    both = Barrier(2)
+    slow = [Slow(both), Slow(both)]
+    with ThreadPoolExecutor(2) as pool:
+        assert [*pool.map(lambda one: one.answer, slow)] == [1, 1]
+    assert [one.answer for one in slow] == [1, 1]  # computed once
+    assert Slow.answer.__doc__ == "The answer."

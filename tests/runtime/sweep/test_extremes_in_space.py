@@ -104,3 +104,19 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
                 motion = module.solve(place, v0, 1, **given)
                 largest = motion.normal_force_max.value
                 assert abs(value - getattr(motion, quantity).value) <= 2e-13 * largest
+
+
+@pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
+def test_with_friction_as_solved_motions(build: Build, name: str) -> None:
+    """Bodies that slide to rest have the extremes of solved motions within roundings of the largest force."""
+    surveyed = gqm.Curve.sampled([[u, 0.3 * np.sin(u), 0.5 * u * u] for u in np.linspace(-2.0, 2.0, 41).tolist()])
+    curve, given, low, high = (WIRE, {"a": 0.4}, 0.2, 2.0) if name == "rough_wire" else (surveyed, {}, 3.3, 4.6)
+    module = build(f"{name}_extremes", curve, gqm.CoulombFriction(mu="1/20"))
+    places = np.random.default_rng(4).uniform(low, high, 6)
+    for t_max in (None, 1.7):
+        for quantity in ("normal_force_min", "normal_force_max"):
+            sweep = module.sweep(quantity, places, 0.0, t_max=t_max, **given)
+            assert (sweep.route == 1).all()
+            for place, value in zip(places.tolist(), sweep.values.tolist(), strict=True):
+                motion = module.solve(place, 0.0, 1, t_max=t_max, **given)
+                assert abs(value - getattr(motion, quantity).value) <= 2e-15 * motion.normal_force_max.value

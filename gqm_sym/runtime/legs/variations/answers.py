@@ -321,8 +321,8 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tupl
         changed = states_at(changes, motion._march_points(np.array([t]))[0])
         law = changed.law
         slope, by_place, by_w = law.force if of_speed else changes.law.loads(changed.states)
-        bend, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
-        step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
+        slope_rate, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
+        step = -slope[0] / slope_rate * law.ds[0] / v if slope_rate and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
             return float(found.t), False
         t += step

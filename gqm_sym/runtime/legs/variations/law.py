@@ -1,17 +1,12 @@
 """The law of a motion with losses in given states, with its derivatives, in double-double arithmetic."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from functools import cached_property
-from itertools import pairwise
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
 from gqm_sym.runtime.gradients.lanes.evaluation import fill_lane_values
 from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
@@ -19,11 +14,10 @@ from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
-from gqm_sym.runtime.legs.panels.polynomials import COUNT
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
+from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
 from gqm_sym.runtime.legs.variations.programs import (
     force_program,
     law_in_doubles,
@@ -31,9 +25,7 @@ from gqm_sym.runtime.legs.variations.programs import (
     load_program,
     range_program,
 )
-
-# The ratio of the rounding errors of doubles to those of double-double arithmetic.
-ROUNDING_RATIO = 0.5 * ULP / UNIT
+from gqm_sym.runtime.motion.locking import computed_once
 
 # The largest distance of a motion from the zero of the curve's parameter, in its width, for which places in doubles
 # suffice at the nodes of panels.
@@ -172,7 +164,7 @@ class FormulaLaw(Law):
         moves[self.count] = 1.0
         return moves
 
-    @cached_property
+    @computed_once
     def ranges(self) -> Array:
         """See `Law`."""
         assert self._domain is not None
@@ -209,38 +201,31 @@ class FormulaLaw(Law):
         """See `Law`."""
         return path_rows(self._exact, self.parameters, self.mass, high, low)
 
-    def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:
-        """Return `force_errors` on the panels of each run, beginning with those from its start: the largest at three
-        places of each.
+    def force_errors_on(self, run: Run, share: float) -> Array:
+        """Return, for each panel of a run, the error of the force on a body at rest, as a multiple of ``share``
+        (`force_errors.force_errors_on`).
         """
-        halves, panels, ends = [], [], [0]
-        for run in runs:
-            v, ahead = float(run.record[HEADING]), run.panels_ahead
-            halves.append((run.record[START], v, v, run.half_c))
-            panels.append(ahead)
-            ends.append(ends[-1] + len(ahead))
-            if run.what != END_ASYMPTOTE:
-                halves.append((run.record[END], v, -v, 0.0))
-                panels.append(run.panels_back)
-                ends[-1] += len(panels[-1])
-        sizes = [len(of_half) for of_half in panels]
-        origin, v, sense, half_c = np.repeat(np.array(halves).T, sizes, axis=1)
-        right, load = (np.concatenate([of_half[:, k] for of_half in panels]) for k in (RIGHT, NORMAL_LOAD + COUNT // 2))
-        left = np.concatenate([[0.0], right])
-        left[np.cumsum(sizes) - sizes] = 0.0  # at the first panel of each half
-        left = left[:-1]
-        w = np.array([left, 0.5 * (left + right), right])
-        is_distance = half_c == inf
-        places = origin + sense * np.where(is_distance, w, w * (w + 2.0 * np.where(is_distance, 0.0, half_c)))
-        nu = np.where(load > 0.0, 1.0, -1.0)
-        errors = self.force_errors(places.ravel(), np.concatenate([v] * 3), np.concatenate([nu] * 3))
-        largest = errors.reshape(places.shape).max(axis=0)
-        return [largest[begin:end] for begin, end in pairwise(ends)]
+        operands, work, by_field = self.force.operands, self.force.work, run.what == END_ASYMPTOTE
+        errors: Array = force_errors_on(operands, work, self._inexact_inputs, by_field, share, run.record)
+        return errors
 
-    def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
-        """Return the errors of dW/dlam of a body at rest in doubles: by rounding, and by the rounding of the place."""
-        errors = self._forces(places, v, nu)[1]
-        return np.where(errors < inf, errors, 0.0)
+    @computed_once
+    def force(self) -> Program:
+        """The program of dW/dlam.
+
+        Raises
+        ------
+        SolutionError
+            If the formulas are too long.
+        """
+        return force_program(self._exact, self.count)
+
+    @computed_once
+    def _inexact_inputs(self) -> Array:
+        """The inputs of `force` with their errors in doubles, which lack the low parts."""
+        inputs: Array = np.concatenate([self.parameters, np.zeros((3, 2))], axis=1)
+        inputs[2, : self.count] = np.abs(self.parameters[1]) / ROUNDING_RATIO
+        return inputs
 
     def _forces(self, places: Array, v: Array, nu: Array) -> tuple[Array, Array]:
         """Return the force dW/dlam on a body at rest, and its errors.
@@ -249,7 +234,7 @@ class FormulaLaw(Law):
         """
         states = states_of(places, np.zeros_like(places), np.zeros_like(places), v, nu)
         lows = np.abs(self.parameters[1]) / ROUNDING_RATIO  # doubles lack the low parts
-        force, slope = self.values(force_program(self._exact, self.count), states, lows)
+        force, slope = self.values(self.force, states, lows)
         return force[0], ROUNDING_RATIO * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
     def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
@@ -259,7 +244,7 @@ class FormulaLaw(Law):
         """
         ones = np.ones_like(high)
         states = states_of(high, low, 0.0 * ones, ones, ones)
-        force, slope = self.values(force_program(self._exact, self.count), states)
+        force, slope = self.values(self.force, states)
         return force[0], slope[0]
 
     def cancels(self, place: float, heading: int) -> bool:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import running_totals
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion.table import build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.running_totals import running_totals
 from gqm_sym.runtime.quadrature.substitution import (
     FROM_TURN,
     REGULAR,
@@ -86,6 +86,8 @@ class Segment:
     speed_series : (float, array), optional
         For panels computed together with a leg, the last value of the march variable and the Legendre coefficients of Y
         (`legs.panels.equation`).
+    known_edge_times : pair of arrays, optional
+        The time in s from ``a`` to each edge of its panels, as two doubles, once they have been computed.
     known_duration : float, optional
         Its duration in s, if it was found accurately in doubles; panels are then computed when they are first needed.
     is_lazy : bool
@@ -112,7 +114,7 @@ class Segment:
     ends: tuple[Any, Any] = (None, None)
     _from_multiprecision: bool = False
     _condition_number: float = field(default=1.0, init=False)
-    _edge_times: Any = field(default=None, repr=False)
+    known_edge_times: Any = field(default=None, repr=False)
     has_given_times: bool = field(default=False, repr=False)
     _width_ratio: float | None = field(default=None, repr=False)
     _table: Any = field(default=None, repr=False)
@@ -184,15 +186,15 @@ class Segment:
     def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
         """Return the same segment with more accurate times at the edges of its panels."""
         other = copy(self._with_panels())
-        other._edge_times, other._table, other.has_given_times, other.known_duration = edge_times, None, True, None
+        other.known_edge_times, other._table, other.has_given_times, other.known_duration = edge_times, None, True, None
         return other
 
     @property
     def edge_times(self) -> tuple[Array, Array]:
         """The time in s from ``a`` to each edge of the panels, as two doubles."""
-        if self._edge_times is None:
-            self._edge_times = running_totals(self.panels[1], self.panels[3])
-        times, low = self._edge_times
+        if self.known_edge_times is None:
+            self.known_edge_times = running_totals(self.panels[3], self.panels[1][-1])
+        times, low = self.known_edge_times
         return times, low
 
     def _initial_edges(self) -> Array:
@@ -219,9 +221,9 @@ class Segment:
     @property
     def total_time(self) -> tuple[float, float]:
         """The time in s from one end to the other as two doubles, according to its panels."""
-        if self._edge_times is None:
+        if self.known_edge_times is None:
             return float(self.panels[1][-1]), 0.0
-        return float(self._edge_times[0][-1]), float(self._edge_times[1][-1])
+        return float(self.known_edge_times[0][-1]), float(self.known_edge_times[1][-1])
 
     @property
     def length(self) -> float:

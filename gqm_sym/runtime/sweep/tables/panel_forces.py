@@ -83,10 +83,10 @@ def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
     """
     lead, behind, power, first = 0.0, 0.0, 1.0, 0
     for j in range(1, NODES):
-        bend = j * (j + 1) * row[at + j] * power
-        behind, power = behind + max(-bend, 0.0), -2.0 * edge * power
-        if bend > lead:
-            lead, behind, first = bend, 0.0, j
+        part = j * (j + 1) * row[at + j] * power
+        behind, power = behind + max(-part, 0.0), -2.0 * edge * power
+        if part > lead:
+            lead, behind, first = part, 0.0, j
     distance, height = 2.0, 0.0
     if not lead > 2.0 * behind:
         return inf
@@ -107,14 +107,14 @@ def fill_near(curve, k):  # type: ignore[no-untyped-def]
     """Fill the polynomials, and the sign of the slope and the bound that follow from them."""
     parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
     fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
-    change, slope, spread, bend = 0.0, row[MIDDLE_TERMS], 0.0, 2.0 * row[MIDDLE_TERMS + 1]
+    change, slope, spread, convexity = 0.0, row[MIDDLE_TERMS], 0.0, 2.0 * row[MIDDLE_TERMS + 1]
     for j in range(2, NODES + 1):
         term = fabs(row[MIDDLE_TERMS + j - 1])
         change += j * term
-        bend -= j * (j - 1) * term if j > 2 else 0.0
+        convexity -= j * (j - 1) * term if j > 2 else 0.0
         spread += fabs(row[SERIES + j - 1])
     row[CONVEX_FROM] = -inf
-    if not bend > 0.0:
+    if not convexity > 0.0:
         from_right = row[INCREASE] + convex_level(row, RIGHT_TERMS, 1.0)
         row[CONVEX_FROM] = row[BASE] + min(convex_level(row, LEFT_TERMS, -1.0), from_right)
     row[SLOPE_SIGN], top = 0.0, row[MIDDLE] + spread

@@ -8,7 +8,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from generated import parabola_rolling
+from generated import cycloid_inverted, parabola_rolling
 
 ULPS = 4.0
 ROLLING = {"a": 1.0, "beta": 0.4, "rho": 0.05, "g": 9.81, "m": 1.0}
@@ -51,6 +51,18 @@ def test_a_launch_alone_has_the_same_bits() -> None:
         assert np.array_equal(together.values, alone)
         singly = parabola_rolling.sweep(quantity, lam0, v0, **{**ROLLING, "rho": np.full(300, 0.05)})
         assert singly.values == pytest.approx(together.values, rel=5e-16, abs=0.0)
+
+
+def test_a_cycloid_is_a_tautochrone() -> None:
+    """Between the cusps of a cycloid all half periods are 2 pi sqrt(R/g); nothing swings across a cusp."""
+    rng = np.random.default_rng(6)
+    lam0, v0 = rng.uniform(0.3, 6.0, 200), np.where(rng.random(200) < 0.5, 0.0, rng.uniform(0.0, 4.0, 200))
+    got = cycloid_inverted.sweep("half_period", lam0, v0, R=1)
+    swings = v0**2 < 2 * 9.81 * (1 - np.cos(lam0))  # the rest reach a cusp, at height 0
+    assert swings.any()
+    assert not swings.all()
+    assert (got.status == 0).tolist() == swings.tolist()
+    assert got.values[swings] == pytest.approx(2 * np.pi / np.sqrt(9.81), rel=ULPS * 2.0**-52, abs=0.0)
 
 
 def _height(x: Any) -> Any:

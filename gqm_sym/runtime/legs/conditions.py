@@ -1,0 +1,101 @@
+"""What all launches with the same run-time parameters and contact share, and the first leg of each."""
+
+from math import inf, nan
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import ONLY_SIGN
+from gqm_sym.runtime.legs.answers import FIRST_LEGS, Track, drive_along
+from gqm_sym.runtime.legs.body import HORIZON, LAM0, LEAST_SIZE, PREFERRED, V2, launched
+from gqm_sym.runtime.legs.leg_record import COLUMNS
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
+
+# The number of panels for which a record has space in addition to one for each break; a leg with more is followed again
+# with a larger record. The number of legs that are followed in one call for a motion with a horizon, all legs of which
+# are needed.
+FEW_PANELS, LEGS_PER_CALL = 12, 8
+
+# The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
+PIECE_SHARE = 2.0**-6
+
+# Curves with formulas are smooth.
+SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+
+
+class FirstLeg(NamedTuple):
+    """The first leg of a launch as compiled code has followed it, from which a driver goes on.
+
+    Attributes
+    ----------
+    body : array
+        The lines of the body (`legs.body`).
+    what : int
+        The code for the end of the leg (`advance`), or END_NEAR_EQUILIBRIUM.
+    records : (1, n) array
+        The record of the leg (`leg_record`).
+    """
+
+    body: Array
+    what: int
+    records: Array
+
+
+class Conditions(NamedTuple):
+    """The arguments of compiled code that all launches with the same run-time parameters and contact share.
+
+    Attributes
+    ----------
+    dissipation : Dissipation
+        The forces on the body.
+    track : Track
+        The curve, with all places at which the curve or its chart is not smooth.
+    parameters : (1, n) array
+        The run-time parameters, followed by the curve's chart if it has one.
+    passes : bool
+        Whether legs are followed by the data kept of gaps, and may have to be followed again.
+    space : int
+        The number of panels for which a record has space.
+    lines : array
+        The lines of a body (`legs.body`) without its launch.
+    """
+
+    dissipation: Dissipation
+    track: Track
+    parameters: Array
+    passes: bool
+    space: int
+    lines: Array
+
+
+def conditions_of(problem: Problem) -> Conditions:
+    """Return the conditions of a launch, which are kept with the run-time parameters."""
+    p, contact = problem.p, problem.launch.contact
+    known: Conditions | None = p.conditions.get(contact)
+    if known is None:
+        f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
+        assert f.dissipation is not None
+        track = Track(f.chart, f.joints, f.corners, f.liftoff_corners(only_sign)) if f.chart.size else SMOOTH
+        passes = track.is_kept(f.dissipation)
+        given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
+        lines = launched((given,), LEGS_PER_CALL if passes else 0)
+        if f.chart.size:
+            lines[0, LEAST_SIZE] = PIECE_SHARE * float(f.chart[3] - f.chart[2]) / float(f.chart[1])
+        space = FEW_PANELS + (0 if passes else track.breaks.size)
+        known = p.conditions[contact] = Conditions(f.dissipation, track, f.p[None], passes, space, lines)
+    return known
+
+
+def follow_first_leg(problem: Problem, horizon: float) -> FirstLeg:
+    """Follow a body from its launch along one leg, for a motion of which all legs up to a horizon in s are needed."""
+    dissipation, track, parameters, _, space, lines = conditions_of(problem)
+    body, records, launch = lines.copy(), np.empty((1, space * COLUMNS)), problem.launch
+    body[0, LAM0], body[0, PREFERRED], body[0, V2] = launch.lam0.value, launch.direction, problem.w0
+    if horizon < inf:
+        body[0, HORIZON] = horizon
+    what = drive_along(track, dissipation, parameters, FIRST_LEGS, body, records)
+    # This avoids the constructor of a named tuple, which is slow.
+    return tuple.__new__(FirstLeg, (body, what, records))

@@ -1,0 +1,73 @@
+"""What has ended a run of a motion with losses, by name, and why a leg could not be followed."""
+
+from contextlib import suppress
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, starting_step
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.speed import path_and_force_at
+from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
+from gqm_sym.runtime.legs.body import LEAST_SWING
+from gqm_sym.runtime.legs.leg_record import END, HEADING, START
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_LIFTOFF, END_LIMIT, END_TOO_NARROW, END_TURN
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
+
+# Legs approach a cusp to within some 1e-8, where roundings of the place hide the decrease of ds/dlam. There ds is at
+# most this share of its value a thousandth of the first step away.
+CUSP_SHARE = 1e-2
+
+# The names of the ends of runs that the code alone determines.
+END_NAMES = {
+    END_TURN: "turn",
+    END_REST: "rest",
+    END_LIFTOFF: "liftoff",
+    END_LIFTOFF_AT_ONCE: "liftoff",
+    END_ASYMPTOTE: "asymptote",
+}
+
+
+def end_name(problem: Problem, what: int, record: Array) -> str:
+    """Return the name of the end of a run, given its code and its record."""
+    if what == END_LIMIT and not problem.period:
+        return domain_end(problem, int(record[HEADING])).what
+    if what == END_TOO_NARROW:
+        return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
+    return END_NAMES.get(what, "")
+
+
+def cusp_ahead(problem: Problem, record: Array) -> float:
+    """Return the place of a cusp close ahead of the end of a run, which takes less than a rounding of the time."""
+    f, place, heading = problem.functions, float(record[END]), int(record[HEADING])
+    near = 0.01 * NEAR_CUSP * starting_step(problem)
+    places = place - heading * near * np.array([0.0, 1.0, 2.0])
+    ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+    slope, second = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
+    distance = float(ds[0] / slope)
+    return place + heading * distance * (1.0 + float(0.5 * second / slope) * distance)
+
+
+def force_cancels(problem: Problem, record: Array) -> bool:
+    """Return whether terms of the force cancel at the end or the start of a leg, so that doubles do not resolve it."""
+    with suppress(SolutionError):  # without formulas, or with very long ones, there is no bound on its rounding
+        law, heading = FormulaLaw(problem), int(record[HEADING])
+        return any(law.cancels(float(record[end]), heading) for end in (START, END))
+    return False
+
+
+def failure(problem: Problem, record: Array, *, cancels: bool) -> SolutionError:
+    """Return the error that says why a leg could not be followed; ``cancels`` is whether terms of the force cancel."""
+    place = f"V**2 beyond {problem.formulas.parameter} = {float(record[END])!r}"
+    if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:
+        return SolutionError(
+            f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
+            "equilibrium, or faster"
+        )
+    if cancels:
+        return SolutionError(
+            f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "
+            "declare the sum of such forces as one, or make them smaller"
+        )
+    return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
