@@ -67,17 +67,32 @@ def test_on_a_circle_it_is_a_pendulum(circle: ModuleType, radius: float, length:
     assert circle.sweep("half_period", [place], L=radius, length=length).values[0] == pytest.approx(found, rel=1e-15)
 
 
-@pytest.mark.parametrize("angle", [0.00278, 0.0313, 0.000652])
-def test_short_trains_on_small_swings(circle: ModuleType, angle: float) -> None:
-    """A swing may end close to where an end of the train passes the lowest place (the period was off by 5.8e-12)."""
-    radius, length = 0.109, 0.000566
+@pytest.mark.parametrize(
+    ("radius", "length", "angle"),
+    [
+        (0.109, 0.000566, 0.00278),
+        (0.109, 0.000566, 0.0313),
+        (0.109, 0.000566, 0.000652),
+        (0.3186115687952875, 0.00038500124019736525, -0.0019450235259119313),
+        (5.689898986605093, 0.022285694341114663, -0.0048662706504848914),
+        (40.89235868677015, 0.047210990718864976, 0.0014709309872692083),
+        (10.466112216758653, 0.08211080714535617, 0.016336325120811755),
+    ],
+)
+def test_short_trains_on_small_swings(circle: ModuleType, radius: float, length: float, angle: float) -> None:
+    """A swing may end close to where an end of the train passes the lowest place (the period was off by 5.8e-12).
+
+    The other turning point was up to 2e-10 of the swing off, because the roundings of a lap came together there.
+    """
     with mp.workdps(40):
         truth = (
             4 * mp.sqrt(radius / weaker(length, radius)) * mp.ellipk(mp.sin(mpf(angle * radius) / (2 * radius)) ** 2)
         )
-        found = circle.solve(angle * radius, L=radius, length=length).period
+        motion = circle.solve(angle * radius, L=radius, length=length)
         # The chart begins and ends at the lowest place, where a place has the rounding of the length of a lap.
-        assert abs(found / truth - 1) <= ROUNDING + 2.0**-53 * 2 * mp.pi / angle
+        place = 2.0**-53 * 2 * mp.pi
+        assert abs(motion.period / truth - 1) <= ROUNDING + place / abs(angle)
+        assert abs(sum(motion.turning_points)) <= 8 * place * radius
 
 
 def test_forces_on_cars(circle: ModuleType) -> None:

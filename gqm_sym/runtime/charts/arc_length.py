@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.budgets import check_budget
 from gqm_sym.errors import BudgetError, SolutionError
-from gqm_sym.runtime.charts.chart import FIT, NODES
+from gqm_sym.runtime.charts.chart import FIT, NODES, WEIGHTS
 from gqm_sym.runtime.charts.evaluate import TERMS
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import Array
@@ -179,7 +179,7 @@ def divided(rows: Rows, edges: Array, dimension: int, *, where: str) -> Division
         speeds = values[dimension]
         rates = np.ascontiguousarray((half[:, None] * speeds) @ FIT.T)
         gains = np.ascontiguousarray(chebint(rates, lbnd=-1, axis=1))
-        lengths = gains.sum(axis=1)
+        lengths = (half * (speeds.astype(np.longdouble) @ WEIGHTS)).astype(np.float64)
         # The mean rate is subtracted: the remainder is small, so that its rounding does not limit Newton's method.
         gains[:, :2] -= 0.5 * lengths[:, None]
         values = rows(low, half[:, None] * (1.0 + _invert(lengths, rates, gains)))[dimension + 1 :]

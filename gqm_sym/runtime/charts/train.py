@@ -177,7 +177,12 @@ def _mean_height(track: Chart, edges: Array, length: float) -> Array:
         bends = turns * np.cos(0.5 * (front + back)) * np.sinc((front - back) / (2.0 * np.pi))
     slopes, bends = slopes.reshape(places.shape), bends.reshape(places.shape)
     gains = np.append(_first_height(track, block, edges[0], length), half * (slopes @ WEIGHTS))
-    heights = np.cumsum(gains, dtype=np.longdouble)[:-1]
+    heights = np.cumsum(gains, dtype=np.longdouble)
+    if track.period:
+        # A lap gains nothing but the roundings of all pieces. They must not come together where the chart begins and
+        # ends, because small swings about that place would lose as many digits as their height is smaller than a lap's.
+        heights -= (heights[-1] - heights[0]) * ((edges - edges[0]) / track.period)
+    heights = heights[:-1]
     anchors = heights.astype(np.float64)
     lows = (heights - anchors).astype(np.float64)
     (made,) = blocks_of(edges, (anchors[:, None], lows[:, None]), (slopes[:, None], bends[:, None]), track.period)

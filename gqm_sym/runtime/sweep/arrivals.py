@@ -21,6 +21,9 @@ from gqm_sym.runtime.sweep.orbit import Orbit
 # The numbers of terms of the series that are tried in turn.
 FEW_TERMS, MORE_TERMS, MAX_TERMS = 32, 64, 128
 
+# Where the rates at the nodes so far begin in the work space, behind the four rows of a call.
+KEPT = 4 * (MAX_TERMS + 1)
+
 # The number of last coefficients that must be small, and their largest ratio to the first. Integration divides each
 # coefficient by its index, so that their share of the time is even smaller.
 TAIL_LENGTH, TAIL_RATIO = 4, 1e-14
@@ -52,32 +55,46 @@ WIDTH_SHARES = np.sin(0.5 * pi * np.arange(MAX_TERMS + 1) / MAX_TERMS) ** 2
 
 
 @Inner
-def fill_time_rate_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untyped-def]
-    """Fill the cosine series of dt/dphi over [0, pi]; return whether it is resolved and V**2 is far from vanishing."""
-    m = n + 1
-    da, db, rows = work[:m], work[m : 2 * m], work[2 * m : 4 * m]
+def fill_time_rate_series(fns, p, ends, n, factors, work, series):  # type: ignore[no-untyped-def]
+    """Fill the cosine series of dt/dphi over [0, pi].
+
+    ``ends`` are both ends of the orbit and its width. If n is more than FEW_TERMS, the series of half as many terms has
+    been filled before: its nodes are every other one of these, and their rates are in ``work``.
+
+    Returns
+    -------
+    resolved : bool
+        Whether the series is resolved and V**2 is far from vanishing.
+    factors : (float, float)
+        The smallest and the largest regular factor of V**2 at all nodes so far, given that of the series before.
+    """
+    (a, b, width), (low, high), step = ends, factors, MAX_TERMS // n
+    first, every, m = (0, step, n + 1) if n == FEW_TERMS else (step, 2 * step, n // 2)
+    da, db, rows, rates = work[:m], work[m : 2 * m], work[2 * m : 4 * m], work[KEPT : KEPT + MAX_TERMS + 1]
     for j in range(m):
-        node = j * (MAX_TERMS // n)
+        node = first + j * every
         da[j], db[j] = width * WIDTH_SHARES[node], width * WIDTH_SHARES[MAX_TERMS - node]
     call_potential_divdiff2(fns.potential_divdiff2, m, a, b, da, db, p, rows)
-    low, high, tail = inf, 0.0, 0.0
     for j in range(m):
         q = rows[j]
         low, high = min(low, q), max(high, q)
-        da[j] = rows[m + j] / sqrt(2.0 * q)
+        rates[first + j * every] = rows[m + j] / sqrt(2.0 * q)
+    for j in range(n + 1):
+        work[j] = rates[j * step]
     if n == FEW_TERMS:
         few_cosines(work, 0, series, 0)
     elif n == MORE_TERMS:
         more_cosines(work, 0, series, 0)
     else:
-        for k in range(m):
+        for k in range(n + 1):
             series[k] = 0.0
-        for j in range(m):
-            for k in range(m):
-                series[k] += COSINES[j, k] * da[j]
+        for j in range(n + 1):
+            for k in range(n + 1):
+                series[k] += COSINES[j, k] * work[j]
+    tail = 0.0
     for k in range(n - TAIL_LENGTH, n + 1):
         tail = max(tail, fabs(series[k]))
-    return tail <= TAIL_RATIO * series[0] and low > MIN_CANCELLATION_RATIO * high
+    return tail <= TAIL_RATIO * series[0] and low > MIN_CANCELLATION_RATIO * high, (low, high)
 
 
 @Inner
@@ -152,10 +169,10 @@ def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no
     """
     low, high, a, b = orbit.low, orbit.high, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
     joints = joints_between(curve.joints, curve.period, a, b)
-    n, resolved = FEW_TERMS // 2 if joints.size == 0 else MAX_TERMS, False
+    n, resolved, factors = FEW_TERMS // 2 if joints.size == 0 else MAX_TERMS, False, (inf, 0.0)
     while n < MAX_TERMS and not resolved:
         n *= 2
-        resolved = fill_time_rate_series(curve.fns, curve.p, a, b, width, n, work, series)
+        resolved, factors = fill_time_rate_series(curve.fns, curve.p, (a, b, width), n, factors, work, series)
     from_upper = -low > high
     if resolved:
         near, far = (high, -low) if from_upper else (-low, high)
