@@ -67,10 +67,10 @@ class LaneProgram(NamedTuple):
         return INTERPRETER.address, LANES_INTERPRETER.address, *self[:-1]
 
 
-def assemble(op: LaneRecorder, results: Sequence[Any]) -> LaneProgram:
-    """Return the program of results, of which all but the first have variances."""
-    outputs = [op.register(result) for result in results]
-    noise = [op.register(v) for v in rounding.variances(op, _live(op, outputs[1:]), outputs[1:])]
+def assemble(op: LaneRecorder, results: Sequence[Any], measured: Sequence[Any] = ()) -> LaneProgram:
+    """Return the program of results, and of the variances of the ``measured`` ones."""
+    outputs, uncertain = ([op.register(result) for result in some] for some in (results, measured))
+    noise = [op.register(v) for v in rounding.variances(op, _live(op, uncertain), uncertain)] if uncertain else []
     live = _live(op, outputs) | _live(op, noise)
     pairs = [k for k in sorted(live | set(range(len(op.values)))) if not op.depends(k)]
     slots = {k: ROW * slot for slot, k in enumerate(pairs)}

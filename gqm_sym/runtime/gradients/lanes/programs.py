@@ -50,7 +50,8 @@ def swing_program(source: Source, wanted: tuple[int, ...]) -> LaneProgram | None
         return None
     rate = ds / op.sqrt(2 * factor)
     moved = [(moves[j], moves[count + j], *(op.number(int(i == k)) for i in range(n))) for j, k in enumerate(wanted)]
-    return assemble(op, [factor, *changes(op, rate, (a, b, *p), moved)])
+    found = changes(op, rate, (a, b, *p), moved)
+    return assemble(op, [factor, *found], found)
 
 
 def changes(

@@ -6,8 +6,9 @@ ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. 
 exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The width is that for which the mean
 over the whole leg vanishes; Newton's method finds it.
 
-The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). Where the panels
-of a leg are read, which takes as long as to follow it panel by panel if there are many, it has 23.
+The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). It has 23 where
+panels are read, and at most 47 where the time at a place is, because with more nodes these take longer than panels that
+are laid one by one.
 """
 
 from math import fabs, fsum, sqrt
@@ -69,6 +70,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     fill_times,
     fill_v2,
     has_no_kink,
+    is_contact_force_resolved,
     is_load_resolved,
     keeps_sign,
     sample_leg,
@@ -204,7 +206,7 @@ def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # 
 
 
 @Inner
-def is_whole(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untyped-def]
     """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg, and the number
     of blocks to try next, or 0.
     """
@@ -215,6 +217,8 @@ def is_whole(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
     fill_v2(blocks, h, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
+    if load_fine and reading.what == PEAKS and reading.force:
+        load_fine, load_ratio = is_contact_force_resolved(blocks, work)
     if not (fine and load_fine):
         return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
     noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]
@@ -228,9 +232,9 @@ def is_whole(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_leg(forces, march, panel, room, start, most, work):  # type: ignore[no-untyped-def]
-    """Return the number of blocks that resolve a leg, at most ``most``, and its width; 0 blocks if there are none."""
-    blocks = start.blocks
+def solve_leg(forces, march, panel, room, start, reading, work):  # type: ignore[no-untyped-def]
+    """Return the number of blocks that resolve a leg and its width; 0 blocks if there are none."""
+    blocks, most = start.blocks, 1 if reading.what == PANELS else (2 if reading.what == PASSAGE else MAX_BLOCKS)
     if blocks > most:
         return 0, 0.0
     width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
@@ -240,7 +244,7 @@ def solve_leg(forces, march, panel, room, start, most, work):  # type: ignore[no
             h = width_of_leg(forces, march, panel, blocks, room, h, False, work)
         if not h > 0.0:
             break
-        fine, onwards = is_whole(forces, panel, blocks, h, work)
+        fine, onwards = is_whole(forces, panel, blocks, h, reading, work)
         if fine:
             return blocks, h
         if not 0 < onwards <= most:
@@ -363,9 +367,7 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and has_space(record, WHOLE_ROWS + 3 * COLUMNS, 0):
         work = whole_buffer()
-        # Panels of a leg with more nodes would take more time than to lay them one by one.
-        most = 1 if route.reading.what == PANELS else MAX_BLOCKS
-        blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, most, work)
+        blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, route.reading, work)
         if blocks > 0 and enter_leg(record, route, origin, v, blocks, h, work):
             what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
         else:

@@ -38,6 +38,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     fill_expm1,
     force_row,
     linear_row,
+    load_per_mass_row,
     load_row,
     load_size_row,
     product,
@@ -205,6 +206,17 @@ def is_load_resolved(blocks, contact_sign, work):  # type: ignore[no-untyped-def
     if not fine and tail <= FAR_FROM_ZERO_RATIO * size:
         limit = 4.0 * FAR_FROM_ZERO_RATIO * size
         fine = tail <= ONE_SIGN_RATIO * size or keeps_sign(blocks, work, LOAD, contact_sign, limit)
+    return fine, middle / size
+
+
+@Inner
+def is_contact_force_resolved(blocks, work):  # type: ignore[no-untyped-def]
+    """Return whether N itself is resolved, as its extremes require, and the ratio of its middle coefficients."""
+    for at in range(0, blocks * WIDE, WIDE):
+        n0, kappa, w = blocks * N0 + at, blocks * KAPPA + at, blocks * W + at
+        load_per_mass_row(work, blocks * SERIES + at, n0, kappa, w)
+    size = size_of_row(blocks, work, SERIES)
+    _tail, middle, fine = examine_row(blocks, work, SERIES, size)
     return fine, middle / size
 
 

@@ -16,7 +16,7 @@ from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.chain import ORIGIN_ROWS, STATE_ROWS, fill_along, fill_states, follow_changes
 from gqm_sym.runtime.legs.variations.chart_law import law_of
-from gqm_sym.runtime.legs.variations.equation import CONTACT_SIGN, PANEL_COLUMNS, end_speed, lay_panels
+from gqm_sym.runtime.legs.variations.equation import CONTACT_SIGN, MARKS, PANEL_COLUMNS, end_speed, lay_panels
 from gqm_sym.runtime.legs.variations.law import LawRows, states_of
 
 
@@ -91,7 +91,7 @@ class Changes:
         states = lay_panels(line, begins, self._first, panels)
         self._panels = panels[: self._first[-1]]
         self._laid = line, begins, self._first, self._panels
-        law, n = self.law.matrix(states), self.law.count
+        law, n = self.law.matrix_on_panels(states, MARKS * len(records)), self.law.count
         self._solutions = np.empty((len(self._panels), 3 * n + 4, WIDE))
         self._origins = np.empty((2 * len(records), ORIGIN_ROWS, n + 2))
         ends = np.empty((len(records), ORIGIN_ROWS, n + 2))

@@ -8,6 +8,7 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
+from gqm_sym.runtime.gradients.lanes.evaluation import fill_lane_values
 from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import Program
@@ -17,8 +18,18 @@ from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
-from gqm_sym.runtime.legs.variations.programs import force_program, law_program, load_program, range_program
+from gqm_sym.runtime.legs.variations.programs import (
+    force_program,
+    law_in_doubles,
+    law_program,
+    load_program,
+    range_program,
+)
 from gqm_sym.runtime.motion.locking import computed_once
+
+# The largest distance of a motion from the zero of the curve's parameter, in its width, for which places in doubles
+# suffice at the nodes of panels.
+MAX_DISTANCE = 10.0
 
 # The largest relative error of the force at which panels still distinguish rounding from structure.
 MAX_FORCE_ERROR = 1e-11
@@ -101,6 +112,13 @@ class Law(ABC):
     def matrix(self, states: Array) -> Array:
         """Return the law in states, as `LawRows.matrix`."""
 
+    def matrix_on_panels(self, states: Array, marks: int) -> Array:
+        """Return the law in states, to the last digits in the first ``marks`` of them only.
+
+        Roundings at the nodes of panels average out. Where a body turns, the force may be a small difference.
+        """
+        return self.matrix(states)
+
     @abstractmethod
     def loads(self, states: Array) -> Array:
         """Return the slope of the contact force per mass along the motion, and its derivatives with respect to the
@@ -160,6 +178,18 @@ class FormulaLaw(Law):
     def matrix(self, states: Array) -> Array:
         """See `Law`."""
         found: Array = self.values(law_program(self._exact, self.count), states, parts=1)[:, 0]
+        return found
+
+    def matrix_on_panels(self, states: Array, marks: int) -> Array:
+        """See `Law`."""
+        places = states[0, :marks].tolist()
+        low, high = min(places), max(places)
+        if MAX_DISTANCE * (high - low) < max(-low, high):
+            return self.matrix(states)  # doubles do not resolve places so near to each other
+        program = law_in_doubles(self._exact, self.count)
+        found = np.empty((program.outputs.size, states.shape[1]))
+        fill_lane_values(program.operands, program.work, self.parameters, states, found)
+        found[:, :marks] = self.matrix(np.ascontiguousarray(states[:, :marks]))
         return found
 
     def loads(self, states: Array) -> Array:

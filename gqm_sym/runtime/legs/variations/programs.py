@@ -6,6 +6,9 @@ from typing import Any, NamedTuple
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
+from gqm_sym.runtime.gradients.lanes.assembly import assemble as assemble_lanes
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.programs import Program, assemble, load_per_mass
 from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
 
@@ -21,6 +24,19 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
     op, ds, slope = _law(law, parameters)
     (lam, w), p = op.places, op.values[:parameters]
     return assemble(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
+
+
+@lru_cache(maxsize=64)
+def law_in_doubles(law: ExactLaw, parameters: int) -> LaneProgram:
+    """Return the program of `law_program` in double precision.
+
+    The inputs are the run-time parameters. The coordinates of a place are those of a state (`law.states_of`), of which
+    the low double of the place does not matter.
+    """
+    op = LaneRecorder(parameters, 5)
+    (lam, _, w, *signs), p = op.places, op.values
+    ds, slope = op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
+    return assemble_lanes(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
 
 
 @lru_cache(maxsize=64)

@@ -230,6 +230,8 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
             assert swept("t_end") == pytest.approx(float(mp.fsum(times)), rel=2e-15)
             assert swept("rest_position") == pytest.approx(float(places[-1]), rel=0.0, abs=1e-15)
         a, b = places[:2]
+        lightest = min(body.g / mp.sqrt(1 + slope(x) ** 2) for x in places)  # where the body rests for a moment
+        assert swept("normal_force_min") == pytest.approx(float(lightest), rel=2e-15)
         fastest = mp.findroot(lambda x: mp.diff(lambda y: body.v2(a, y, -1), x), 0.0)
         assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
         for share in map(mpf, ("0.0625", "0.375", "0.875")):
