@@ -38,7 +38,7 @@ _ELEMENTARY = {
 
 # Other names that a function may use because they mean the same in Python.
 _SAME = (abs, bool, enumerate, int, len, max, min, range, round, slice, math.copysign)
-_OF_NUMPY = "abs array empty floor full int64 maximum ones rint searchsorted zeros"
+_OF_NUMPY = "abs array bool_ empty floor full int64 int8 maximum ones rint searchsorted zeros"
 _NUMPY = SimpleNamespace(
     **{name: getattr(np, name) for name in _OF_NUMPY.split()},
     **{name: np.float64(getattr(np, name)) for name in ("inf", "nan", "pi")},
@@ -75,6 +75,9 @@ class _Sharing(threading.local):
 _DEADLINE, _SHARING = _Deadline(), _Sharing()
 _STEPS = count()
 
+
+# The parser of Python 3.11 may raise a SystemError if two threads use it at once.
+_PARSING = threading.Lock()
 
 # Launches in this process so far.
 _LAUNCHES = SimpleNamespace(count=0)
@@ -239,6 +242,12 @@ def _array(address: Any, shape: Any) -> Any:
     return np.frombuffer(line, dtype=np.dtype(kind)).reshape(shape)
 
 
+def _parts_of(x: Any) -> tuple[Any, int]:
+    """Return what `math.frexp` returns in compiled code."""
+    share, exponent = math.frexp(x)
+    return np.float64(share), exponent
+
+
 @cache
 def _operations() -> dict[Any, Callable[..., Any]]:
     """Return, for each operation of compiled code, the Python function that gives the same result."""
@@ -249,6 +258,7 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         math.fabs: abs,
         math.floor: lambda x: int(np.floor(x)),
         math.ceil: lambda x: int(np.ceil(x)),
+        math.frexp: _parts_of,
         math.isfinite: np.isfinite,
         numba.carray: _array,
         intrinsics.fma: fma,
@@ -371,7 +381,8 @@ def plain_function(function: Any, text: str | None = None) -> Callable[..., Any]
 
 def _of_text(text: str, original: CodeType) -> CodeType:
     """Return the code of a function made from its text, with powers as calls."""
-    definition = ast.parse(text).body[0]
+    with _PARSING:
+        definition = ast.parse(text).body[0]
     if not isinstance(definition, ast.FunctionDef):
         raise NotPlainError
     definition.decorator_list = []
