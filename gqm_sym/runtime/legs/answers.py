@@ -218,7 +218,7 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
         return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
     if body[ENDING] == END_ASYMPTOTE:
         return np.nan, LEFT
-    return sought_extreme(question)[1] * findings.peak, FOUND
+    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak, FOUND
 
 
 @Inner
