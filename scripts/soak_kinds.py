@@ -297,9 +297,9 @@ def rims(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     motion = modules["rim"].solve(lam0, v0, draw.choice((1, -1)), **given)
     found, count, w, at = [], 0, mpf(v0) ** 2, mpf(lam0)
     for leg in [leg for leg in motion.legs if leg.end not in ("horizon", "asymptote") and leg.t_end > 0.0][:6]:
-        what, at = rim_end(w, at, leg, mpf(mu), mpf(mu) + mpf(b))
+        what, at, resolved = rim_end(w, at, leg, mpf(mu), mpf(mu) + mpf(b))
         # The circle is a chart of doubles, whose radius is 1: its tangent has a rounding of its own everywhere.
-        error, bound = abs(mpf(leg.lam_end) - at), motion.error_bound(leg.t_end) + 2.0**-52
+        error, bound = abs(mpf(leg.lam_end) - at), motion.error_bound(leg.t_end) + 2.0**-52 + resolved
         count, w = count + 1, mpf(0)
         if leg.end not in what:
             found.append(f"{leg.end} for {what[0]}")
@@ -310,8 +310,12 @@ def rims(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     return found, count
 
 
-def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, ...], Any]:
-    """Return how and where a leg ends; V**2 is the solution of a linear equation there."""
+def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, ...], Any, float]:
+    """Return how and where a leg ends, and to what distance doubles resolve it; V**2 solves a linear equation.
+
+    The bound of a place at a time says nothing of where contact is lost: next to the top the contact force changes so
+    slowly that a rounding of its terms moves that place by many roundings.
+    """
     g, u = mpf(G), leg.direction
     a = (2 * g - 4 * c * mu * g) / (1 + 4 * c**2)
     b = -2 * u * mu * g - 2 * u * c * a
@@ -327,9 +331,10 @@ def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, .
         return mp.findroot(function, mpf(leg.lam_end))
 
     if leg.end == "liftoff":
-        return ("liftoff",), root(load)
+        at = root(load)
+        return ("liftoff",), at, float(ROUNDINGS * (speed(at) + g) / abs(mp.diff(load, at)))
     at = root(speed)
-    return ("rest",) if abs(mp.sin(at)) <= mu * mp.cos(at) else ("turn",), at
+    return ("rest",) if abs(mp.sin(at)) <= mu * mp.cos(at) else ("turn",), at, 0.0
 
 
 def hills(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
