@@ -304,7 +304,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
     gaps = gaps_on_leg(dissipation, joints, reading)
-    limit = place + direction * (LAPS_AHEAD if joints.gaps.size == 0 else 1) * period if period > 0.0 else end
+    limit = place + direction * (LAPS_AHEAD * period if joints.gaps.size == 0 else body[REACH]) if period > 0.0 else end
     liftoff_corners, _ = breaks_before(joints.liftoff_corners, joints.ahead, period, direction, place, limit)
     limit = liftoff_corners[0] if liftoff_corners.size else limit
     # Breaks a little behind the body show on which piece of the curve it is, and one at the limit shows the end of that

@@ -23,7 +23,7 @@ DIRECTION             the sign of dlam/dt of the next leg; 0 if the body stays w
 CONTACT_SIGN, STEP,   as of `runs.route.Start`
 NO_TURN_UNTIL
 FIRST_STEP            the step of a search along the curve (`launch.ends.first_step`)
-REACH                 on a curve without ends, the distance after which a run pauses
+REACH                 on a curve without ends, the distance after which a run pauses or, by kept data, ends
 ELAPSED, ELAPSED_LOW  the time from launch, as two doubles
 LEG_TIME              the time since the last turn
 LAST_LEG, LEG_BEFORE  the times of the last leg from turn to turn, and of the one before it; 0 if there was none

@@ -203,17 +203,21 @@ class Driver:
             return [run]
         parts: list[Array] = []
         space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()
+        left = abs(float(run.record[END] - run.record[START]))
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))
             what = drive_along(self.track, self.dissipation, self._conditions.parameters, RUN_AGAIN, body, record)
             # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
-            left = abs(float(run.record[END] - record[0, END]))
-            if what in PASSED or (what == END_PAUSE and left <= ULP * self.problem.period):
+            part = abs(float(record[0, END] - record[0, START]))
+            if what in PASSED or (what == END_PAUSE and abs(left - part) <= ULP * self.problem.period):
                 return run.with_panels([*parts, record[0]], self._horizon)
             if what == END_RECORD_FULL:
                 space *= 4
             elif what in (END_PAUSE, END_SLOW):
                 parts.append(record[0])
+                left -= part
+                if run.what == END_LIMIT:
+                    body[0, REACH] = left  # the rest ends where the run did, and not a lap after this part
             else:
                 break
         raise self._failure(record[0])

@@ -324,3 +324,39 @@ def test_each_change_of_contact_is_an_event(lam0: float, v0: float, direction: i
     force = motion.state(0.5 * (times[:-1] + times[1:])).normal_force
     assert len(times) > 20
     assert np.all(force[:-1] * force[1:] < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("lam0", "v0", "b", "end"),
+    [
+        (0.39480152205872354, 7.336874044988307, 0.003694168211493829, "liftoff"),
+        (0.39480152205872354, 7.336874044988307, 0.004, "contact-sign"),
+        (0.39480152205872354, 7.336874044988307, 0.003, "liftoff"),
+        (-1.0646594884473632, 9.060303191787575, 0.0967765559180089, "contact-sign"),
+    ],
+)
+def test_laps_of_a_loop_until_contact_is_lost(lam0: float, v0: float, b: float, end: str, build: Build) -> None:
+    """The time of several laps with drag is the integral of the closed form of V**2.
+
+    A lap after which the body becomes slow was followed up to a lap after its slow part, when it was followed again for
+    its panels: contact was lost too early, or the leg was refused.
+    """
+    rim = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
+    module = build("rim", rim, gqm.CoulombFriction(mu="mu") + gqm.QuadraticDrag(b="b"))
+    contact = "above" if end == "liftoff" else "bilateral"
+    leg = module.solve(lam0, v0, 1, mu=0.0, b=b, t_max=20.0, contact=contact).legs[0]
+    with mp.workdps(25):
+        g, c, start, stop = mpf(G), mpf(b), mpf(lam0), mpf(leg.lam_end)
+        a = 2 * g / (1 + 4 * c**2)
+
+        def forced(s: Any) -> Any:
+            return a * (mp.cos(s) - 2 * c * mp.sin(s))
+
+        def speed(s: Any) -> Any:
+            return forced(s) + (mpf(v0) ** 2 - forced(start)) * mp.exp(-2 * c * (s - start))
+
+        time = mp.quad(lambda s: 1 / mp.sqrt(speed(s)), mp.linspace(start, stop, 41))
+        assert abs(speed(stop) + g * mp.cos(stop)) < 2e-15 * v0**2  # roundings of the largest V**2
+    assert leg.end == end
+    assert leg.lam_end - leg.lam_start > 2.0 * math.pi
+    assert leg.t_end == pytest.approx(float(time), rel=1e-15)
