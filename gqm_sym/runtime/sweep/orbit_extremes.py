@@ -63,17 +63,24 @@ line_buffer, pair_buffer, frame_buffer, vector_buffer, point_buffer, sum_buffer,
 
 
 @Inner
+def fill_squares(curve, direction, n, lam, v2, out):  # type: ignore[no-untyped-def]
+    """Fill the square of the contact force at n places for a direction of motion, on which it depends."""
+    vector = vector_buffer()
+    call_path_in_space(curve.path_in_space, n, lam, v2, float(direction), curve.p, vector)
+    for i in range(n):
+        out[i] = vector[n + i] ** 2 + vector[2 * n + i] ** 2 + vector[3 * n + i] ** 2
+
+
+@Inner
 def fill_force(curve, sought, n, lam, v2, frame, out):  # type: ignore[no-untyped-def]
     """Fill the contact force at n places, or the square of its length if that is sought, and ``frame`` with the path.
 
     ``sought`` has the function that is searched, and the direction of motion if the force depends on it, otherwise 0.
     """
-    (function, direction), vector = sought, vector_buffer()
+    function, direction = sought
     call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
     if function == FORCE_SQUARED and direction != 0:
-        call_path_in_space(curve.path_in_space, n, lam, v2, float(direction), curve.p, vector)
-        for i in range(n):
-            out[i] = vector[n + i] ** 2 + vector[2 * n + i] ** 2 + vector[3 * n + i] ** 2
+        fill_squares(curve, direction, n, lam, v2, out)
         return
     for i in range(n):
         force = frame[4 * n + i]
@@ -99,7 +106,7 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame):  # type: ignore[n
     itself.
     """
     offsets, lam, rows, v2 = line_buffer(), line_buffer(), pair_buffer(), line_buffer()
-    width, there_and_back = orbit.high - orbit.low, is_loop(orbit, sought) and not orbit.circulates
+    width, there_and_back = orbit.high - orbit.low, sought[1] != 0 and not orbit.circulates
     for i in range(n):
         share = sin(pi * shares[i]) ** 2 if there_and_back else shares[i]
         offsets[i] = orbit.low + width * share
@@ -113,7 +120,7 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame):  # type: ignore[n
         fill_force(curve, sought, n, lam, v2, frame, out)
         return
     fill_force(curve, (sought[0], 1), n, lam, v2, frame, out)
-    fill_force(curve, (sought[0], -1), n, lam, v2, frame, offsets)
+    fill_squares(curve, -1, n, lam, v2, offsets)
     for i in range(n):
         if floor(2.0 * shares[i]) % 2.0 != 0.0:
             out[i] = offsets[i]
