@@ -218,7 +218,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     """Run to the end as one polynomial if that suffices, else by `run_to_end`; return the end, and the number of blocks
     of the polynomial (`whole_tables`), or 0.
     """
-    if start.v2 == 0.0 and forces.linear and start.blocks > 0:
+    if start.v2 == 0.0 and start.blocks > 0:
         end, blocks = run_whole(forces, start, route, off, record)
         if end.what == END_TURN:
             return end, blocks

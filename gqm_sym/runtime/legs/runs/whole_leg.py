@@ -67,6 +67,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     begin_leg,
     blocks_for,
     extent_of_row,
+    fill_load,
     fill_times,
     fill_v2,
     has_no_kink,
@@ -105,6 +106,10 @@ ROUGH_STEP = 0.03
 
 # The smallest and the largest factor by which the width grows if no turn is found on it.
 MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
+
+# The change of V**2 as a share of its largest value that is rounding only; and a share below which it is, if changes do
+# not decrease any more.
+SETTLED, NEARLY_SETTLED = 1e-15, 1e-13
 
 # The rounding error of a mean in units in the last place of its largest term.
 MEAN_ROUNDINGS = 4.0
@@ -179,19 +184,28 @@ def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # 
     """Return the width of a leg, which is about ``width`` and at most ``room``, and fill FORCE and EXPM1_Q; return 0 if
     it is not found.
 
-    A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width.
+    A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width. If the
+    forces are not linear in V**2, the same steps are those of Newton's method for V**2.
     """
-    h, last, at = min(width, room), np.inf, blocks * TAILS
+    h, last, at, change, is_settled = min(width, room), np.inf, blocks * TAILS, np.inf, forces.linear
     begin_leg(blocks, work)
     for _ in range(MAX_TRIES):
         if not sample_leg(forces, march, panel, blocks, h, work):
             return 0.0
+        if not forces.linear:
+            before = change
+            change, size = fill_v2(blocks, h, work)
+            is_settled = change <= SETTLED * size or (change <= NEARLY_SETTLED * size and change >= 0.5 * before)
         to_end_terms(blocks, work, blocks * FORCE, work, at)
         factor = 0.0
         if work[at + 1] < 0.0:
             step = step_to_turn(work, at)
             rounding = ULP * (MEAN_ROUNDINGS + fabs(march.origin[0]) / h)
-            if last <= LAST_STEP and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE):
+            if (
+                is_settled
+                and last <= LAST_STEP
+                and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE)
+            ):
                 return h
             last = fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
@@ -215,6 +229,7 @@ def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untype
         if not has_one_sign:
             return False, blocks_for(ratio, blocks)
     fill_v2(blocks, h, work)
+    fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
     if load_fine and reading.what == PEAKS and reading.force:
