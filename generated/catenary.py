@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 13, input 2558bd3a8d44, body c42b28a13d51
+# interface 13, input 2558bd3a8d44, body de1835bfc676
 """Bead on a hanging chain
 
 x              = x
@@ -369,12 +369,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 13, input a74aedd594f9, body 10ef67ff24ac
+# interface 13, input a74aedd594f9, body 0016cb6fd24d
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -401,12 +401,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'L': 'm', 'Omega': '1/s', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,

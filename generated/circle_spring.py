@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 13, input bcc7b1afa151, body 6746daf98a15
+# interface 13, input bcc7b1afa151, body 6facf442f4ac
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -399,12 +399,11 @@ def exact_agm_arguments(op, half, p):
 
 MODEL = CompiledModel(
     name='circle_spring', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'L': 'm', 'g': 'm/s**2', 'h': 'm', 'm': 'kg', 'theta': '1', 'w': '1/s'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 13, input 01e055bdd46f, body 86e34f32a25a
+# interface 13, input 01e055bdd46f, body 1ee9c3b83dad
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -366,12 +366,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='cycloid_inverted', parameter='theta', parameters=PARAMETERS, positive=('R',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'R': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,

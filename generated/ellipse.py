@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 13, input 81dc4ee20e82, body d7e3514c304d
+# interface 13, input 81dc4ee20e82, body f71744239fc2
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -391,12 +391,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,

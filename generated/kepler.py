@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 13, input a0162e77d64e, body 9a44bd0348b1
+# interface 13, input a0162e77d64e, body 7e84c1996cbf
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -540,12 +540,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'E': '1', 'a': 'm', 'ecc': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,

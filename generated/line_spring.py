@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 13, input 702c9ef6b67b, body 984948d33c94
+# interface 13, input 702c9ef6b67b, body 79f1d6e02cb7
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -320,12 +320,11 @@ def exact_agm_arguments(op, half, p):
 
 MODEL = CompiledModel(
     name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'g': 'm/s**2', 'm': 'kg', 'w': '1/s', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         agm_arguments=agm_arguments_batch, turning_point=turning_point_batch, bounds=bounds_batch,

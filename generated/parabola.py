@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 13, input 2c8bf584b06a, body a4d265bb7234
+# interface 13, input 2c8bf584b06a, body c06c53637fa0
 """Bead in a parabolic bowl
 
 x              = x
@@ -342,12 +342,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='parabola', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 13, input 6fc25406b912, body cbafde49d55d
+# interface 13, input 6fc25406b912, body f1addc62d44e
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -431,14 +431,13 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': '1/m', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'rho': 'm', 'x': 'm'},
     at_least=(('beta', '0'),),
     rolling_radius='rho',
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     inertia=exact_inertia,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 13, input f60615287831, body a455ecb6c8a1
+# interface 13, input f60615287831, body ca98680c2dad
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -342,12 +342,11 @@ def exact_agm_arguments(op, half, p):
 
 MODEL = CompiledModel(
     name='pendulum', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'L': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 13, input 79764b04feb4, body 60eddbeeea8d
+# interface 13, input 79764b04feb4, body 4e968b0845d7
 """Bead in a quartic bowl
 
 x              = x
@@ -338,12 +338,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='quartic', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,

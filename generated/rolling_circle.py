@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 13, input 2a76ceb4277a, body 0da08c7c3e3a
+# interface 13, input 2a76ceb4277a, body b93f329105f1
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -350,13 +350,12 @@ def exact_agm_arguments(op, half, p):
 
 MODEL = CompiledModel(
     name='rolling_circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'L': 'm', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('beta', '0'),),
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     inertia=exact_inertia,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,

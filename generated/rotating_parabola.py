@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 13, input 33421e752297, body bb74084d9237
+# interface 13, input 33421e752297, body 7654ca1509be
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -350,12 +350,11 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='rotating_parabola', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'Omega': '1/s', 'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 13, input cd2a37956d84, body 5d2c86ecff3d
+# interface 13, input cd2a37956d84, body bb5eb6551cc1
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -334,12 +334,11 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'b': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,

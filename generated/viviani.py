@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 13, input c93b8a64a5a5, body bb3bf5cbf95e
+# interface 13, input c93b8a64a5a5, body c8c942bd5666
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -443,13 +443,12 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 MODEL = CompiledModel(
     name='viviani', parameter='theta', parameters=PARAMETERS, positive=('a',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     path_in_space=path_in_space, signed=False, sided=False,
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,

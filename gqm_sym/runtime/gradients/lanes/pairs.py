@@ -27,7 +27,8 @@ def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[n
 
     Of orbits that are mirror images of themselves only the first half counts, whoever their neighbours are.
     """
-    (address, operations, first, count, outputs), place, halved = program, program[3] * ROW, True
+    (address, operations, first, count, outputs), halved = program, True
+    place = count * ROW
     for i in range(lanes):
         halved = halved and mirrored[i]
     sums[:, :, :] = 0.0
@@ -83,11 +84,11 @@ def judge_means(level, lanes, sums, means, states):  # type: ignore[no-untyped-d
 @entry(
     types.void(
         *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), PROGRAM, VECTOR),
-        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2))), MATRIX, types.boolean[::1], MATRIX, MATRIX),
+        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX)), MATRIX, types.boolean[::1], MATRIX),
     ),
     nogil=True,
 )
-def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, nodes, found):  # type: ignore[no-untyped-def]
+def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, found):  # type: ignore[no-untyped-def]
     """Fill the derivatives of half periods, or of times of laps, with NaN where double-double arithmetic does not
     suffice.
 
@@ -98,19 +99,17 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, no
         (`programs.end_programs`), with their work spaces; without results where the program needs no turning points.
     program, work
         The program of an orbit, with its work space.
-    rule : (int, (float, float))
-        The number of columns of the launches that are inputs of the program, and the range of the phase, as two
-        doubles.
+    rule : (int, (float, float), (4, k) array)
+        The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
+        and the table of shares (`nodes.trapezoidal_nodes`).
     launches : (m, n) array
         The launches; the turning points, to the accuracy of doubles, are last.
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
-    nodes : (4, k) array
-        The table of shares (`nodes.trapezoidal_nodes`).
     found : (m, k) array
         Filled with the derivatives.
     """
-    count, (inputs, phase), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
+    count, (inputs, phase, nodes), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
     sums, means, states = np.empty((count, MEAN, BLOCK)), np.empty((count, 2, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[0], BLOCK):
         stop = min(start + BLOCK, launches.shape[0])

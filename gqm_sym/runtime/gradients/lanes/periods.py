@@ -180,8 +180,8 @@ def carried_out(
         elif stage.make is mean_program:
             fill_mean_gradients(*given, stage.inputs, some, answers)
         else:
-            rule, nodes = (stage.inputs, PHASES[stage.kind]), trapezoidal_nodes(stage.kind)
-            fill_pair_gradients(*given, rule, some, mirrored[part], nodes, out[part])
+            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind)
+            fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
     if isinstance(program, Program):
