@@ -157,6 +157,7 @@ TESTED_THROUGH = {
     "legs/runs/gaps.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/runs/route.py": "claims/test_dissipative.py",
     "legs/runs/run.py": "claims/test_dissipative.py",
+    "legs/runs/whole_panels.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/runs/whole_rows.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/runs/whole_tables.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/tabulation.py": "runtime/inversion/test_leg_tables.py",
