@@ -68,6 +68,7 @@ whole_buffer = on_stack(ROWS * MAX_BLOCKS * WIDE)
 # A bound on the Lebesgue constant for all numbers of nodes (`polynomials.LEBESGUE`).
 LEBESGUE = 4.0
 
+difference_row = over_rows(lambda one, other: one - other, WIDE)
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 
@@ -129,21 +130,22 @@ def keeps_sign(blocks, work, row, sign, noise):  # type: ignore[no-untyped-def]
 
 @Inner
 def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
-    """Fill in the nodes, once for all widths."""
+    """Fill in the nodes, and V**2 to begin with, once for all widths."""
     work[0] = 1.0
     to_nodes(blocks, work, 0, work, blocks * NODES)
+    for at in range(0, blocks * WIDE, WIDE):
+        copy_row(work, blocks * W + at, 0.0)
 
 
 @Inner
 def sample_leg(forces, march, panel, blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows DS to KAPPA, EXPM1_Q and FORCE of a leg of the width ``h``; return whether resistance is small
-    enough for that.
+    """Fill the rows DS to KAPPA, EXPM1_Q and FORCE of a leg of the width ``h``, for V**2 in the row W; return whether
+    resistance is small enough for that.
     """
     wide, origin, v, nu = blocks * WIDE, march.origin, float(march.direction), float(panel.contact_sign)
     for at in range(0, wide, WIDE):
         product(work, blocks * OFFSET + at, blocks * NODES + at, h)
         linear_row(work, blocks * ARC_RATE + at, blocks * OFFSET + at, origin[0] + origin[1], v)
-        copy_row(work, blocks * W + at, 0.0)
     if panel.span[0] > -inf or panel.span[1] < inf:
         for j in range(blocks * ARC_RATE, blocks * ARC_RATE + wide):
             work[j] = within(work[j], panel.span)
@@ -164,12 +166,24 @@ def sample_leg(forces, march, panel, blocks, h, work):  # type: ignore[no-untype
 
 @Inner
 def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR, W, LOAD, and the size of the terms of LOAD in MEAN."""
+    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
     to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+    change = 0.0
     for at in range(0, blocks * WIDE, WIDE):
-        factor, w, ds = blocks * W_FACTOR + at, blocks * W + at, blocks * DS + at
+        factor, w, new = blocks * W_FACTOR + at, blocks * W + at, blocks * SPEED + at
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        v2_row(work, w, factor, blocks * NODES + at, h)
+        v2_row(work, new, factor, blocks * NODES + at, h)
+        difference_row(work, w, new, w)
+        change = max(change, size_of_block(work, w))
+        copy_row(work, w, new)
+    return change, extent_of_row(blocks, work, W)[1]
+
+
+@Inner
+def fill_load(blocks, work):  # type: ignore[no-untyped-def]
+    """Fill the row LOAD, and the size of its terms in MEAN."""
+    for at in range(0, blocks * WIDE, WIDE):
+        w, ds = blocks * W + at, blocks * DS + at
         load_row(work, blocks * LOAD + at, ds, blocks * N0 + at, blocks * KAPPA + at, w)
         load_size_row(work, blocks * MEAN + at, ds, blocks * N0 + at, blocks * KAPPA + at, w)
 

@@ -1,4 +1,4 @@
-"""Legs from turn to turn as one polynomial agree with closed forms with 28 digits."""
+"""Legs from turn to turn as one polynomial agree with closed forms with 28 digits, and with Taylor series."""
 
 from functools import cache, partial
 from itertools import accumulate, pairwise
@@ -12,8 +12,7 @@ from mpmath import mp, mpf
 
 import generated.circle_coulomb
 import gqm_sym as gqm
-from gqm_sym.runtime.legs.panels.polynomials import SHARES
-from gqm_sym.runtime.legs.runs import whole_leg, whole_tables
+from gqm_sym.runtime.legs.runs import whole_tables
 
 # The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
@@ -42,17 +41,6 @@ def test_tables(blocks: int) -> None:
             halves = [mp.quad(partial(_power, n), (a, a + mp.pi / 2), method="gauss-legendre") for a in (0, mp.pi / 2)]
         assert whole_tables.half_times(blocks).T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
     assert np.abs(whole_tables.coefficients(blocks).T @ np.ones(y.size) - np.eye(y.size)[0]).max() <= TABLE
-
-
-@pytest.mark.parametrize(
-    ("table", "begin", "end"),
-    [(whole_leg.TURN_PART, 0.0, whole_leg.JOINT), (whole_leg.MIDDLE_PART, whole_leg.JOINT, 1.0)],
-)
-def test_tables_of_parts(table: Any, begin: float, end: float) -> None:
-    """Powers on the whole leg become the same powers on a part of it."""
-    shares = 0.5 * (begin + (end - begin) * SHARES) ** 2
-    for n in range(1, 16):
-        assert table.T @ SHARES**n == pytest.approx(shares**n, abs=TABLE)
 
 
 class Pendulum:
@@ -210,7 +198,7 @@ MU, C_D = 0.125, 0.0625
     ],
 )
 def test_graphs(height: str, slope: Any, start: float, force: str, generated_folder: Path) -> None:
-    """Along curves that a polynomial of degree 22 does not resolve, times, turns and extremes agree with sums."""
+    """Along curves that polynomials of degree 22 do not resolve, times, turns, extremes and places agree with sums."""
     law, name = gqm.Gravity(), f"whole_{force}_{'parabola' if slope is PARABOLA else 'wave'}"
     law = law + (gqm.CoulombFriction() if force == "friction" else gqm.QuadraticDrag(b="c_d"))
     module = gqm.build(gqm.derive(gqm.Curve.graph(height), law), name=name, folder=generated_folder)
@@ -234,10 +222,77 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
         assert swept("normal_force_min") == pytest.approx(float(lightest), rel=2e-15)
         fastest = mp.findroot(lambda x: mp.diff(lambda y: body.v2(a, y, -1), x), 0.0)
         assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
+        motion = module.solve(start, 0.0, **given)
+        assert motion.legs[0].lam_end == pytest.approx(float(b), rel=0.0, abs=1e-15)
         for share in map(mpf, ("0.0625", "0.375", "0.875")):
             place = a + (b - a) * share
             time = float(body.time(a, b, -1, share))
+            for found in (motion.lam(time), module.solve(start, 0.0, **(given | {"t_max": time})).legs[0].lam_end):
+                assert abs(found - place) <= min(motion.error_bound(time), 2e-15)
             assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
             if (place - fastest) * (a - fastest) > 0:
                 v_there = float(mp.sqrt(body.v2(a, place, -1)))
                 assert swept("v_max", t_max=time) == pytest.approx(v_there, rel=2e-15)
+
+
+# Curves in space with the launch, friction and drag; the turns and times of three legs; a place on the first of them
+# with its time; and the largest speed and contact force. The numbers are from Taylor series with 24 digits
+# (mpmath.odefun), and midpoint rules in the phase angle.
+IN_SPACE = [
+    (
+        "level_helix",
+        ("2*t/5", "sin(t)", "-cos(t)"),
+        ("0.8", "0.05", "0"),
+        ("-0.6570348545712337020835", "0.5263777063732419757187", "-0.4046214985568049706883"),
+        ("1.117003434902001027968", "1.104044419943094096118", "1.094657329943367260426"),
+        ("0.362889543628629889375", "0.410940219593459029787"),
+        ("2.23231775475114284322", "14.0884891366881986191"),
+    ),
+    (
+        "viviani",
+        ("1 + cos(t)", "sin(t)", "-2*cos(t/2)"),
+        ("0.7", "0.05", "0.05"),
+        ("-0.4618717513538408649637", "0.2479287040538638861815", "-0.04550740325550841154861"),
+        ("1.458720071992155626145", "1.435358021766626787023", "1.423605735475332675321"),
+        ("0.351438474593847740511", "0.543276950775226435115"),
+        ("1.28077224514166470483", "10.7385253403899798651"),
+    ),
+    (
+        "waves",
+        ("t", "sin(2*t)/5", "t**2/2 + sin(3*t)/10"),
+        ("0.7", "0.05", "0"),
+        ("-0.7722785722083909732175", "0.3452111345166966029414", "-0.6029134860365929190459"),
+        ("1.169940679239594121754", "1.022968676866387831532", "1.022219591069823456064"),
+        ("0.258316428337482708035", "0.493767048870440062308"),
+        ("2.46400771701974555907", "18.726109280290832263"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "curve", "given", "turns", "durations", "passage", "largest"), IN_SPACE)
+def test_friction_in_space(
+    name: str,
+    curve: tuple[str, str, str],
+    given: tuple[str, str, str],
+    turns: tuple[str, ...],
+    durations: tuple[str, ...],
+    passage: tuple[str, str],
+    largest: tuple[str, str],
+    generated_folder: Path,
+) -> None:
+    """The law of friction on a space curve is not linear in V**2, and legs agree with Taylor series all the same."""
+    x, y, z = curve
+    force = gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag(b="c_d")
+    model = gqm.derive(gqm.Curve.space(x=x, y=y, z=z, parameter="t"), force)
+    module = gqm.build(model, name=f"whole_{name}", folder=generated_folder)
+    start, mu, c_d = given
+    legs = module.solve(start, 0, mu=mu, c_d=c_d, t_max=10).legs
+    ends = accumulate(map(mpf, durations))
+    for leg, place, end in zip(legs[: len(turns)], turns, ends, strict=True):
+        assert leg.lam_end == pytest.approx(float(mpf(place)), abs=9.0 * float(np.spacing(float(start))))
+        assert leg.t_end == pytest.approx(float(end), rel=1e-15)
+    there, expected = {"lam": float(passage[0])}, (passage[1], *largest)
+    for quantity, value in zip(("time_at", "v_max", "normal_force_max"), expected, strict=True):
+        asked = {"t_max": 3.0, **(there if quantity == "time_at" else {})}
+        swept = module.sweep(quantity, [float(start)], 0.0, mu=float(mu), c_d=float(c_d), **asked)
+        assert float(swept.values[0]) == pytest.approx(float(mpf(value)), rel=2e-15)
