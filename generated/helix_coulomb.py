@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 12, input 3f2dfaf376e9, body 7a78a2848bda
+# interface 13, input 3f2dfaf376e9, body a28947ac3282
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=12)
+compiled = compiler(__file__, interface=13)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, STATIC_BALANCE,
@@ -255,10 +255,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-
-    Returns
-    -------
-    Motion
 
     Raises
     ------

@@ -91,35 +91,39 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 12
+INTERFACE = 13
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
-PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
-PATH_IN_SPACE = types.void(types.intp, MANY, MANY, REAL, MANY, MANY)
-LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
-EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF2 = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
+# How many places. It is unsigned, because numba counts negative subscripts from the end, and in a long function LLVM
+# then does not see that the places follow each other, and does not vectorise the loop over them.
+COUNT = types.uintp
+
+PATH_AND_CONTACT_FORCE = types.void(COUNT, MANY, MANY, MANY, MANY)
+PATH_IN_SPACE = types.void(COUNT, MANY, MANY, REAL, MANY, MANY)
+LOAD_MAP = types.void(COUNT, REAL, REAL, MANY, MANY, MANY)
+EFFECTIVE_POTENTIAL = types.void(COUNT, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1 = types.void(COUNT, REAL, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2 = types.void(COUNT, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 SEPARATED_TERMS = POTENTIAL_DIVDIFF1
 
-POTENTIAL_DIVDIFF1_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF2_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
-BOUNDS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
-ORBIT_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
-TIME_INTEGRAND_BATCH = types.void(types.intp, REAL, REAL, MANY, MANY)
-INTEGRAND_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
-AGM_ARGUMENTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
-TURNING_POINT_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
+BOUNDS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
+ORBIT_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
+TIME_INTEGRAND_BATCH = types.void(COUNT, REAL, REAL, MANY, MANY)
+INTEGRAND_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY)
+AGM_ARGUMENTS_BATCH = types.void(COUNT, MANY, MANY, MANY)
+TURNING_POINT_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
 
-SPEED_EQUATION = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
+SPEED_EQUATION = types.void(COUNT, MANY, MANY, REAL, REAL, MANY, MANY)
 RIDER_LOADS = SPEED_EQUATION
-STATIC_BALANCE = types.void(types.intp, MANY, MANY, MANY)
+STATIC_BALANCE = types.void(COUNT, MANY, MANY, MANY)
 
-FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
-SEGMENT = types.void(types.intp, MANY, MANY, MANY)
+FIELD = types.void(COUNT, MANY, MANY, MANY, MANY)
+SEGMENT = types.void(COUNT, MANY, MANY, MANY)
 
 # Rows of path_and_contact_force, of path_in_space, of rider_loads and of load_map.
 PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7
@@ -282,7 +286,9 @@ class ExactFormulas(NamedTuple):
 
     ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. A space curve has ``y``; one
     that lies in no vertical plane also has ``load_along_curvature``, the scalar product [1/s2] of the vectors whose
-    lengths are kappa and n0.
+    lengths are kappa and n0. Where the time of orbits about an axis of symmetry has a closed form, the formulas of
+    ``agm_arguments_batch``, ``f(op, half, p)``, or of ``time_integrand_batch``, ``f(op, half, sine2, cosine2, p)``,
+    follow.
     """
 
     x: Callable[..., Any]
@@ -294,6 +300,8 @@ class ExactFormulas(NamedTuple):
     effective_potential_slope: Callable[..., Any]
     y: Callable[..., Any] | None = None
     load_along_curvature: Callable[..., Any] | None = None
+    agm_arguments: Callable[..., Any] | None = None
+    time_integrand: Callable[..., Any] | None = None
 
 
 class ExactLaw(NamedTuple):

@@ -31,7 +31,7 @@ MAX_PYTHON_TIME = 0.02
 @cache
 def _c_function(signature: Any) -> Any:
     """Return the type of C's functions with numba's signature."""
-    kinds: dict[Any, Any] = {types.float64: ctypes.c_double, types.intp: ctypes.c_ssize_t}
+    kinds: dict[Any, Any] = {types.float64: ctypes.c_double, types.uintp: ctypes.c_size_t}
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 
@@ -142,6 +142,24 @@ class Emitted:
             self.run(*arguments)
         except BaseException as error:
             jit.PENDING_EXCEPTIONS[threading.get_ident()] = error
+
+
+class MachineCode(Emitted):
+    """A function that is machine code from the beginning.
+
+    Parameters
+    ----------
+    address : int
+        The address of the code.
+    signature
+        As for `Emitted`.
+    owner
+        What keeps the code in memory.
+    """
+
+    def __init__(self, address: int, signature: Any, owner: Any) -> None:
+        super().__init__(None, signature)
+        self._slot.value, self._compiled = address, owner
 
 
 # The functions of generated modules that are in use, by their text, so that modules with the same function share it.

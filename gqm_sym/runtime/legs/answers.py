@@ -47,6 +47,7 @@ from gqm_sym.runtime.legs.body import (
     TARGET,
     TOTAL,
     TURNS,
+    V2,
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
@@ -99,6 +100,10 @@ MAX_TURNS = 20000
 
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
+
+# Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
+# without bound there, as at a cusp.
+UNBOUNDED_GROWTH = 1e6
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
@@ -226,6 +231,14 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
+    """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
+    point = point_buffer()
+    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1), body[PLACE], body[V2], 0, point)
+    return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
+
+
+@Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
     findings = Findings(inf, -inf)
@@ -242,6 +255,9 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         if not goes_on(body, question, findings.arrival):
+            is_at_limit = question >= LEAST_LOAD and body[ENDING] == END_LIMIT
+            if is_at_limit and force_is_unbounded(dissipation, p, body, findings.peak):
+                break
             return conclude(body, question, findings)
     return np.nan, LEFT
 
