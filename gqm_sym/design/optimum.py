@@ -331,10 +331,12 @@ class _Family(_Tracks):
         return self._compiled, dict(zip(self._names, x.tolist(), strict=True))
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
-        """Return the derivatives of a solved motion."""
+        """Return the derivatives of a solved motion; the time to the end of the track is that at which it ends."""
         model, request, parameters, _ = self._launch(x)
+        lam = self._given.get("lam") if quantity == "time_at" else None
+        asked = "t_end" if quantity == "time_at" and lam is None else quantity
         try:
-            found = model.solve(request, parameters).gradient(quantity, self._names)
+            found = model.solve(request, parameters).gradient(asked, self._names, lam=lam)
         except GQMError:
             return None
         return np.array([found[name] for name in self._names])
