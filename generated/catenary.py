@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 13, input 2558bd3a8d44, body e9feb4fbb9c9
+# interface 14, input 2558bd3a8d44, body 4011e9090626
 """Bead on a hanging chain
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -192,10 +192,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -358,14 +354,26 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = icosh(_t0)
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    c, g = p[0], p[1]
+    _t0 = half/c
+    _t1 = _t0/4
+    _t2 = op.cosh(_t1)
+    _t3 = 1/_t2**4
+    _t4 = sine2/_t2**2
+    _t5 = _t3*sine2*op.cosh(_t0/2) + cosine2
+    _t6 = _t4*op.sinh(_t1)**2
+    return _t3*c*(4*_t6 + (_t6 + 1)**2)**2/(_t5*g*(_t4 + cosine2)**4), 4*_t5*c*g
+
+
 MODEL = CompiledModel(
     name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
@@ -374,6 +382,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

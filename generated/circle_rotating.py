@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 13, input a74aedd594f9, body b1817b2f5dc3
+# interface 14, input a74aedd594f9, body 66bff68d892a
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -193,10 +193,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-
-    Returns
-    -------
-    Motion
 
     Raises
     ------
@@ -386,14 +382,30 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = L
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    L, Omega, g = p[0], p[1], p[2]
+    _t0 = half/4
+    _t1 = op.cos(_t0)
+    _t2 = 1/_t1**4
+    _t3 = half/2
+    _t4 = _t2*sine2*op.cos(_t3) + cosine2
+    _t5 = Omega**2
+    _t6 = sine2*op.sin(_t0)**2/_t1**2
+    _t7 = 4*L
+    _t8 = (_t6 + 1)**2
+    _t9 = L*_t8
+    _t10 = L*_t5*_t8 - _t5*_t6*_t7 - _t5*_t9*op.sin(_t3)**2 - _t8*g
+    return -_t2*_t9/(_t10*_t4), -_t10*_t4*_t7/_t8
+
+
 MODEL = CompiledModel(
     name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'L': 'm', 'Omega': '1/s', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
@@ -403,6 +415,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 13, input 350ae6cf923a, body 032e00c83585
+# interface 14, input 350ae6cf923a, body 0b1aee91e0f3
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -190,10 +190,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -355,14 +351,26 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = _t1
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    R, g = p[0], p[1]
+    _t0 = half/4
+    _t1 = op.cos(_t0)
+    _t2 = 1/_t1**4
+    _t3 = sine2/_t1**2
+    _t4 = op.cos(half/2)
+    _t5 = _t2*_t4*sine2 + cosine2
+    _t6 = 4*R
+    return -_t2*_t6*(_t3*_t4 + cosine2)**2/(_t5*g*(_t3*op.sin(_t0)**2 + 1)**2), -_t5*_t6*g
+
+
 MODEL = CompiledModel(
     name='cycloid', parameter='theta', parameters=PARAMETERS, positive=('R',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'R': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
@@ -371,6 +379,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 13, input 876b66f15f50, body 80a5a87501b8
+# interface 14, input 876b66f15f50, body 98e3e3107178
 """Bead between two wells
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -194,10 +194,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -362,14 +358,22 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = isqrt(iadd(imul(imul(imul(iconst(16.0), _t0), ipow(_t1, 2)), ipow(h, 2)), iconst(1.0)))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    h, g = p[0], p[1]
+    _t0 = half**2
+    _t1 = _t0*sine2
+    _t2 = _t0 + _t1 - 2
+    return (16*_t1*h**2*(_t1 - 1)**2 + 1)/(2*_t2*g*h), 2*_t2*g*h
+
+
 MODEL = CompiledModel(
     name='double_well', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
@@ -378,6 +382,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 13, input 81dc4ee20e82, body 9039cb2b01ed
+# interface 14, input 81dc4ee20e82, body b605a6224c89
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -191,10 +191,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-
-    Returns
-    -------
-    Motion
 
     Raises
     ------
@@ -379,14 +375,27 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    a, b, g = p[0], p[1], p[2]
+    _t0 = half/4
+    _t1 = op.cos(_t0)
+    _t2 = 1/_t1**4
+    _t3 = op.cos(half/2)
+    _t4 = _t2*_t3*sine2 + cosine2
+    _t5 = sine2/_t1**2
+    _t6 = _t5*op.sin(_t0)**2
+    _t7 = (_t3*_t5 + cosine2)**2
+    return _t2*(16*_t6*_t7*b**2 + a**2*(-4*_t6 + _t7)**2)/(_t4*b*g*(_t6 + 1)**4), 4*_t4*b*g
+
+
 MODEL = CompiledModel(
     name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
@@ -396,6 +405,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

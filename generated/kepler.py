@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 13, input a0162e77d64e, body c1e6f2937fb4
+# interface 14, input a0162e77d64e, body b134848cf927
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -257,10 +257,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-
-    Returns
-    -------
-    Motion
 
     Raises
     ------
@@ -513,14 +509,42 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    a, ecc, k = p[0], p[1], p[2]
+    _t0 = abs(a)
+    _t1 = half/4
+    _t2 = op.cos(_t1)
+    _t3 = 1/_t2**4
+    _t4 = half/2
+    _t5 = op.cos(_t4)
+    _t6 = _t3*_t5*sine2 + cosine2
+    _t7 = sine2/_t2**2
+    _t8 = _t7*op.sin(_t1)**2
+    _t9 = _t8 + 1
+    _t10 = _t9**2
+    _t11 = 1/_t10
+    _t12 = op.sin(_t4)**2
+    _t13 = 1 - ecc**2
+    _t14 = op.sqrt(4*_t12*_t13*(1 - _t12) + (-2*_t12 - ecc + 1)**2)
+    _t15 = (_t5*_t7 + cosine2)**2
+    _t16 = 16*_t8
+    _t17 = 4*_t8
+    _t18 = _t10*ecc
+    _t19 = _t10 + _t12*_t18 + _t17*ecc - _t18
+    _t20 = -_t10
+    _t21 = op.sqrt((_t13*_t16*(-_t17 - _t20) + (-_t18 - _t20 - 8*_t8)**2)/_t9**4)
+    _t22 = _t14 + _t21
+    return _t0*_t11*_t14*_t21*_t22*_t3*a**2*(_t13*(_t15 - _t17)**2 + _t15*_t16)/(2*_t19*_t6*ecc*k), 8*_t11*_t19*_t6*ecc*k/(_t0*_t14*_t21*_t22)
+
+
 MODEL = CompiledModel(
     name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'E': '1', 'a': 'm', 'ecc': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
@@ -529,6 +553,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 13, input 702c9ef6b67b, body b4c05d9806f9
+# interface 14, input 702c9ef6b67b, body 43be2b7d61b2
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -177,10 +177,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -316,14 +312,19 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = idiv(iconst(5.0), iconst(4.0))
 
 
+def exact_agm_arguments(op, half, p):
+    """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
+    w = p[0]
+    return w**2, w**2
+
+
 MODEL = CompiledModel(
     name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'g': 'm/s**2', 'm': 'kg', 'w': '1/s', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         agm_arguments=agm_arguments_batch, turning_point=turning_point_batch, bounds=bounds_batch,
@@ -331,6 +332,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, agm_arguments=exact_agm_arguments,
     ),
 )

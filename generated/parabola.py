@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 13, input 2c8bf584b06a, body c23ea5f8a42d
+# interface 14, input 2c8bf584b06a, body 5501076dd56b
 """Bead in a parabolic bowl
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -186,10 +186,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -338,14 +334,19 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    a, g = p[0], p[1]
+    return (4*a**2*half**2*sine2 + 1)/(2*a*g), 2*a*g
+
+
 MODEL = CompiledModel(
     name='parabola', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
@@ -354,6 +355,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

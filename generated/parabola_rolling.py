@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 13, input 6fc25406b912, body 123209c0b9cb
+# interface 14, input 6fc25406b912, body fd92ea234627
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -230,10 +230,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -420,16 +416,28 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = imul(idiv(iconst(1.0), _t1), _t3)
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
+    _t0 = beta + 1
+    _t1 = 4*a**2
+    _t2 = _t1*half**2
+    _t3 = _t2*sine2 + 1
+    _t4 = op.sqrt(_t2 + 1)
+    _t5 = op.sqrt(_t3)
+    _t6 = -_t1*rho/(_t4*_t5*(_t4 + _t5)) + a
+    return _t0*(_t3**(op.mpf(3)/2) - 2*a*rho)**2/(2*_t3**2*_t6*g), 2*_t6*g/_t0
+
+
 MODEL = CompiledModel(
     name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': '1/m', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'rho': 'm', 'x': 'm'},
     at_least=(('beta', '0'),),
     rolling_radius='rho',
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     inertia=exact_inertia,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
@@ -439,6 +447,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

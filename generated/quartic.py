@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 13, input 79764b04feb4, body 5b03dd726cc1
+# interface 14, input 79764b04feb4, body ec9621cd97fe
 """Bead in a quartic bowl
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -181,10 +181,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -332,14 +328,21 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    g = p[0]
+    _t0 = half**2
+    _t1 = _t0*sine2 + _t0
+    return (16*half**6*sine2**3 + 1)/(2*_t1*g), 2*_t1*g
+
+
 MODEL = CompiledModel(
     name='quartic', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
@@ -348,6 +351,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, time_integrand=exact_time_integrand,
     ),
 )

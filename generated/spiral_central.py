@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 13, input cd2a37956d84, body 53a78b401874
+# interface 14, input cd2a37956d84, body 7391f5950a23
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
@@ -196,10 +196,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -338,12 +334,11 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'b': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,

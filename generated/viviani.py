@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 13, input c93b8a64a5a5, body d19c234e2ef8
+# interface 14, input c93b8a64a5a5, body f2b6cc47f5e4
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -240,10 +240,6 @@ def solve(
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     GQMError
@@ -431,15 +427,28 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = imul(a, isqrt(iadd(ipow(_t0, 2), iconst(1.0))))
 
 
+def exact_time_integrand(op, half, sine2, cosine2, p):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    a, g = p[0], p[1]
+    _t0 = half/8
+    _t1 = op.cos(_t0)
+    _t2 = 1/_t1**4
+    _t3 = op.cos(half/4)
+    _t4 = _t2*_t3*sine2 + cosine2
+    _t5 = sine2/_t1**2
+    _t6 = _t5*op.sin(_t0)**2
+    _t7 = (_t6 + 1)**4
+    return 2*_t2*a*(16*_t6*(_t3*_t5 + cosine2)**2 + _t7)/(_t4*_t7*g), 8*_t4*a*g
+
+
 MODEL = CompiledModel(
     name='viviani', parameter='theta', parameters=PARAMETERS, positive=('a',),
-    source=__file__,
+    source=__file__, load_map=load_map,
     units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     path_in_space=path_in_space, signed=False, sided=False,
-    load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
@@ -449,6 +458,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope, exact_y, exact_load_along_curvature,
+        exact_effective_potential_slope, exact_y, exact_load_along_curvature, time_integrand=exact_time_integrand,
     ),
 )

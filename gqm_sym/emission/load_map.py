@@ -84,7 +84,9 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
         return Pow(Abs(base), exponent - 1) * sizes[0]
     if isinstance(form, Abs):
         return sizes[0]
-    if isinstance(form, exp | cosh | sinh):
+    if isinstance(form, exp | cosh):
+        return form  # SymPy would write the real part of an exponent that it does not know to be real
+    if isinstance(form, sinh):
         return Abs(form)
     if isinstance(form, sin | cos):
         return Abs(form) if _is_exact(form.args[0], place) else Abs(form) + sizes[0]

@@ -14,6 +14,7 @@ from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
+from gqm_sym.emission.time_integrand import exact_axis_orbits
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
 
 FLAGS = ("friction", "kinked", "linear")
@@ -32,7 +33,8 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         energy = lowering.effective_potential()
         law = (speed_equation(lowering, loss), *squared_contact(lowering, loss), static_balance(lowering, loss))
         functions, batch = (*law, energy), ()
-    exact = (*lowering.exact(), *lowering.inertia(), *lowering.trigonometric_values())
+    of_axes = exact_axis_orbits(lowering) if loss is None and not model.curve.charted else ()
+    exact = (*lowering.exact(), *of_axes, *lowering.inertia(), *lowering.trigonometric_values())
     return ModuleIR(
         name=name,
         title=model.title,

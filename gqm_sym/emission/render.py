@@ -18,7 +18,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 13
+INTERFACE = 14
 
 # Functions that the runtime has in vectorised forms; all others are those of the standard library.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
@@ -26,6 +26,9 @@ _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("CompiledFunctions", "CompiledModel")
 # The width of the emitted import list.
 _WIDTH = 116
+
+# Formulas for speed that only some modules have, by the names under which the record of formulas has them.
+_BY_KEYWORD = {"exact_agm_arguments": "agm_arguments", "exact_time_integrand": "time_integrand"}
 # The functions of one motion, as the interface orders them.
 _COMPILED_FUNCTIONS = (
     "path_and_contact_force",
@@ -100,7 +103,8 @@ def render(module: ModuleIR, *, source: str) -> str:
         "defaults_line": defaults if len(defaults) <= _WIDTH - len("PARAMETERS = {}") else "",
         "functions": functions.single,
         "batch_functions": functions.batch,
-        "exact": [exact_formula(f) for f in _exact_functions(module)],
+        "exact": [exact_formula(f) for f in _exact_functions(module) if f.name not in _BY_KEYWORD],
+        "exact_for_speed": [exact_formula(f) for f in module.exact if f.name in _BY_KEYWORD],
         "data": list(chart.data) if chart else [],
         "parameter": module.parameter,
         "keywords": [f"{name}: Any = {value!r}" for name, value in module.defaults],
@@ -186,7 +190,8 @@ def _separated(terms: SeparatedIR) -> str:
 
 def _exact_formulas(module: ModuleIR) -> list[str]:
     """Return the formulas over a namespace that a module passes to the runtime; empty if there are none."""
-    return [function.name for function in module.exact if function.places]
+    names = (function.name for function in module.exact if function.places)
+    return [f"{_BY_KEYWORD[name]}={name}" if name in _BY_KEYWORD else name for name in names]
 
 
 def _pass1(module: ModuleIR) -> str:

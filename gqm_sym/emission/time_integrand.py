@@ -4,9 +4,12 @@ from sympy import Expr
 
 from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.ir import FunctionIR
+from gqm_sym.emission.ir import ExactIR, FunctionIR
 from gqm_sym.emission.sharing import hoist
 from gqm_sym.emission.subscripts import at
+
+AGM_DOC = "a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."
+INTEGRAND_DOC = "(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."
 
 
 def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
@@ -25,6 +28,31 @@ def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     if orbits.turning_point is None or model.cusp is not None or model.force.radius:
         return times
     return (*times, _turning_point(lowering, orbits.turning_point))
+
+
+def exact_axis_orbits(lowering: Lowering) -> tuple[ExactIR, ...]:
+    """Return the same arguments of the mean, or the same integrand, over a namespace of operations, for gradients."""
+    orbits, names = lowering.model.symmetric_orbits, lowering.names
+    if orbits is None or orbits.time_integrand is None:
+        return ()
+    half = names.symbol("half")
+    if orbits.agm_arguments is not None:
+        forms = tuple(square.xreplace({HALF: half}) for square in orbits.agm_arguments)
+        return (
+            ExactIR(
+                name="exact_agm_arguments",
+                doc=AGM_DOC,
+                places=(half.name,),
+                parameters=lowering.used(forms),
+                inside=(),
+                outputs=forms,
+            ),
+        )
+    sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
+    here = at_place(dict(zip(dict(orbits.invariants), dict(orbits.invariants), strict=True)), sine2, cosine2)
+    ends = {symbol: end.xreplace({HALF: half}) for symbol, end in orbits.invariants}
+    forms = tuple(form.xreplace(here).xreplace(ends) for form in (orbits.time_integrand, orbits.divisor))
+    return (lowering.exact_function("time_integrand", INTEGRAND_DOC, forms, (half, sine2, cosine2)),)
 
 
 def _turning_point(lowering: Lowering, forms: tuple[Expr, ...]) -> FunctionIR:
@@ -47,7 +75,7 @@ def _agm_arguments(lowering: Lowering, squares: tuple[Expr, Expr]) -> FunctionIR
     return lowering.function(
         "agm_arguments_batch",
         (halves,),
-        "a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss).",
+        AGM_DOC,
         inside=[(half, at(halves))],
         outputs=tuple(square.xreplace({HALF: half}) for square in squares),
         batch=True,
@@ -68,7 +96,7 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr
     emitted = lowering.function(
         "time_integrand_batch",
         (sine2, cosine2),
-        "(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17).",
+        INTEGRAND_DOC,
         inside=[(symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)],
         outputs=tuple(outputs),
         batch=True,

@@ -96,7 +96,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 13
+INTERFACE = 14
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -292,7 +292,9 @@ class ExactFormulas(NamedTuple):
 
     ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. A space curve has ``y``; one
     that lies in no vertical plane also has ``load_along_curvature``, the scalar product [1/s2] of the vectors whose
-    lengths are kappa and n0.
+    lengths are kappa and n0. Where the time of orbits about an axis of symmetry has a closed form, the formulas of
+    ``agm_arguments_batch``, ``f(op, half, p)``, or of ``time_integrand_batch``, ``f(op, half, sine2, cosine2, p)``,
+    follow.
     """
 
     x: Callable[..., Any]
@@ -304,6 +306,8 @@ class ExactFormulas(NamedTuple):
     effective_potential_slope: Callable[..., Any]
     y: Callable[..., Any] | None = None
     load_along_curvature: Callable[..., Any] | None = None
+    agm_arguments: Callable[..., Any] | None = None
+    time_integrand: Callable[..., Any] | None = None
 
 
 class ExactLaw(NamedTuple):

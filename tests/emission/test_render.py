@@ -154,6 +154,24 @@ def test_taken_names_as_parameters(folder: Path) -> None:
     check_numbers(gqm.build(model, name="taken", folder=folder), text, values)
 
 
+def test_the_exponential_of_the_height_of_a_rolling_body(folder: Path) -> None:
+    """The size of an exponential is itself: SymPy's absolute value wrote the exponent's real part, by atan2."""
+    force = gqm.Potential("4*x**2 + exp(z)") + gqm.Rolling(radius="0.05", beta="0.4")
+    module = gqm.build(gqm.derive(gqm.families.ellipse(a=2, b=1), force), name="exponential", folder=folder)
+    start, places = -1.25, [-1.5, -1.75, -2.0]
+    with mp.workdps(40):
+
+        def height(theta: float) -> mpf:
+            c, s = mp.cos(theta), mp.sin(theta)
+            length = mp.sqrt(4 * s**2 + c**2)
+            x, z = 2 * c - mpf("0.05") * c / length, s - mpf("0.05") * 2 * s / length
+            return (4 * x**2 + mp.exp(z)) / mpf("1.4")
+
+        for place, v2 in zip(places, module.pass1(places, start, 3.0).v2, strict=True):
+            truth = 9 - 2 * (height(place) - height(start))
+            assert abs(v2 - truth) <= 1e-14 * abs(height(place))
+
+
 @pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
 def test_taken_names_as_the_curves_parameter(name: str) -> None:
     """The curve's parameter may have any of these names too."""

@@ -278,4 +278,7 @@ def _of_waves(forms: Sequence[sp.Expr], d: sp.Symbol, waves: _Waves) -> tuple[sp
     else:
         rate, found, names = 2 * common * first, squares, {c2: _COSINE, s2: _SINE}
     height, metric = (form if form is None else form.xreplace(names) for form in found)
-    return None if height is None or metric is None else (rate, height, metric)
+    # A form may hold powers of the distance beside its waves, such as those of a rotating frame on a catenary.
+    if height is None or metric is None or height.has(d) or metric.has(d):
+        return None
+    return rate, height, metric

@@ -144,6 +144,24 @@ class Emitted:
             jit.PENDING_EXCEPTIONS[threading.get_ident()] = error
 
 
+class MachineCode(Emitted):
+    """A function that is machine code from the beginning.
+
+    Parameters
+    ----------
+    address : int
+        The address of the code.
+    signature
+        As for `Emitted`.
+    owner
+        What keeps the code in memory.
+    """
+
+    def __init__(self, address: int, signature: Any, owner: Any) -> None:
+        super().__init__(None, signature)
+        self._slot.value, self._compiled = address, owner
+
+
 # The functions of generated modules that are in use, by their text, so that modules with the same function share it.
 _IN_USE: WeakValueDictionary[str, Emitted] = WeakValueDictionary()
 

@@ -222,19 +222,21 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     The coordinate of a place is the square of the sine of half the phase angle. The inputs after those of the source
     are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives with respect to
     all variables, V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam with respect to the
-    run-time parameters at the same place. If variables are ``wanted``, the results are the derivatives of dt/dphi with
-    respect to these alone.
+    run-time parameters at the same place. If variables are ``wanted``, there are derivatives of the turning points with
+    respect to these alone, and the results are the derivatives of dt/dphi with respect to them.
     """
-    n, share = source.variables, (op := Recorder(source.inputs + 2 * source.variables + 2, source.coordinates)).place
-    a, b, *ends = op.values[source.inputs :]
+    n, rows = source.variables, range(source.variables) if wanted is None else wanted
+    op = Recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
+    share, (a, b, *ends) = op.place, op.values[source.inputs :]
     width, inertia = b - a, source.one_plus_beta(op)
     half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, a + width * share)
     rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
     power = 2 * rate * half * inertia
     rates, powers = [rate], [power]
     by_launch = [op.number(0)] * LAUNCH_VARIABLES
-    for k, by in enumerate(gradient(op, inertia, op.values[:n])):
-        low, high, strain = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
+    by_all = gradient(op, inertia, op.values[:n])
+    for j, k in enumerate(rows):
+        low, high, strain, by = ends[j], ends[len(rows) + j], [*ds_partials, *by_launch][k], by_all[k]
         moved = low + (high - low) * share
         # The small change of V**2 is computed as a whole first, because its parts are large near the turning points.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
@@ -242,7 +244,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:
-        return assemble(op, [rates[1 + k] for k in wanted])
+        return assemble(op, rates[1:])
     return assemble(op, [*rates, *powers, *ds_partials])
 
 

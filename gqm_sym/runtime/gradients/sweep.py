@@ -1,32 +1,21 @@
 """Gradients of periods, turning points and extremes of many launches, by compiled loops in threads."""
 
 from math import fabs, inf, nan
-from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
-from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
-from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, begin, evaluate_block, fill_means_of
+from gqm_sym.runtime.gradients.evaluation import PROGRAM, begin, evaluate_block
 from gqm_sym.runtime.gradients.formula_orbit import source_of
-from gqm_sym.runtime.gradients.lanes.evaluation import ANSWERED, OPEN, PASSES, fill_lane_gradients
-from gqm_sym.runtime.gradients.lanes.programs import end_programs, swing_program
-from gqm_sym.runtime.gradients.programs import (
-    Program,
-    Source,
-    circulation_program,
-    extreme_program,
-    libration_program,
-    turning_point_program,
-)
+from gqm_sym.runtime.gradients.lanes.launches import Launches
+from gqm_sym.runtime.gradients.lanes.periods import period_gradients
+from gqm_sym.runtime.gradients.programs import extreme_program, turning_point_program
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.kinds import EXTREMES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -46,9 +35,6 @@ NEWTON_STEPS = 2
 LAP_SHARES = np.arange(BLOCK) / BLOCK
 WIDTH_SHARES = np.sin(0.5 * np.pi * np.arange(BLOCK) / (BLOCK - 1)) ** 2
 MAX_STEPS, LAST_STEP = 8, 1e-12
-
-# The largest distance of the middle of an even orbit from its axis of symmetry, as a share of the places.
-EVEN_TOLERANCE = 4.0 * 2.0**-52
 
 # The largest error of a derivative, as a share of it or of the extreme, and the largest difference between the extreme
 # found here and that of the sweep, as a share of the largest value on the grid.
@@ -76,43 +62,6 @@ def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyp
         for k in range(count):
             at, to = outputs[1 + k] + i, count + 2 + i * count + k
             inputs[0, to], inputs[1, to], inputs[2, to] = work[at], work[at + LOW], work[at + ERROR]
-
-
-@entry(types.void(PROGRAM, VECTOR, PROGRAM, VECTOR, INTEGER, MATRIX, MATRIX, MATRIX), nogil=True)
-def fill_gradients(turns, turns_work, orbit, work, kind, launches, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the gradients of half periods, or of times of laps, with NaN where double-double arithmetic does not
-    suffice.
-
-    Parameters
-    ----------
-    turns, turns_work, orbit, work
-        The programs of a turning point and of an orbit (`programs.Program.operands`), each with its work space.
-    kind : int
-        LIBRATION or CIRCULATION.
-    launches : (m, n + 2) array
-        The n variables of each launch, and the turning points of a libration to the accuracy of doubles.
-    nodes : (4, k) array
-        The table of shares (`nodes.trapezoidal_nodes`).
-    found : (m, k) array
-        Filled with the derivatives with respect to the variables of the orbit's program.
-    """
-    n = launches.shape[1] - 2
-    variables, inputs = np.zeros((3, n)), np.zeros((3, orbit[3]))
-    means = np.empty((orbit[4].size, MEAN))
-    for m in range(launches.shape[0]):
-        variables[0] = launches[m, :n]
-        if kind == LIBRATION:
-            fill_turns(turns, turns_work, variables, launches[m, n:], inputs)
-        else:
-            inputs[:, :n] = variables
-            inputs[0, n] = launches[m, n - 3]  # the lap begins at lam0
-        means[:, :] = 0.0
-        count = fill_means_of(orbit, work, inputs, nodes, means)
-        for j in range(means.shape[0]):
-            high, low = means[j, 0], means[j, 1]
-            if kind == LIBRATION:
-                high, low = multiply(high, low, 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])
-            found[m, j] = high if count > 0 else nan
 
 
 @Inner
@@ -222,7 +171,14 @@ def fill_extremes(turns, turns_work, extreme, work, kind, sign, launches, found)
 def fill_ends(turns, turns_work, launches, found):  # type: ignore[no-untyped-def]
     """Fill the derivatives of the lower and then of the upper turning point, with respect to all variables.
 
-    The arguments are as for `fill_gradients`.
+    Parameters
+    ----------
+    turns, turns_work
+        The program of a turning point, with its work space.
+    launches : (m, n + 2) array
+        The n variables of each launch, and its turning points to the accuracy of doubles.
+    found : (m, 2*n) array
+        Filled with the derivatives.
     """
     n = launches.shape[1] - 2
     variables, inputs = np.zeros((3, n)), np.zeros((3, n + 2 + 2 * n))
@@ -230,50 +186,6 @@ def fill_ends(turns, turns_work, launches, found):  # type: ignore[no-untyped-de
         variables[0] = launches[m, :n]
         fill_turns(turns, turns_work, variables, launches[m, n:], inputs)
         found[m] = inputs[0, n + 2 :]
-
-
-class Launches(NamedTuple):
-    """Many launches whose motions are periodic.
-
-    Attributes
-    ----------
-    given : (m, n) array
-        The run-time parameters, lam0 and v0 of each launch.
-    directions : (m,) array
-        The sign of ds/dt at launch.
-    spans : (m, 2) array
-        The turning points of each launch; NaN for a circulation.
-    mirrored : (m,) array
-        Whether each orbit is even about an axis of symmetry.
-    """
-
-    given: Array
-    directions: Array
-    spans: Array
-    mirrored: NDArray[np.bool_]
-
-    @property
-    def table(self) -> Array:
-        """Return the arguments of compiled code: the variables of each launch, then its turning points."""
-        return np.hstack([self.given, np.zeros((len(self.given), 1)), self.spans])
-
-    @property
-    def circulates(self) -> NDArray[np.bool_]:
-        """Whether each motion is a circulation."""
-        circulates: NDArray[np.bool_] = np.isnan(self.spans[:, 0])
-        return circulates
-
-
-def mirrored(formulas: Formulas, parameters: Array, spans: Array) -> NDArray[np.bool_]:
-    """Return which librations are even about an axis of symmetry of the curve and the forces on it."""
-    found = np.zeros(len(spans), dtype=np.bool_)
-    place, step = formulas.axes(ARRAYS, tuple(parameters.T))
-    if place is not None:
-        middle = 0.5 * (spans[:, 0] + spans[:, 1]) - place
-        axis = 0.0 if step is None else step * np.rint(middle / step)
-        rounding = EVEN_TOLERANCE * (np.abs(spans).sum(axis=1) + np.abs(place))
-        found |= np.abs(middle - axis) <= rounding
-    return found
 
 
 def launch_gradients(
@@ -301,7 +213,7 @@ def launch_gradients(
     """
     if quantity in PERIODS:
         shares = np.where(launches.circulates, 1.0, PERIODS[quantity])
-        return shares[:, np.newaxis] * _period_gradients(formulas, launches, rows)
+        return shares[:, np.newaxis] * period_gradients(formulas, launches, rows)
     if quantity == "turning_points":
         turns, table = turning_point_program(source_of(formulas)), launches.table
         ends = np.empty((len(table), 2, table.shape[1] - 2))
@@ -312,57 +224,6 @@ def launch_gradients(
         run_in_threads(work, len(table), MIN_LAUNCHES_PER_THREAD)
         return ends[:, :, list(rows)]
     return _extreme_gradients(formulas, quantity, launches, values)[:, list(rows)]
-
-
-def _period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Array:
-    """Return the derivatives of half periods, or of times of laps."""
-    table, circulates = launches.table, launches.circulates
-    source, found = source_of(formulas), np.full((len(table), len(rows)), nan)
-    turns = turning_point_program(source)
-
-    def fill(program: Program, kind: int, chosen: NDArray[np.bool_]) -> None:
-        which = np.flatnonzero(chosen)
-
-        def work(part: slice) -> None:
-            some = which[part]
-            out = np.empty((some.size, len(rows)))
-            programs = (turns.operands, turns.work.copy(), program.operands, program.work.copy())
-            fill_gradients(*programs, kind, table[some], trapezoidal_nodes(kind), out)
-            found[some] = out
-
-        run_in_threads(work, which.size, MIN_LAUNCHES_PER_THREAD)
-
-    swings = np.flatnonzero(~circulates)
-    found[swings] = in_lanes(source, rows, launches, swings)
-    is_open = np.isnan(found).any(axis=1)
-    fill(libration_program(source, rows), LIBRATION, ~circulates & is_open)
-    for direction in (1, -1):
-        if (chosen := circulates & (launches.directions == direction)).any():
-            fill(circulation_program(source, direction, rows), CIRCULATION, chosen)
-    return found
-
-
-def in_lanes(source: Source, rows: tuple[int, ...], launches: Launches, which: NDArray[np.intp]) -> Array:
-    """Return the derivatives of half periods in double precision, with NaN where that does not suffice."""
-    found, program = np.full((which.size, len(rows)), nan), swing_program(source, rows)
-    if program is None or not rows:
-        return found
-    step, moves = end_programs(source, rows)
-    table, mirrored, waiting = launches.table[which], launches.mirrored[which], np.arange(which.size)
-    for most in PASSES:
-        some, even = table[waiting], mirrored[waiting]
-        out, states = np.empty((waiting.size, len(rows))), np.empty(waiting.size, dtype=np.int8)
-
-        def work(part: slice, most: int = most, given: Any = (some, even, out, states)) -> None:
-            launched, symmetric, answers, kinds = (array[part] for array in given)
-            works = step.work.copy(), moves.work.copy()
-            programs = (step.operands, moves.operands), works, program.operands, program.work.copy()
-            fill_lane_gradients(*programs, (most, PASSES[-1]), launched, symmetric, (answers, kinds))
-
-        run_in_threads(work, waiting.size, MIN_LAUNCHES_PER_THREAD)
-        found[waiting[states == ANSWERED]] = out[states == ANSWERED]
-        waiting = waiting[states == OPEN]
-    return found
 
 
 def _extreme_gradients(formulas: Formulas, quantity: str, launches: Launches, values: Array) -> Array:

@@ -45,7 +45,9 @@ from gqm_sym.runtime.legs.body import (
     STATUS,
     STEP,
     TARGET,
+    TOTAL,
     TURNS,
+    V2,
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
@@ -63,6 +65,8 @@ from gqm_sym.runtime.legs.leg_record import (
     START,
     START_V2,
     TIMES,
+    USED,
+    pack,
 )
 from gqm_sym.runtime.legs.panels.equation import Forces
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
@@ -96,6 +100,10 @@ MAX_TURNS = 20000
 
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
+
+# Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
+# without bound there, as at a cusp.
+UNBOUNDED_GROWTH = 1e6
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
@@ -228,6 +236,14 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
+    """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
+    point = point_buffer()
+    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1, 0), body[PLACE], body[V2], 0, point)
+    return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
+
+
+@Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
     findings = Findings(inf, -inf)
@@ -246,6 +262,9 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         if not goes_on(body, question, findings.arrival):
+            is_at_limit = question >= LEAST_LOAD and body[ENDING] == END_LIMIT
+            if is_at_limit and force_is_unbounded(dissipation, p, body, findings.peak):
+                break
             return conclude(body, question, findings)
     return np.nan, LEFT
 
@@ -278,21 +297,31 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
 
 @Inner
 def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-untyped-def]
-    """Advance a body by as many legs as there are records, or up to a leg after which Python decides how to go on."""
-    what, count, body = END_REST, 0, bodies[0]
-    while count < records.shape[0]:
-        if joints.gaps.size > 0:
-            what = follow_leg(dissipation, p, joints, body, bodies[1 + count], records[count])
+    """Advance a body by as many legs as there is space for, or up to a leg after which Python decides how to go on.
+
+    The records follow each other, and each but the last takes as many elements as it needs (USED). A record begins only
+    where there is space for a whole row of ``records``, so that how a leg is followed does not depend on those before.
+    """
+    what, count, used, body = END_REST, 0, 0, bodies[0]
+    line, size, keeps = records.reshape(-1), records.shape[1], joints.gaps.size > 0
+    while used + size <= line.size and not (keeps and count + 1 >= bodies.shape[0]):
+        record = line[used : used + size]
+        if keeps:
+            what = follow_leg(dissipation, p, joints, body, bodies[1 + count], record)
         else:
-            what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), records[count])
+            what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), record)
         if what == END_RECORD_FULL:
             break
         count += 1
-        body[PANEL_COUNT] += 1.0 + records[count - 1, AHEAD] + records[count - 1, BACK]
-        body[STATUS] = 1.0 if is_tiny(records[count - 1], body[LEAST_SIZE]) else 0.0
+        record[USED] = size
+        body[PANEL_COUNT] += 1.0 + record[AHEAD] + record[BACK]
+        body[STATUS] = 1.0 if is_tiny(record, body[LEAST_SIZE]) else 0.0
+        if what in (END_TURN, END_REST):
+            pack(record)
+        used += int(record[USED])
         if what != END_TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
-    body[VALUE] = count
+    body[VALUE], body[TOTAL] = count, used
     return what
 
 
@@ -319,8 +348,8 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         The bodies (`legs.body`), which are moved on. For questions up to RUN_AGAIN there is one body, in the first row;
         if data of gaps are kept, the other rows become copies of it before each leg.
     records : (n, size) array
-        Filled with legs of the first body (`leg_record`), at most n for LEGS. For other questions the first row is work
-        space.
+        Filled with legs of the first body (`leg_record`), one directly behind the other; TOTAL is the number of
+        elements that they take. For other questions the first row is work space.
 
     Returns
     -------

@@ -41,6 +41,7 @@ from gqm_sym.runtime.legs.body import (
     REACH,
     STATUS,
     STEP,
+    TOTAL,
     TURNS,
     V2,
     VALUE,
@@ -49,8 +50,8 @@ from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, F
 from gqm_sym.runtime.legs.endings import END_NAMES, cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
-from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
-from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START, USED
+from gqm_sym.runtime.legs.leg_segments import Run, panelled
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
     END_LIMIT,
@@ -187,11 +188,14 @@ class Driver:
         number = self.body.item
         if what != END_TURN and not number(DIRECTION) and not number(TURNS):
             return  # the body stays where it is
-        count = 1 if len(records) == 1 else int(number(VALUE))
+        count, at = int(number(VALUE)), 0
+        line = records.reshape(-1)[: int(number(TOTAL))].copy()  # most legs take a small part of the space
         before = self.body[1 : 1 + count].copy() if self._conditions.passes and self._frame is None else [None] * count
         for k in range(count - 1):
-            self.runs.append(turned(records[k], before[k]))
-        self._last_record = last = records[count - 1]
+            end = at + int(line.item(at + USED))
+            self.runs.append(turned(line[at:end], before[k]))
+            at = end
+        self._last_record = last = line[at:]
         if what == END_TURN and self._frame is None and not number(STATUS):
             self.runs.append(turned(last, before[-1]))
         else:
@@ -200,7 +204,7 @@ class Driver:
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
         if run.before is None:
-            return [run]
+            return [run.as_panels(self._horizon)]
         parts: list[Array] = []
         space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()
         left = abs(float(run.record[END] - run.record[START]))
@@ -210,7 +214,7 @@ class Driver:
             # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
             part = abs(float(record[0, END] - record[0, START]))
             if what in PASSED or (what == END_PAUSE and abs(left - part) <= ULP * self.problem.period):
-                return run.with_panels([*parts, record[0]], self._horizon)
+                return run.with_panels([*parts, panelled(record[0])], self._horizon)
             if what == END_RECORD_FULL:
                 space *= 4
             elif what in (END_PAUSE, END_SLOW):

@@ -138,9 +138,15 @@ class FollowedMotion(Motion):
     def _runs_as_legs(self) -> list[Leg]:
         """Return the runs of `legs`, which are not cut at changes of the contact sign and at corners."""
         everything, lap = self._all_runs, self.problem.period
-        stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._driver.elapsed]
-        shown = everything[: self._beginning or None]
-        return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
+        shown, legs, stop = everything[: self._beginning or None], [], self._driver.elapsed
+        if len(shown) < len(everything):
+            stop = everything[len(shown)].record.item(BEGIN)
+        for run in reversed(shown):
+            leg = run.leg(lap, stop)
+            legs.append(leg)
+            stop = leg.t_start
+        legs.reverse()
+        return legs
 
     def _known_end(self) -> float:
         """Return the time at which the motion ends, as far as is known; infinite if it is not."""

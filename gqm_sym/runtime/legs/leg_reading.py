@@ -34,13 +34,13 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_END,
     TIME_FROM_START,
     WHOLE,
-    WHOLE_ROWS,
+    WHOLE_WIDTH,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope
-from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE
+from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, whole_time_row
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
 
 
@@ -174,7 +174,7 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
     record, ahead, back = borrowed(record), int(record[AHEAD]), int(record[BACK])
     march, v = march_of(record), record[HEADING]
     if record[WHOLE] > 0.0:
-        return np.nan
+        return place_of_rows(record, time) if record[WHOLE_WIDTH] > 0.0 else np.nan
     if time <= record[TIME_FROM_START] and ahead > 0:
         return record[START] + (record[START_LOW] + v * distance(marched_in(record, HEAD, ahead, time), march))
     remaining = (record[TIME_FROM_START] - time) + record[TIME_FROM_END]
@@ -311,45 +311,75 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
 
 
 @Inner
-def time_to_phase(record, phase, backwards):  # type: ignore[no-untyped-def]
-    """Return the time from the start, or ``backwards`` from the end, of a leg whose record has rows to a phase angle of
-    at most pi/2, and its derivative.
+def time_to_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-def]
+    """Return the time from the start, or ``backwards`` from the end, of a leg to a phase angle of at most pi/2, and its
+    derivative.
+
+    ``terms`` begins with the ``count`` coefficients of the time per phase angle.
     """
-    count, sign = int(record[WHOLE]) * WIDE - 1, 1.0 if backwards else -1.0
+    sign = 1.0 if backwards else -1.0
     # The sum of c_k cos(k phase), with the signs of c_k that the direction requires, and its integral.
     c, s = cos(phase), sin(phase)
     rate, rate_after, time, time_after = 0.0, 0.0, 0.0, 0.0
     for k in range(count - 1, 0, -1):
-        term = record[WHOLE_ROWS + k] if k % 2 == 0 else sign * record[WHOLE_ROWS + k]
+        term = terms[k] if k % 2 == 0 else sign * terms[k]
         rate, rate_after = fma(2.0 * c, rate, term - rate_after), rate
         time, time_after = fma(2.0 * c, time, term / k - time_after), time
-    constant = record[WHOLE_ROWS]
+    constant = terms[0]
     return fma(constant, phase, s * time), fma(c, rate, constant - rate_after)
 
 
 @Inner
 def passage_of_rows(record, covered, left):  # type: ignore[no-untyped-def]
     """Return the time from the start of a leg whose record has rows to a place, given its distances from both ends."""
+    terms, count = record[HEAD:], int(record[WHOLE]) * WIDE - 1
     if covered <= left:
-        return time_to_phase(record, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
+        return time_to_phase(terms, count, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
     total = record[TIME_FROM_START] + record[TIME_FROM_END]
-    return total - time_to_phase(record, 2.0 * asin(sqrt(left / (covered + left))), True)[0]
+    return total - time_to_phase(terms, count, 2.0 * asin(sqrt(left / (covered + left))), True)[0]
+
+
+@Inner
+def phase_of_rows(record, terms, time):  # type: ignore[no-untyped-def]
+    """Return the phase angle at a time from the start of a leg whose record has rows, from the nearer end, and whether
+    that is the end of the leg.
+    """
+    total, count = record[TIME_FROM_START] + record[TIME_FROM_END], int(record[WHOLE]) * WIDE - 1
+    backwards = time > record[TIME_FROM_START]
+    wanted = total - time if backwards else time
+    phase = 0.5 * pi * wanted / (record[TIME_FROM_END] if backwards else record[TIME_FROM_START])
+    for _ in range(MAX_STEPS):
+        there, rate = time_to_phase(terms, count, phase, backwards)
+        step = (there - wanted) / rate
+        phase = min(max(phase - step, 0.0), 0.5 * pi)
+        if fabs(step) <= FLAT_PART:
+            break
+    return phase, backwards
 
 
 @Inner
 def place_in_rows(record, time):  # type: ignore[no-untyped-def]
     """Return the place in [-1, 1] at a time from the start of a leg whose record has rows, to some ten digits."""
-    total = record[TIME_FROM_START] + record[TIME_FROM_END]
-    backwards = time > record[TIME_FROM_START]
-    wanted = total - time if backwards else time
-    phase = 0.5 * pi * wanted / (record[TIME_FROM_END] if backwards else record[TIME_FROM_START])
-    for _ in range(MAX_STEPS):
-        there, rate = time_to_phase(record, phase, backwards)
-        step = (there - wanted) / rate
-        phase = min(max(phase - step, 0.0), 0.5 * pi)
-        if fabs(step) <= FLAT_PART:
-            break
+    phase, backwards = phase_of_rows(record, record[HEAD:], time)
     return cos(phase) if backwards else -cos(phase)
+
+
+@Inner
+def place_of_rows(record, time):  # type: ignore[no-untyped-def]
+    """Return the result of `place_at` for a record with the rows of a solved motion (`runs.whole_panels`)."""
+    rows, blocks, h, v = sample_buffer(), int(record[WHOLE]), record[WHOLE_WIDTH], record[HEADING]
+    wide = blocks * WIDE
+    if not time <= record[TIME_FROM_START] + record[TIME_FROM_END]:
+        return np.nan
+    for at in range(0, wide, WIDE):
+        copy(rows, wide + at, record, HEAD + at)
+        copy(rows, 2 * wide + at, record, HEAD + 3 * wide + at)
+        whole_time_row(rows, wide + at, 2 * wide + at, wide + at, h)
+    to_coefficients(blocks, rows, wide, rows, 0)
+    phase, backwards = phase_of_rows(record, rows, time)
+    root = sin(0.5 * phase)
+    covered = v * (h * (root * root))
+    return record[END] + (record[END_LOW] - covered) if backwards else record[START] + (record[START_LOW] + covered)
 
 
 @Inner
@@ -359,7 +389,7 @@ def peak_of_rows(record, until, asked, best):  # type: ignore[no-untyped-def]
     if sign < 0.0 and function == SPEED:
         return max(best, 0.0)  # the body is slowest where it turns
     for at in range(0, blocks * WIDE, WIDE):
-        copy(values, at, record, WHOLE_ROWS + (1 if function == SPEED else 2) * blocks * WIDE + at)
+        copy(values, at, record, HEAD + (1 if function == SPEED else 2) * blocks * WIDE + at)
     last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
     if function != SPEED:
         return peak_of_function(blocks, values, (-1.0, last), asked, best)

@@ -14,10 +14,14 @@ HALF_C               c/2 of the march variable (`panels.equation.March`); inf wh
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
-WHOLE                0; or, if the record has no panels but rows of the whole leg from WHOLE_ROWS on, the number of
-                     blocks of a row (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of
-                     the time per phase angle, V**2, and N per mass
-AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end
+WHOLE                0; or, if the record has no panels but rows of the whole leg from HEAD on, the number of blocks
+                     of a row (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of the
+                     time per phase angle, V**2, and N per mass. Where panels are read, they are those of
+                     `runs.whole_panels`
+WHOLE_WIDTH          the width of a leg with rows from which panels can be made; 0 if they cannot
+AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end; if
+                     there are rows, both are ROWS_COUNT_AS
+USED                 the number of elements of a record of a solved motion that other legs follow
 from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
                      the field next to an equilibrium
 at the end           the places at which N changes sign, the first one last
@@ -52,7 +56,7 @@ from gqm_sym.runtime.legs.panels.resolution import tail_of
 
 START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
-WHOLE, AHEAD, BACK, HEAD = range(15, 19)
+WHOLE, WHOLE_WIDTH, AHEAD, BACK, USED, HEAD = range(15, 21)
 
 # The data that are read from a record (`runs.route.Reading`): the times and places between which the leg runs; also the
 # largest or smallest speed or contact force; the time at which the body passes a place; or everything that panels
@@ -60,7 +64,7 @@ WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
-WHOLE_ROWS = HEAD + 4 * COLUMNS
+MAX_ROWS, ROWS_COUNT_AS = 4, 2
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 FIELD_COLUMNS = 2 + 2 * COUNT
@@ -100,3 +104,13 @@ def total_time(record, begin, count):  # type: ignore[no-untyped-def]
         high, rounding = two_sum(high, record[begin + k * COLUMNS + TIME])
         low += rounding
     return high + low
+
+
+@Inner
+def pack(record):  # type: ignore[no-untyped-def]
+    """Move the changes of N's sign on a leg that turns directly behind its rows or panels, and set USED."""
+    changes, wide = int(record[CHANGE_COUNT]), int(record[WHOLE]) * WIDE
+    used = HEAD + (MAX_ROWS * wide if wide > 0 else int(record[AHEAD] + record[BACK]) * COLUMNS)
+    for k in range(changes):
+        record[used + k] = record[record.size - changes + k]
+    record[USED] = used + changes

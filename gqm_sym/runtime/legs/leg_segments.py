@@ -32,10 +32,12 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_ERROR,
     TIME_FROM_END,
     TIME_FROM_START,
+    WHOLE,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_PAUSE
+from gqm_sym.runtime.legs.runs.whole_panels import lay_panels
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.running_totals import totals_of
@@ -86,6 +88,12 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
     return edges, edge_times, lengths, time_terms, length_terms, error, low_times, speed_terms
 
 
+def panelled(record: Array) -> Array:
+    """Return a record with panels in place of rows of the whole leg."""
+    with_panels: Array = lay_panels(record) if record[WHOLE] else record
+    return with_panels
+
+
 class Run(NamedTuple):
     """One run of the body as found by compiled code (`runs.follow`), from which segments are made when they are needed.
 
@@ -118,14 +126,24 @@ class Run(NamedTuple):
 
         ``until`` is the last time of the motion.
         """
-        own, last = self.record, records[-1]
-        begin, times = own[BEGIN], own[TIME_FROM_START] + own[TIME_FROM_END]
-        passed = own if begin <= until <= begin + 2.0 * times else None
+        own, last, passed = self.record, records[-1], self._passed(until)
         clock = [BEGIN, BEGIN_LOW, TIME_FROM_START, TIME_FROM_END]
         last[TIME_FROM_END if last[BACK] else TIME_FROM_START] += sum((own[clock] - last[clock]).tolist())
         last[[END, END_LOW]] = own[[END, END_LOW]]
         earlier = [Run(record, END_PAUSE, "", None, None, passed) for record in records[:-1]]
         return [*earlier, self._replace(record=last, before=None, passed=passed)]
+
+    def as_panels(self, until: float) -> "Run":
+        """Return the run with panels, if its record has rows of the whole leg; ``until`` is as in `with_panels`."""
+        if not self.record.item(WHOLE):
+            return self
+        return tuple.__new__(Run, (lay_panels(self.record), *self[1:5], self._passed(until)))
+
+    def _passed(self, until: float) -> Array | None:
+        """Return the record, if the motion may end at the time ``until`` within the run."""
+        number = self.record.item
+        begin, times = number(BEGIN), number(TIME_FROM_START) + number(TIME_FROM_END)
+        return self.record if begin <= until <= begin + 2.0 * times else None
 
     @property
     def laps(self) -> int:
@@ -154,7 +172,7 @@ class Run(NamedTuple):
 
     def leg(self, lap: float, t_end: float) -> Leg:
         """Return the leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
-        head = self.record[:HEAD].tolist()
+        head = self.record[: END + 1].tolist()  # more numbers would take longer than the rest
         start, before = head[START], head[LAPS_BEFORE] * lap
         end = start if self.what == END_LIFTOFF_AT_ONCE else head[END]
         t_end = inf if self.what == END_ASYMPTOTE else t_end

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.errors import GQMError, InputError
+from gqm_sym.runtime.gradients.lanes.launches import launches_of
 from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
-from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients, mirrored
+from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.sweep.columns import as_doubles
@@ -63,7 +64,7 @@ def sweep_with_gradient(
         which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
         table = np.stack(columns[:-1], axis=1)[which]
         ends = spans.values.reshape(-1, 2)[which]
-        several = Launches(table[:, :-1], table[:, -1], ends, mirrored(formulas, table[:, :-3], ends))
+        several = launches_of(formulas, table[:, :-1], table[:, -1], ends)
         values = found.values.reshape(found.status.size, *shape[:-1])[which]
         if which.size:
             gradient[which] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))

@@ -170,6 +170,61 @@ def test_there_is_none(z: str) -> None:
     assert gqm.derive(graph(z), gqm.Gravity()).symmetric_orbits is None
 
 
+HEIGHTS = ["x**2/2", "x**4/5", "cosh(x)", "cosh(2*x)/4", "-cos(x)", "-sin(x)**2/2"]
+FORCES = [
+    gqm.Gravity(),
+    gqm.Gravity() + gqm.RotatingFrame(Omega="1/4"),
+    gqm.Potential("9*z + x**2/3"),
+    gqm.Potential("9*z + x**4/8"),
+    gqm.Potential("9*z - cos(x)/2"),
+    gqm.Potential("9*z + cosh(x)/7"),
+]
+
+
+@pytest.mark.parametrize("axis", ["x", "catenary"])
+@pytest.mark.parametrize("force", range(len(FORCES)))
+def test_powers_and_waves_together(axis: str, force: int) -> None:
+    """Whatever an even curve and an even force are made of, there is no such integral, or it is the motion's."""
+    heights = HEIGHTS if axis == "x" else ["catenary"]
+    for z in heights:
+        curve = gqm.families.catenary(c="4/5") if axis == "catenary" else graph(z)
+        model, half = gqm.derive(curve, FORCES[force]), mpf("0.7")
+        if model.symmetric_orbits is None or model.symmetric_orbits.time_integrand is None:
+            continue
+        assert model.symmetry is not None
+        (potential,) = functions(model, model.effective_potential, by=(model.parameter,))
+        axis_place = mpf(sp.N(model.symmetry.place, 40))
+        if potential(axis_place + half) < potential(axis_place):
+            continue  # a hill
+        with mp.workdps(40):
+            truth = by_heights(model, half)
+        with mp.workdps(25):
+            assert abs(by_integral(model, half) / truth - 1) < mpf("1e-18"), z
+
+
+def test_the_rotating_frame_of_a_catenary_is_not_left_out(tmp_path: Path) -> None:
+    """Sweeps over a catenary in a rotating frame gave the half periods of gravity alone."""
+    model = gqm.derive(gqm.families.catenary(c=1), gqm.Gravity() + gqm.RotatingFrame())
+    assert model.symmetric_orbits is None
+    module = gqm.build(model, name="turning_catenary", folder=tmp_path)
+    places = [0.2, 0.7, 1.2]
+    swept = module.sweep("half_period", places, Omega=0.7).values
+    with mp.workdps(40):
+
+        def height(x: mpf) -> mpf:
+            return mpf("9.81") * mp.cosh(x) - mpf(0.7) ** 2 * x**2 / 2
+
+        for value, place in zip(swept, places, strict=True):
+            start = mpf(place)
+
+            def rate(u: mpf, start: mpf = start) -> mpf:
+                x = start * mp.sin(u)
+                return mp.cosh(x) * start * mp.cos(u) / mp.sqrt(2 * (height(start) - height(x)))
+
+            truth = 2 * integral(rate)
+            assert abs(mpf(float(value)) - truth) <= 2 * np.spacing(float(truth))
+
+
 def test_a_pendulum_has_the_elliptic_integral() -> None:
     """After Landen's transformation the integrand is (1 + k1)**2/(1 - k1**2*sin(u)**2) with k1 = tan(half/2/2)**2."""
     orbits = gqm.derive(PENDULUM, gqm.Gravity()).symmetric_orbits

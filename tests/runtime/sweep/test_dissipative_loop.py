@@ -154,6 +154,18 @@ def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None
                 assert (status == quantities.ANSWERED) == (not math.isnan(expected))
 
 
+def test_the_contact_force_of_a_damped_body_at_a_cusp(build: Build) -> None:
+    """The contact force grows without bound towards a cusp; sweeps gave its value at the last node before it."""
+    cycloid = gqm.Curve.parametric(x="u - sin(u)", z="cos(u) - 1", parameter="u", domain=(0, "2*pi"))
+    module = build("swept_cusp", cycloid, gqm.QuadraticDrag(b="0.05"))
+    starts = [0.75, 1.12, 3.0]
+    for quantity in ("normal_force_min", "normal_force_max"):
+        swept = module.sweep(quantity, starts, 0.0, -1, t_max=5.0).values
+        expected = [float(getattr(module.solve(start, 0.0, -1, t_max=5.0), quantity).value) for start in starts]
+        assert swept == pytest.approx(expected, rel=1e-13)
+        assert np.isinf(swept).any() == (quantity == "normal_force_min")
+
+
 def test_the_same_bits_on_any_number_of_cores(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:
     """A launch is answered independently of the others, with its own parameters."""
     module = build("swept_friction", ring(), gqm.CoulombFriction())

@@ -29,6 +29,9 @@ from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, RESULTS, Lan
 
 Codes = NDArray[np.int64]
 
+# The places of a program that is evaluated at none of its own.
+NOWHERE: Array = np.zeros((2, 0))
+
 # The operations with two operands of which only the left or only the right one depends on the place.
 WITH_PAIR: dict[int, tuple[int, int]] = {
     interpreter.ADD: (PLUS_PAIR, PLUS_PAIR),
@@ -49,6 +52,8 @@ class LaneProgram(NamedTuple):
         The operations in doubles for the results, and for the variances of their rounding errors.
     coordinates, outputs, variances : arrays of int
         The positions in the work space of the coordinates of a place, the results, and the variances.
+    places : (k, n) array
+        The coordinates of the nodes of the trapezoidal rule.
     work : array
         The registers, of which those of constants are filled. The inputs come first.
     """
@@ -59,16 +64,19 @@ class LaneProgram(NamedTuple):
     coordinates: Codes
     outputs: Codes
     variances: Codes
+    places: Array
     work: Array
 
     @property
     def operands(self) -> tuple[Any, ...]:
-        """The arguments of compiled code, beginning with the addresses of both interpreters."""
-        return INTERPRETER.address, LANES_INTERPRETER.address, *self[:-1]
+        """The arguments of compiled code, beginning with the addresses of the interpreters of all operations."""
+        return (INTERPRETER.address, LANES_INTERPRETER.address, LANES_INTERPRETER.address), *self[:-1]
 
 
-def assemble(op: LaneRecorder, results: Sequence[Any], measured: Sequence[Any] = ()) -> LaneProgram:
-    """Return the program of results, and of the variances of the ``measured`` ones."""
+def assemble(
+    op: LaneRecorder, results: Sequence[Any], measured: Sequence[Any] = (), places: Array = NOWHERE
+) -> LaneProgram:
+    """Return the program of results, and of the variances of the ``measured`` ones, for nodes at ``places``."""
     outputs, uncertain = ([op.register(result) for result in some] for some in (results, measured))
     noise = [op.register(v) for v in rounding.variances(op, _live(op, uncertain), uncertain)] if uncertain else []
     live = _live(op, outputs) | _live(op, noise)
@@ -88,8 +96,8 @@ def assemble(op: LaneRecorder, results: Sequence[Any], measured: Sequence[Any] =
         code, *pair = op.entries[k]
         if code == "constant":
             work[slot : slot + LOW], work[slot + LOW : slot + ERROR] = pair
-    places = np.array(list(coordinates.values()), dtype=np.int64)
-    return LaneProgram(codes, exact.codes, rounded.codes, places, exact.outputs, rounded.outputs, work)
+    positions = np.array(list(coordinates.values()), dtype=np.int64)
+    return LaneProgram(codes, exact.codes, rounded.codes, positions, exact.outputs, rounded.outputs, places, work)
 
 
 def _live(op: LaneRecorder, wanted: Sequence[int]) -> set[int]:

@@ -7,15 +7,12 @@ from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
-from gqm_sym.runtime.double_double.arithmetic import add
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM
-from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES
 from gqm_sym.runtime.quadrature.trapezoid import (
     MIN_INTERVALS,
     NODE_SHARES,
-    OFFSETS_FROM_A,
-    OFFSETS_TO_B,
     has_converged,
 )
 
@@ -31,7 +28,11 @@ MAX_VARIANCE = 4.7
 
 # The largest condition of an integral, the mean of the absolute values over the absolute mean, by which rounding errors
 # may be larger.
-MAX_CONDITION = 2.0
+MAX_CONDITION = 4.0
+
+# The largest relative difference of two numbers whose arithmetic-geometric mean is their mean, as double precision
+# needs it, and the largest error of a derivative as a share of it.
+MAX_DIFFERENCE, MAX_ERROR = 3e-9, 1e-18
 
 # The nodes at which the variances of rounding errors are found: one end, the middle, and the other end.
 NOISE_NODES = (0, MIN_INTERVALS // 2, MIN_INTERVALS)
@@ -46,7 +47,7 @@ MIN_HOPE = 16
 WIDTH = 8
 
 CODES, POSITIONS = types.int64[:, ::1], types.int64[::1]
-LANE_PROGRAM = types.Tuple((INTEGER, INTEGER, CODES, CODES, CODES, POSITIONS, POSITIONS, POSITIONS))
+LANE_PROGRAM = types.Tuple((types.UniTuple(INTEGER, 3), CODES, CODES, CODES, POSITIONS, POSITIONS, POSITIONS, MATRIX))
 
 
 @Inner
@@ -77,16 +78,16 @@ def fill_lane_values(program, work, inputs, places, found):  # type: ignore[no-u
         for i in range(lanes):
             at = k * ROW + i
             work[at], work[at + LOW], work[at + ERROR] = inputs[0, k], inputs[1, k], inputs[2, k]
-    call_interpreter(program[0], program[2], 0, program[2].shape[0], work, lanes)
+    call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
     for start in range(0, count, BLOCK):
         n = min(BLOCK, count - start)
         for k in range(places.shape[0]):
-            at = program[5][k]
+            at = program[4][k]
             for i in range(n):
                 work[at + i] = places[k, start + i]
-        call_interpreter(program[1], program[3], 0, program[3].shape[0], work, n)
+        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, n)
         for k in range(found.shape[0]):
-            at = program[6][k]
+            at = program[5][k]
             for i in range(n):
                 found[k, start + i] = work[at + i]
 
@@ -102,10 +103,10 @@ def fill_place(program, work, places, lanes):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_ends(ends, works, launches, lanes, first, target):  # type: ignore[no-untyped-def]
+def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: ignore[no-untyped-def]
     """Fill the inputs of the orbits' program from register ``first`` on: both turning points, then their derivatives.
 
-    The turning points of the launches are improved by one step of Newton's method.
+    The turning points of the launches are improved by some steps of Newton's method.
     """
     size, places = launches.shape[0], np.empty((2, BLOCK))
     for program, work in ((ends[0], works[0]), (ends[1], works[1])):
@@ -117,11 +118,14 @@ def fill_ends(ends, works, launches, lanes, first, target):  # type: ignore[no-u
     for end in range(2):
         for i in range(lanes):
             places[0, i], places[1, i] = launches[min(i, size - 1), count + end], 0.0
-        fill_place(step, works[0], places, lanes)
-        for i in range(lanes):
-            at, to = step[4][0] + i, (first + end) * ROW + i
-            places[0, i], places[1, i] = add(places[0, i], 0.0, works[0][at], works[0][at + LOW])
-            target[to], target[to + LOW], target[to + ERROR] = places[0, i], places[1, i], works[0][at + ERROR]
+        for number in range(steps):
+            fill_place(step, works[0], places, lanes)
+            for i in range(lanes):
+                at, to = step[4][0] + i, (first + end) * ROW + i
+                places[0, i], places[1, i] = add(places[0, i], places[1, i], works[0][at], works[0][at + LOW])
+                last = fabs(works[0][at]) if number > 0 else 0.0  # the first step is far larger than what remains
+                target[to], target[to + LOW] = places[0, i], places[1, i]
+                target[to + ERROR] = works[0][at + ERROR] + UNIT * fabs(places[0, i]) + last
         fill_place(moves, works[1], places, lanes)
         for j in range(wanted):
             source, to = moves[4][j], (first + 2 + end * wanted + j) * ROW
@@ -131,13 +135,25 @@ def fill_ends(ends, works, launches, lanes, first, target):  # type: ignore[no-u
 
 
 @Inner
-def carry_out(program, operations, node, work, lanes):  # type: ignore[no-untyped-def]
+def fill_inputs(ends, works, launches, count, steps, lanes, target):  # type: ignore[no-untyped-def]
+    """Fill the inputs of the orbits' program: the first columns of the launches, then what `fill_ends` fills.
+
+    If ``ends`` has no results, the program does not depend on the turning points.
+    """
+    for k in range(count):
+        fill_input(target, k, launches, k, launches.shape[0], lanes)
+    if ends[0][4].size > 0:
+        fill_ends(ends, works, launches, steps, lanes, count, target)
+
+
+@Inner
+def carry_out(program, address, operations, node, work, lanes):  # type: ignore[no-untyped-def]
     """Carry out operations of the orbits' program at one node of the trapezoidal rule."""
-    coordinates = program[5]
+    coordinates, places = program[4], program[7]
     share, rest = coordinates[0], coordinates[1]
     for i in range(lanes):
-        work[share + i], work[rest + i] = OFFSETS_FROM_A[node], OFFSETS_TO_B[node]
-    call_interpreter(program[1], operations, 0, operations.shape[0], work, lanes)
+        work[share + i], work[rest + i] = places[0, node], places[1, node]
+    call_interpreter(address, operations, 0, operations.shape[0], work, lanes)
 
 
 @Inner
@@ -146,11 +162,11 @@ def fill_variances(program, mirrored, whole, work, lanes, found):  # type: ignor
 
     Of an orbit that is a mirror image of itself, nodes come in pairs with the same errors.
     """
-    positions = program[7]
+    positions = program[6]
     found[:, :] = 0.0
     for number in range(2 if whole else 3):
         node = NOISE_NODES[number]
-        carry_out(program, program[4], node, work, lanes)
+        carry_out(program, program[0][2], program[3], node, work, lanes)
         for k in range(positions.size):
             at = positions[k]
             for i in range(lanes):
@@ -163,7 +179,7 @@ def fill_variances(program, mirrored, whole, work, lanes, found):  # type: ignor
 @Inner
 def add_node(program, work, weights, lanes, sums, factors):  # type: ignore[no-untyped-def]
     """Add the results at one node to the sums: these, what rounding took from them, and the sums of absolute values."""
-    outputs = program[6]
+    outputs = program[5]
     for i in range(lanes):
         factor = work[outputs[0] + i]
         low, high = factors[0, i], factors[1, i]
@@ -227,7 +243,7 @@ def fill_batch(program, mirrored, limits, work, lanes, sums, answers):  # type: 
 
     Of orbits that are mirror images of themselves, only nodes up to the middle count.
     """
-    count = program[6].size - 1
+    count = program[5].size - 1
     means, variances = np.zeros((count, BLOCK)), np.empty((count, BLOCK))
     changes, weights, factors = np.full(BLOCK, inf), np.zeros(BLOCK), np.zeros((2, BLOCK))
     whole = True
@@ -245,11 +261,11 @@ def fill_batch(program, mirrored, limits, work, lanes, sums, answers):  # type: 
             for i in range(lanes):
                 side = 1.0 if share == 0.5 or not mirrored[i] else (2.0 if share < 0.5 else 0.0)
                 weights[i] = edge * side
-            carry_out(program, program[3], node, work, lanes)
+            carry_out(program, program[0][1], program[2], node, work, lanes)
             add_node(program, work, weights, lanes, sums, factors)
             if first == 0 and node % 2 == 0:
                 for k in range(count):
-                    at = program[6][1 + k]
+                    at = program[5][1 + k]
                     for i in range(lanes):
                         means[k, i] += 2.0 * weights[i] * work[at + i] / MIN_INTERVALS
         rule = (nodes, limits[0], limits[1])
@@ -260,7 +276,7 @@ def fill_batch(program, mirrored, limits, work, lanes, sums, answers):  # type: 
 
 @entry(
     types.void(
-        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), LANE_PROGRAM, VECTOR, types.UniTuple(INTEGER, 2)),
+        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), LANE_PROGRAM, VECTOR, types.UniTuple(INTEGER, 3)),
         *(MATRIX, types.boolean[::1], types.Tuple((MATRIX, types.int8[::1]))),
     ),
     nogil=True,
@@ -272,20 +288,22 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
     ----------
     ends, works
         The programs of the Newton step to a turning point, and of the derivatives of a turning point
-        (`programs.end_programs`), with their work spaces.
+        (`programs.end_programs`), with their work spaces; without results for launches from rest.
     program, work
         The program of an orbit (`assembly.LaneProgram.operands`), with its work space.
-    limits : (int, int)
-        The largest number of intervals in this call, and in any call.
+    limits : (int, int, int)
+        The number of columns of the launches that are inputs of the program, and the largest numbers of intervals in
+        this call and in any call.
     launches : (m, n + 2) array
-        The n variables of each launch, and its turning points to the accuracy of doubles.
+        The n variables of each launch, and its turning points to the accuracy of doubles; for launches from rest, the
+        inputs of the program (`programs.Orbits`).
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
     answers : ((m, k) array, (m,) array)
         The derivatives, and the states: OPEN where more intervals are needed, and LEFT where digits are lost.
     """
     found, states = answers
-    count, inputs = found.shape[1], launches.shape[1] - 2 - LAUNCH_VARIABLES
+    count, inputs = found.shape[1], limits[0]
     sums, values, even = np.empty((3, count, BLOCK)), np.empty((BLOCK, count)), np.zeros(BLOCK, np.bool_)
     kinds = np.zeros(BLOCK, np.int8)
     for start in range(0, launches.shape[0], BLOCK):
@@ -294,10 +312,37 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
         lanes = -(-size // WIDTH) * WIDTH
         for i in range(lanes):
             even[i], kinds[i] = mirrored[start + min(i, size - 1)], OPEN
-        fill_ends(ends, works, some, lanes, inputs, work)
-        for k in range(inputs):
-            fill_input(work, k, some, k, size, lanes)
-        call_interpreter(program[0], program[2], 0, program[2].shape[0], work, lanes)
-        fill_batch(program, even, limits, work, lanes, sums, (values, kinds))
+        fill_inputs(ends, works, some, inputs, 1, lanes, work)
+        call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
+        fill_batch(program, even, limits[1:], work, lanes, sums, (values, kinds))
         for i in range(size):
             found[start + i], states[start + i] = values[i], kinds[i]
+
+
+@entry(
+    types.void(
+        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), PROGRAM, VECTOR, INTEGER),
+        *(MATRIX, types.Tuple((MATRIX, types.int8[::1]))),
+    ),
+    nogil=True,
+)
+def fill_mean_gradients(ends, works, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of half periods that are pi over an arithmetic-geometric mean.
+
+    The arguments are as for `fill_lane_gradients`, except that the orbit's program is `programs.mean_program`, and that
+    ``inputs`` is the number of columns of the launches that are its inputs.
+    """
+    found, states = answers
+    address, operations, _, _, outputs = program
+    for start in range(0, launches.shape[0], BLOCK):
+        stop = min(start + BLOCK, launches.shape[0])
+        some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
+        fill_inputs(ends, works, some, inputs, 1, lanes, work)
+        call_interpreter(address, operations, 0, operations.shape[0], work, lanes)
+        for i in range(stop - start):
+            is_known = fabs(work[outputs[0] + i]) <= MAX_DIFFERENCE
+            for j in range(found.shape[1]):
+                at = outputs[1 + j] + i
+                found[start + i, j] = work[at]
+                is_known &= work[at + ERROR] <= MAX_ERROR * fabs(work[at])
+            states[start + i] = ANSWERED if is_known else OPEN

@@ -75,6 +75,8 @@ class LaneRecorder(RecorderOfMore):
     def _simplified(self, code: int, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
         """Return the result of an operation with two operands in another form; None if there is no simpler one."""
         if code == MULTIPLY:
+            if a.known is None and b.known is None:
+                return self._regrouped(a, b)
             return self._product(*((a, b) if a.known is not None else (b, a)))
         if code in (ADD, SUBTRACT):
             if b.known == 0:
@@ -105,6 +107,21 @@ class LaneRecorder(RecorderOfMore):
                 if isinstance(constant, Fraction):
                     return self.number(constant * factor.known) * self.at(rest)
         return None
+
+    def _regrouped(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
+        """Return the product of a number with what does not depend on the place, with all such factors as one."""
+        for number, fixed in ((a, b), (b, a)):
+            code, *operands = self.entries[number.register]
+            if code == MULTIPLY and self.depends(number.register) and not self.depends(fixed.register):
+                for one, rest in (operands, operands[::-1]):
+                    if not self.depends(one):
+                        return self.at(rest) * (self._factor(one) * fixed)
+        return None
+
+    def _factor(self, register: int) -> TapeNumber:
+        """Return the number in a register; a constant as such, so that it is joined with others."""
+        constant = self.exact.get(register)
+        return self.number(constant) if isinstance(constant, Fraction) else self.at(register)
 
     def _negated(self, number: TapeNumber) -> TapeNumber | None:
         """Return minus a number that was recorded as a product with -1; None for other numbers."""

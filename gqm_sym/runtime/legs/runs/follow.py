@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     MIDDLE,
     MIDDLE_LOW,
+    ROWS_COUNT_AS,
     TIME_FROM_END,
     TIME_FROM_START,
     WHOLE,
@@ -282,12 +283,15 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     record[WHOLE] = 0.0
     end, blocks = run_forwards(forces, start, route, off, record)
-    back = 2 if blocks > 0 else 0  # a record without panels has the times of two in each half
-    what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
+    is_whole = blocks > 0  # the record has rows and both times then
+    what, used, back = end.what, HEAD + end.panel_count * COLUMNS, ROWS_COUNT_AS if is_whole else 0
+    if not is_whole:
+        record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), 0.0
     direction, could_stay = start.direction, True
     if what == END_TURN:
-        back = run_back(forces, end, breaks, off, route.reading, record, used) if back == 0 else back
-        time_from_end = total_time(record, used, back)
+        if not is_whole:
+            back = run_back(forces, end, breaks, off, route.reading, record, used)
+            record[TIME_FROM_END] = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
         direction, could_stay = direction_from_rest(dissipation.static_balance, p, here, here, direction)
     elif what == END_ASYMPTOTE and dissipation.linear:
@@ -295,7 +299,6 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     record[END], record[END_LOW] = end.place
     record[MIDDLE], record[MIDDLE_LOW] = end.middle
     record[HALF_C], record[CHANGE_COUNT] = end.half_c, end.change_count
-    record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), time_from_end
     record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
         what = END_RECORD_FULL if back == NO_SPACE else END_TOO_MANY_PANELS

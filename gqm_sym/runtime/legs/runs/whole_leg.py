@@ -6,38 +6,31 @@ ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. 
 exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The width is that for which the mean
 over the whole leg vanishes; Newton's method finds it.
 
-The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). It has 23 where
-panels are read, and at most 47 where the time at a place is, because with more nodes these take longer than panels that
-are laid one by one.
+The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). It has at most 47
+where the time at a place is read, because with more nodes that takes longer than panels that are laid one by one. For a
+solved motion the record gets rows from which panels are made when they are needed (`whole_panels`).
 """
 
-from math import fabs, fsum, sqrt
+from math import fabs
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
-from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import over_rows
-from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.leg_record import (
-    COLUMNS,
     HEAD,
-    NORMAL_LOAD,
+    MAX_ROWS,
     PANELS,
     PASSAGE,
     PEAKS,
-    RIGHT,
-    TIME,
-    TIME_ERROR,
+    ROWS_COUNT_AS,
+    TIME_FROM_END,
+    TIME_FROM_START,
     WHOLE,
-    WHOLE_ROWS,
-    Y_ROW,
-    has_space,
+    WHOLE_WIDTH,
 )
 from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, located, offset, span_before, within
 from gqm_sym.runtime.legs.panels.equation import (
-    ARC_RATE,
     DS,
     FORCE,
     KAPPA,
@@ -45,8 +38,6 @@ from gqm_sym.runtime.legs.panels.equation import (
     MEAN,
     N0,
     NODES,
-    OFFSET,
-    SPEED,
     TAILS,
     TIME_RATE,
     W_FACTOR,
@@ -54,13 +45,11 @@ from gqm_sym.runtime.legs.panels.equation import (
     Panel,
     W,
     copy,
-    linear_row,
     load_per_mass_row,
-    time_rate_row,
 )
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
-from gqm_sym.runtime.legs.panels.polynomials import BITS, COUNT, SHARES, TO_COEFFICIENTS, WIDE, size_of
-from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE, examine, tail_of
+from gqm_sym.runtime.legs.panels.polynomials import WIDE
+from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.solving import is_settled
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
@@ -110,37 +99,6 @@ MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
 
 # The rounding error of a mean in units in the last place of its largest term.
 MEAN_ROUNDINGS = 4.0
-
-
-def _to_part(begin: float, end: float) -> Array:
-    """Return the matrix that gives a function's values at the nodes of a panel on the half from the start to the
-    middle.
-
-    There the march variable is the root of the distance; the panel lies between two shares of its value in the middle.
-    """
-    one, rows = 1 << BITS, []
-    for share in SHARES.tolist():
-        top, bottom = (begin + (end - begin) * share).as_integer_ratio()
-        x = one // (bottom * bottom) * (top * top) - one
-        values = [one, x]
-        for _ in range(COUNT - 2):
-            values.append(2 * x * values[-1] // one - values[-2])
-        terms = [value / one for value in values]
-        rows.append([fsum(t * c for t, c in zip(terms, column, strict=True)) for column in TO_COEFFICIENTS.T])
-    return np.array(rows).T
-
-
-# Time on half a leg is not smooth at the other turn, and takes two panels. They meet at this share of the march
-# variable in the middle.
-JOINT = 0.625
-TURN_PART, MIDDLE_PART = _to_part(0.0, JOINT), _to_part(JOINT, 1.0)
-to_turn_part, to_middle_part = multiply(TURN_PART), multiply(MIDDLE_PART)
-# Beyond the middle, distances are counted from the end.
-from_turn_part, from_middle_part = multiply(TURN_PART[::-1]), multiply(MIDDLE_PART[::-1])
-
-# Y at the share s of the value that the march variable has in the middle.
-part_speed_row = over_rows(lambda factor, s: np.sqrt(factor - 0.5 * factor * (s * s)), WIDE)
-part_arc_row = over_rows(lambda ds, s, slope: ds * (s * slope), WIDE)
 
 
 @Inner
@@ -246,7 +204,7 @@ def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untype
 @Inner
 def solve_leg(forces, march, panel, room, start, reading, work):  # type: ignore[no-untyped-def]
     """Return the number of blocks that resolve a leg and its width; 0 blocks if there are none."""
-    blocks, most = start.blocks, 1 if reading.what == PANELS else (2 if reading.what == PASSAGE else MAX_BLOCKS)
+    blocks, most = start.blocks, 2 if reading.what == PASSAGE else MAX_BLOCKS
     if blocks > most:
         return 0, 0.0
     width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
@@ -266,60 +224,6 @@ def solve_leg(forces, march, panel, room, start, reading, work):  # type: ignore
 
 
 @Inner
-def enter_part(record, at, begin, end, w, work):  # type: ignore[no-untyped-def]
-    """Write a part of a leg into the record as one panel, whose factor and ds are in SPEED and ARC_RATE.
-
-    The panel lies between two shares of ``w``, the march variable in the middle. The function returns whether time on
-    it is resolved.
-    """
-    width = (end - begin) * w
-    linear_row(work, OFFSET, NODES, begin, end - begin)
-    part_speed_row(work, SPEED, SPEED, OFFSET)
-    time_rate_row(work, TIME_RATE, ARC_RATE, SPEED, 2.0)
-    part_arc_row(work, ARC_RATE, ARC_RATE, OFFSET, 2.0 * w)
-    fine = examine(work, TIME_RATE, size_of(work, TIME_RATE))[2]
-    copy(record, at, work, TIME_RATE)
-    copy(record, at + WIDE, work, ARC_RATE)
-    copy(record, at + Y_ROW, work, SPEED)
-    record[at + RIGHT] = end * w
-    record[at + TIME], record[at + TIME_ERROR] = width * work[TAILS + 6], width * tail_of(work)
-    return fine
-
-
-@Inner
-def enter_parts(record, h, work):  # type: ignore[no-untyped-def]
-    """Write a leg into the record as two panels from each of its ends; return whether time is resolved on them."""
-    w, at = sqrt(0.5 * h), HEAD
-    load_per_mass_row(work, MEAN, N0, KAPPA, W)
-    to_turn_part(work, W_FACTOR, work, SPEED)
-    to_turn_part(work, DS, work, ARC_RATE)
-    to_turn_part(work, MEAN, record, at + NORMAL_LOAD)
-    fine = enter_part(record, at, 0.0, JOINT, w, work)
-    at += COLUMNS
-    to_middle_part(work, W_FACTOR, work, SPEED)
-    to_middle_part(work, DS, work, ARC_RATE)
-    to_middle_part(work, MEAN, record, at + NORMAL_LOAD)
-    fine = enter_part(record, at, JOINT, 1.0, w, work) and fine
-    at += COLUMNS
-    from_turn_part(work, W_FACTOR, work, SPEED)
-    from_turn_part(work, DS, work, ARC_RATE)
-    from_turn_part(work, MEAN, record, at + NORMAL_LOAD)
-    fine = enter_part(record, at, 0.0, JOINT, w, work) and fine
-    at += COLUMNS
-    from_middle_part(work, W_FACTOR, work, SPEED)
-    from_middle_part(work, DS, work, ARC_RATE)
-    from_middle_part(work, MEAN, record, at + NORMAL_LOAD)
-    return enter_part(record, at, JOINT, 1.0, w, work) and fine
-
-
-@Inner
-def enter_time(record, begin, time, is_read):  # type: ignore[no-untyped-def]
-    """Set the time on the panels of half a leg, the first of which is at ``begin`` in the record."""
-    first = record[begin + TIME] if is_read else 0.0
-    record[begin + TIME], record[begin + COLUMNS + TIME] = first, time - first
-
-
-@Inner
 def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
     """Return whether times on a leg of the width ``h`` are read."""
     if route.reading.what == PASSAGE:
@@ -328,32 +232,31 @@ def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def enter_rows(record, blocks, with_times, with_values, work):  # type: ignore[no-untyped-def]
-    """Write a leg into the record as rows."""
-    wide = blocks * WIDE
+def enter_rows(record, blocks, route, is_read, work):  # type: ignore[no-untyped-def]
+    """Write what is read of a leg into the record as rows."""
+    wide, reads = blocks * WIDE, route.reading.what
     record[WHOLE] = blocks
-    if with_times:
-        to_coefficients(blocks, work, blocks * TIME_RATE, record, WHOLE_ROWS)
-    if with_values:
+    if is_read:
+        to_coefficients(blocks, work, blocks * TIME_RATE, record, HEAD)
+    if reads == PEAKS or reads == PANELS:
         for at in range(0, wide, WIDE):
-            copy(record, WHOLE_ROWS + wide + at, work, blocks * W + at)
             load_per_mass_row(work, blocks * MEAN + at, blocks * N0 + at, blocks * KAPPA + at, blocks * W + at)
-            copy(record, WHOLE_ROWS + 2 * wide + at, work, blocks * MEAN + at)
+            copy(record, HEAD + 2 * wide + at, work, blocks * MEAN + at)
+            copy(record, HEAD + wide + at, work, blocks * (W if reads == PEAKS else FORCE) + at)
+    if reads == PANELS:
+        for at in range(0, wide, WIDE):
+            copy(record, HEAD + at, work, blocks * W_FACTOR + at)
+            copy(record, HEAD + 3 * wide + at, work, blocks * DS + at)
 
 
 @Inner
 def enter_leg(record, route, origin, v, blocks, h, work):  # type: ignore[no-untyped-def]
-    """Write a leg into the record; return whether what is read of it is resolved."""
+    """Write a leg into the record."""
     to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
-    first, second, reads = work[blocks * TAILS], work[blocks * TAILS + 1], route.reading.what
-    if reads == PANELS:
-        if not enter_parts(record, h, work):
-            return False
-    else:
-        enter_rows(record, blocks, is_read(route, origin, v, h, first + second), reads == PEAKS, work)
-    enter_time(record, HEAD, first, reads == PANELS)
-    enter_time(record, HEAD + 2 * COLUMNS, second, reads == PANELS)
-    return True
+    first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
+    enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
+    record[WHOLE_WIDTH] = h if route.reading.what == PANELS else 0.0
+    record[TIME_FROM_START], record[TIME_FROM_END] = first, second
 
 
 @Inner
@@ -377,12 +280,11 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
     what, middle, h, blocks = END_NONE, origin, 0.0, 0
     if nu == 0:
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
-    if nu != 0 and nu != -route.only_sign and has_space(record, WHOLE_ROWS + 3 * COLUMNS, 0):
+    if nu != 0 and nu != -route.only_sign and record.size >= HEAD + MAX_ROWS * MAX_BLOCKS * WIDE:
         work = whole_buffer()
         blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, route.reading, work)
-        if blocks > 0 and enter_leg(record, route, origin, v, blocks, h, work):
+        if blocks > 0:
+            enter_leg(record, route, origin, v, blocks, h, work)
             what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
-        else:
-            blocks = 0
     place = located(origin, v, h, breaks, upcoming)
-    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, 2, upcoming), blocks
+    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks

@@ -12,8 +12,7 @@ from mpmath import mp, mpf
 
 import generated.circle_coulomb
 import gqm_sym as gqm
-from gqm_sym.runtime.legs.panels.polynomials import SHARES
-from gqm_sym.runtime.legs.runs import whole_leg, whole_tables
+from gqm_sym.runtime.legs.runs import whole_tables
 
 # The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
@@ -42,17 +41,6 @@ def test_tables(blocks: int) -> None:
             halves = [mp.quad(partial(_power, n), (a, a + mp.pi / 2), method="gauss-legendre") for a in (0, mp.pi / 2)]
         assert whole_tables.half_times(blocks).T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
     assert np.abs(whole_tables.coefficients(blocks).T @ np.ones(y.size) - np.eye(y.size)[0]).max() <= TABLE
-
-
-@pytest.mark.parametrize(
-    ("table", "begin", "end"),
-    [(whole_leg.TURN_PART, 0.0, whole_leg.JOINT), (whole_leg.MIDDLE_PART, whole_leg.JOINT, 1.0)],
-)
-def test_tables_of_parts(table: Any, begin: float, end: float) -> None:
-    """Powers on the whole leg become the same powers on a part of it."""
-    shares = 0.5 * (begin + (end - begin) * SHARES) ** 2
-    for n in range(1, 16):
-        assert table.T @ SHARES**n == pytest.approx(shares**n, abs=TABLE)
 
 
 class Pendulum:
@@ -210,7 +198,7 @@ MU, C_D = 0.125, 0.0625
     ],
 )
 def test_graphs(height: str, slope: Any, start: float, force: str, generated_folder: Path) -> None:
-    """Along curves that a polynomial of degree 22 does not resolve, times, turns and extremes agree with sums."""
+    """Along curves that polynomials of degree 22 do not resolve, times, turns, extremes and places agree with sums."""
     law, name = gqm.Gravity(), f"whole_{force}_{'parabola' if slope is PARABOLA else 'wave'}"
     law = law + (gqm.CoulombFriction() if force == "friction" else gqm.QuadraticDrag(b="c_d"))
     module = gqm.build(gqm.derive(gqm.Curve.graph(height), law), name=name, folder=generated_folder)
@@ -234,9 +222,13 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
         assert swept("normal_force_min") == pytest.approx(float(lightest), rel=2e-15)
         fastest = mp.findroot(lambda x: mp.diff(lambda y: body.v2(a, y, -1), x), 0.0)
         assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
+        motion = module.solve(start, 0.0, **given)
+        assert motion.legs[0].lam_end == pytest.approx(float(b), rel=0.0, abs=1e-15)
         for share in map(mpf, ("0.0625", "0.375", "0.875")):
             place = a + (b - a) * share
             time = float(body.time(a, b, -1, share))
+            for found in (motion.lam(time), module.solve(start, 0.0, **(given | {"t_max": time})).legs[0].lam_end):
+                assert abs(found - place) <= min(motion.error_bound(time), 2e-15)
             assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
             if (place - fastest) * (a - fastest) > 0:
                 v_there = float(mp.sqrt(body.v2(a, place, -1)))

@@ -1,0 +1,129 @@
+"""Compiled code for gradients of many half periods or laps in double-double arithmetic, with one orbit in each lane."""
+
+from math import fabs, inf, nan
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.nodes import LEVELS
+from gqm_sym.runtime.gradients.evaluation import MAX_NEXT_CHANGE, MAX_RATIO, MAX_ROUNDING, MEAN, PROGRAM
+from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs
+
+# The number of Newton steps to the turning points, starting from doubles.
+NEWTON_STEPS = 2
+
+# The rows of the state of an orbit: the change by the last level, and whether the rule has converged (-1 if it never
+# will, because digits are lost).
+CHANGE, DONE = range(2)
+
+
+@Inner
+def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[no-untyped-def]
+    """Fill the means of each result over n midpoints (`evaluation.add_midpoints`).
+
+    Of orbits that are mirror images of themselves only the first half counts, whoever their neighbours are.
+    """
+    (address, operations, first, count, outputs), halved = program, True
+    place = count * ROW
+    for i in range(lanes):
+        halved = halved and mirrored[i]
+    sums[:, :, :] = 0.0
+    for node in range(n, n + n // 2 if halved else 2 * n):
+        for i in range(lanes):
+            work[place + i], work[place + LOW + i] = nodes[0, node], nodes[1, node]
+            work[place + ERROR + i] = UNIT * nodes[0, node]
+        call_interpreter(address, operations, first, operations.shape[0], work, lanes)
+        is_second = node >= n + n // 2
+        for j in range(outputs.size):
+            at, high, low, error, size = outputs[j], sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3]
+            for i in range(lanes):
+                side = 0.0 if is_second and mirrored[i] else 1.0
+                high[i], low[i] = add(high[i], low[i], side * work[at + i], side * work[at + LOW + i])
+                error[i] += side * (work[at + ERROR + i] + UNIT * fabs(high[i]))
+                size[i] += side * fabs(work[at + i])
+    for j in range(outputs.size):
+        for part in range(MEAN):
+            for i in range(lanes):
+                sums[j, part, i] *= (2.0 if mirrored[i] else 1.0) / n
+
+
+@Inner
+def judge_means(level, lanes, sums, means, states):  # type: ignore[no-untyped-def]
+    """Take the means of a level for orbits for which the rule has not converged; return whether there is none left.
+
+    The criteria are those of `evaluation.fill_means_of`.
+    """
+    is_done = True
+    for i in range(lanes):
+        if states[DONE, i] != 0.0:
+            continue
+        change, rounding = 0.0, 0.0
+        for j in range(sums.shape[0]):
+            size = sums[j, 3, i]
+            if not size <= sums[j, 2, i]:  # a smaller mean is zero within rounding
+                step = fabs(add(sums[j, 0, i], sums[j, 1, i], -means[j, 0, i], -means[j, 1, i])[0]) / size
+                change = step if not step <= change else change
+                share = sums[j, 2, i] / size
+                rounding = share if not share <= rounding else rounding
+            means[j, 0, i], means[j, 1, i] = sums[j, 0, i], sums[j, 1, i]
+        before = states[CHANGE, i]
+        has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
+        if not rounding <= MAX_ROUNDING:
+            states[DONE, i] = -1.0
+        elif level > 1 and has_converged:
+            states[DONE, i] = 1.0
+        states[CHANGE, i] = change if level > 1 else 1.0
+        is_done = is_done and states[DONE, i] != 0.0
+    return is_done
+
+
+@entry(
+    types.void(
+        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), PROGRAM, VECTOR),
+        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX)), MATRIX, types.boolean[::1], MATRIX),
+    ),
+    nogil=True,
+)
+def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, found):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of half periods, or of times of laps, with NaN where double-double arithmetic does not
+    suffice.
+
+    Parameters
+    ----------
+    ends, works
+        The programs of the Newton step to a turning point, and of the derivatives of a turning point
+        (`programs.end_programs`), with their work spaces; without results where the program needs no turning points.
+    program, work
+        The program of an orbit, with its work space.
+    rule : (int, (float, float), (4, k) array)
+        The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
+        and the table of shares (`nodes.trapezoidal_nodes`).
+    launches : (m, n) array
+        The launches; the turning points, to the accuracy of doubles, are last.
+    mirrored : (m,) array
+        Whether each orbit is a mirror image of itself.
+    found : (m, k) array
+        Filled with the derivatives.
+    """
+    count, (inputs, phase, nodes), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
+    sums, means, states = np.empty((count, MEAN, BLOCK)), np.empty((count, 2, BLOCK)), np.empty((2, BLOCK))
+    for start in range(0, launches.shape[0], BLOCK):
+        stop = min(start + BLOCK, launches.shape[0])
+        some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
+        for i in range(lanes):
+            even[i] = mirrored[start + min(i, stop - start - 1)]
+        fill_inputs(ends, works, some, inputs, NEWTON_STEPS, lanes, work)
+        call_interpreter(program[0], program[1], 0, program[2], work, lanes)
+        means[:, :, :], states[CHANGE, :], states[DONE, :] = 0.0, inf, 0.0
+        for level in range(1, len(LEVELS) - 1):
+            add_nodes(program, work, nodes, LEVELS[level], even, lanes, sums)
+            if judge_means(level, lanes, sums, means, states):
+                break
+        for i in range(stop - start):
+            for j in range(count):
+                value = multiply(means[j, 0, i], means[j, 1, i], phase[0], phase[1])[0]
+                found[start + i, j] = value if states[DONE, i] == 1.0 else nan

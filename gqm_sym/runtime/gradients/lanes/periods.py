@@ -1,0 +1,189 @@
+"""Gradients of half periods and times of laps of many launches, by the fastest program that keeps its digits.
+
+About an axis of symmetry that is an arithmetic-geometric mean or an integral without divided differences. For other
+librations it is an integral in double precision, and for what remains and for laps one in double-double arithmetic.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from math import nan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
+from gqm_sym.runtime.compiled.threads import run_in_threads
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
+from gqm_sym.runtime.gradients.formula_orbit import source_of
+from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
+from gqm_sym.runtime.gradients.lanes.evaluation import (
+    ANSWERED,
+    LEFT,
+    OPEN,
+    PASSES,
+    fill_lane_gradients,
+    fill_mean_gradients,
+)
+from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, UNEVEN, Launches
+from gqm_sym.runtime.gradients.lanes.machine_code import operands
+from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients
+from gqm_sym.runtime.gradients.lanes.programs import (
+    Orbits,
+    axis_program,
+    end_programs,
+    exact_axis_program,
+    mean_program,
+    swing_program,
+)
+from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
+from gqm_sym.runtime.launch.formulas import Formulas
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+
+# The number of launches from which on a thread is worth starting, and that from which on machine code is worth making
+# for a program, which takes up to 0.2 s.
+MIN_LAUNCHES_PER_THREAD, MIN_LAUNCHES_FOR_CODE = 64, 2000
+
+# The ranges of phases of half periods and laps, as two doubles.
+PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.0)}
+
+# A program without results.
+NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))
+
+
+class Stage(NamedTuple):
+    """A program that may answer some of the launches.
+
+    Attributes
+    ----------
+    serves : (m,) array
+        Whether it may answer each launch.
+    make, given
+        The function that returns the program (None if there is none), and its arguments.
+    launched : (m, k) array
+        The launches as compiled code takes them for this program.
+    inputs : int
+        The number of columns that are inputs of the program.
+    has_turns : bool
+        Whether it also needs the turning points.
+    kind : int
+        LIBRATION or CIRCULATION.
+    """
+
+    serves: NDArray[np.bool_]
+    make: Callable[..., Program | LaneProgram | None]
+    given: tuple[Any, ...]
+    launched: Array
+    inputs: int
+    has_turns: bool
+    kind: int = LIBRATION
+
+
+@lru_cache(maxsize=128)
+def machine_code(make: Callable[..., Program | LaneProgram], *given: Any) -> tuple[Any, ...]:
+    """Return the operands of a program with machine code for it, which is made once."""
+    return operands(make(*given))
+
+
+def end_program(end: int, source: Source, rows: tuple[int, ...]) -> Program:
+    """Return one of `end_programs`."""
+    return end_programs(source, rows)[end]
+
+
+def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Array:
+    """Return the derivatives of half periods, or of times of laps, with NaN where no program keeps its digits.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        The model of a generated module.
+    launches : Launches
+        The launches.
+    rows : tuple of int
+        The variables of differentiation.
+    """
+    found = np.full((len(launches.given), len(rows)), nan)
+    is_open = np.full(len(found), bool(rows))
+    for stage in stages(formulas, launches, rows):
+        chosen = np.flatnonzero(stage.serves & is_open)
+        program = stage.make(*stage.given) if chosen.size else None
+        for most in () if program is None else PASSES if isinstance(program, LaneProgram) else (0,):
+            if chosen.size:
+                out, states = carried_out(stage, program, rows, (chosen, launches.even[chosen] != UNEVEN), most)
+                is_answered = states == ANSWERED
+                found[chosen[is_answered]], is_open[chosen[is_answered]] = out[is_answered], False
+                chosen = chosen[states == OPEN]
+    return found
+
+
+def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
+    """Yield the programs for half periods and laps, the fastest first."""
+    source, table, swings = source_of(formulas), launches.table, ~launches.circulates
+    n, about_axis = source.parameters, launches.even == ABOUT_ONE_AXIS
+    has_form = source.formulas.agm_arguments is not None or source.formulas.time_integrand is not None
+    if has_form and formulas.axes_of is not None:
+        at_rest = launches.given[:, -1] == 0.0
+        for chosen, are_at_rest in ((about_axis & at_rest, True), (about_axis & ~at_rest, False)):
+            if not chosen.any():
+                continue
+            orbits = Orbits(source, formulas.axes_of, are_at_rest, rows)
+            launched = np.hstack([table[:, : n + 1], launches.axes]) if are_at_rest else table
+            for make in (mean_program, axis_program, exact_axis_program):
+                yield Stage(chosen, make, (orbits,), launched, n + 3 if are_at_rest else n, not are_at_rest)
+    uneven = swings if source.formulas.time_integrand is None else swings & ~about_axis
+    yield Stage(uneven, swing_program, (source, rows), table, n, True)
+    yield Stage(swings, libration_program, (source, rows), table, source.variables, True)
+    laps = np.hstack([table[:, : source.variables], table[:, n : n + 1]])  # a lap begins at lam0
+    for direction in (1, -1):
+        chosen = ~swings & (launches.directions == direction)
+        given = (source, direction, rows)
+        yield Stage(chosen, circulation_program, given, laps, source.variables + 1, False, CIRCULATION)
+
+
+def carried_out(
+    stage: Stage, program: Any, rows: tuple[int, ...], which: tuple[NDArray[np.intp], NDArray[np.bool_]], most: int
+) -> tuple[Array, NDArray[np.int8]]:
+    """Return the derivatives of some launches, and the states of their orbits.
+
+    Parameters
+    ----------
+    stage : Stage
+        The program.
+    program : Program or LaneProgram
+        The program itself.
+    rows : tuple of int
+        The variables of differentiation.
+    which : pair of arrays
+        The launches, and whether each orbit is a mirror image of itself.
+    most : int
+        The largest number of intervals of the trapezoidal rule, for a program in double precision.
+    """
+    chosen, mirrored = which
+    launched, source = stage.launched[chosen], stage.given[0]
+    out, states = np.empty((chosen.size, len(rows))), np.full(chosen.size, ANSWERED, dtype=np.int8)
+    turns = [(end_program, end, getattr(source, "source", source), rows) for end in range(2)] if stage.has_turns else []
+    makers = [*turns, (stage.make, *stage.given)]
+    programs = [make(*given) for make, *given in makers]
+    if chosen.size >= MIN_LAUNCHES_FOR_CODE:
+        addressed = [machine_code(*maker) for maker in makers]
+    else:
+        addressed = [one.operands for one in programs]
+    ends = tuple(addressed[:-1]) or (NO_PROGRAM, NO_PROGRAM)
+
+    def work(part: slice) -> None:
+        *spaces, own = (one.work.copy() for one in programs)
+        given = ends, tuple(spaces) or (np.empty(0), np.empty(0)), addressed[-1], own
+        some, answers = launched[part], (out[part], states[part])
+        if isinstance(program, LaneProgram):
+            fill_lane_gradients(*given, (stage.inputs, most, PASSES[-1]), some, mirrored[part], answers)
+        elif stage.make is mean_program:
+            fill_mean_gradients(*given, stage.inputs, some, answers)
+        else:
+            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind)
+            fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
+
+    run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
+    if isinstance(program, Program):
+        states[np.isnan(out).any(axis=1)] = LEFT
+    return out, states
