@@ -14,14 +14,16 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
+from gqm_sym.design.shape import time_gradient
 from gqm_sym.design.tracks import read_constant
 from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
-from gqm_sym.runtime.charts.sampled import Sampled
+from gqm_sym.runtime.charts.sampled import MIN_POINTS, Sampled
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.request import LaunchRequest
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
 
@@ -92,7 +94,9 @@ def minimise(
     Notes
     -----
     The optimiser is SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` if there are such, and difference
-    quotients otherwise. The result is a local minimum.
+    quotients otherwise. The time to the end of a track through points has exact derivatives by all its points together,
+    if the body is launched from the first of them, which does not move, and loses no energy. The result is a local
+    minimum.
 
     Examples
     --------
@@ -327,10 +331,12 @@ class _Family(_Tracks):
         return self._compiled, dict(zip(self._names, x.tolist(), strict=True))
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
-        """Return the derivatives of a solved motion."""
+        """Return the derivatives of a solved motion; the time to the end of the track is that at which it ends."""
         model, request, parameters, _ = self._launch(x)
+        lam = self._given.get("lam") if quantity == "time_at" else None
+        asked = "t_end" if quantity == "time_at" and lam is None else quantity
         try:
-            found = model.solve(request, parameters).gradient(quantity, self._names)
+            found = model.solve(request, parameters).gradient(asked, self._names, lam=lam)
         except GQMError:
             return None
         return np.array([found[name] for name in self._names])
@@ -374,6 +380,22 @@ class _Points(_Tracks):
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
         text = "\n".join(f"{a!r} {b!r}" for a, b in self._heights(x).tolist())
         return replace(self._compiled, chart=Sampled(text)), {}
+
+    def gradient(self, quantity: str, x: Array) -> Array | None:
+        """Return the derivatives of the time to the end of the track, for a body that loses no energy and is launched
+        from the first point, which does not move.
+        """
+        model, request, parameters, (low, _) = self._launch(x)
+        numbers, points = model.numbers(parameters), self._heights(x)
+        launch = read_launch(model, numbers, request)
+        if (
+            not isinstance(model.exact, ExactPotential)
+            or (quantity, launch.direction, launch.lam0.value) != ("time_at", 1, low)
+            or ("lam" in self._given or model.rolling_radius or 0 in self._moved or len(points) > MIN_POINTS)
+        ):
+            return None
+        p = tuple(number.value for number in numbers)
+        return time_gradient(points, self._moved, model.exact.effective_potential, p, launch.v0.value)
 
     def track(self, x: Array) -> Curve:
         """Return the track through the points with these heights. They are not measured, so they have no scatter."""

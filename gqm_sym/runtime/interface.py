@@ -101,30 +101,34 @@ INTERFACE = 14
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
-PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
-PATH_IN_SPACE = types.void(types.intp, MANY, MANY, REAL, MANY, MANY)
-LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
-EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF2 = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
+# How many places. It is unsigned, because numba counts negative subscripts from the end, and in a long function LLVM
+# then does not see that the places follow each other, and does not vectorise the loop over them.
+COUNT = types.uintp
+
+PATH_AND_CONTACT_FORCE = types.void(COUNT, MANY, MANY, MANY, MANY)
+PATH_IN_SPACE = types.void(COUNT, MANY, MANY, REAL, MANY, MANY)
+LOAD_MAP = types.void(COUNT, REAL, REAL, MANY, MANY, MANY)
+EFFECTIVE_POTENTIAL = types.void(COUNT, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1 = types.void(COUNT, REAL, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2 = types.void(COUNT, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 SEPARATED_TERMS = POTENTIAL_DIVDIFF1
 
-POTENTIAL_DIVDIFF1_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
-POTENTIAL_DIVDIFF2_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
-BOUNDS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
-ORBIT_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
-TIME_INTEGRAND_BATCH = types.void(types.intp, REAL, REAL, MANY, MANY)
-INTEGRAND_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
-AGM_ARGUMENTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
-TURNING_POINT_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
+BOUNDS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
+ORBIT_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
+TIME_INTEGRAND_BATCH = types.void(COUNT, REAL, REAL, MANY, MANY)
+INTEGRAND_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY)
+AGM_ARGUMENTS_BATCH = types.void(COUNT, MANY, MANY, MANY)
+TURNING_POINT_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
 
-SPEED_EQUATION = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
+SPEED_EQUATION = types.void(COUNT, MANY, MANY, REAL, REAL, MANY, MANY)
 RIDER_LOADS = SPEED_EQUATION
-SQUARED_CONTACT = STATIC_BALANCE = types.void(types.intp, MANY, MANY, MANY)
+SQUARED_CONTACT = STATIC_BALANCE = types.void(COUNT, MANY, MANY, MANY)
 
-FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
-SEGMENT = types.void(types.intp, MANY, MANY, MANY)
+FIELD = types.void(COUNT, MANY, MANY, MANY, MANY)
+SEGMENT = types.void(COUNT, MANY, MANY, MANY)
 
 # Rows of path_and_contact_force, of path_in_space, of rider_loads and of load_map.
 PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7

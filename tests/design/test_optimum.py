@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym.design.optimum import _Points
+from gqm_sym.design.optimum import _Family, _Points
 from gqm_sym.errors import GQMError
 
 PLANE = gqm.Curve.graph("-k*x", domain=(0, 1), parameters={"k": 1})
@@ -38,6 +38,17 @@ def test_with_friction() -> None:
     """With friction the quickest plane is steeper by half of the angle of friction."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
     assert steepness(force, {"k": (0.5, 0.9, 4)}) == pytest.approx(tan(pi / 4 + atan(0.3) / 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("given", [{}, {"lam": "1/2"}])
+def test_times_with_friction_have_derivatives(given: dict[str, Any], tmp_path: Path) -> None:
+    """Down a plane of slope k to x = c the time is sqrt(2 c (1 + k**2)/(g (k - mu)))."""
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
+    planes = _Family(PLANE, force, START, {"lam0": 0} | given, str(tmp_path))
+    for k in (0.6, 1.5):
+        found = planes.gradient("time_at", np.array([k]))
+        time = sqrt(2 * (0.5 if given else 1.0) * (1 + k * k) / (9.81 * (k - 0.3)))
+        assert found == pytest.approx(time * (k / (1 + k * k) - 0.5 / (k - 0.3)), rel=1e-12)
 
 
 def test_exact_gradients() -> None:

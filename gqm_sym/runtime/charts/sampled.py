@@ -214,17 +214,22 @@ def _planes(points: Array, closed: bool) -> Chart:
     return _assembled(pieces, np.arange(lengths.size), edges, turn, closed, corners, corners)
 
 
-def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
-    """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
-    knots = summed(reduce(np.hypot, np.diff(points[:, :ROLL], axis=0).T))
+def arc_length_knots(points: Array, closed: bool) -> Array:
+    """Return the arc lengths of the interpolating spline at its points, which are its knots."""
+    knots = summed(reduce(np.hypot, np.diff(points, axis=0).T))
     for _ in range(MAX_ITERATIONS):
         check_budget()
-        terms = _polynomials(points[:, :ROLL], knots, closed)
-        lengths = _lengths(knots, terms)
+        lengths = _lengths(knots, _polynomials(points, knots, closed))
         change = np.abs(lengths / np.diff(knots) - 1.0).max()
         knots = summed(lengths)
         if change <= MAX_LAST_CHANGE:
             break
+    return knots
+
+
+def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
+    """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
+    knots = arc_length_knots(points[:, :ROLL], closed)
     # The increase of the roll angle over a lap is taken as linear, and the rest is periodic.
     rates = (points[-1] - points[0]) / knots[-1] if closed else np.zeros(points.shape[1])
     points, knots = _thinned(points - rates * knots[:, None], knots, closed)

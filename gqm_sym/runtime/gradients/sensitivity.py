@@ -320,8 +320,9 @@ class OrbitSensitivity:
                 outputs[:, 1 + j] = of_path[:, 1 + row]
         functions = [0, *(1 + row for row in rows), *(1 + variables + row for row in rows)]
         constants = np.ascontiguousarray(self._orbit(motion, phi)[:, list(rows)])
-        along = program.operands, program.work.copy(), derivatives.parameters, outputs
-        return along, (constants, series.of(functions), self._scale)
+        along, table = (program.operands, program.work.copy(), derivatives.parameters, outputs), series.of(functions)
+        table[0, 1 + len(rows) :], table[1, 0] = 0.0, 0.0  # these are not needed
+        return along, (constants, table, self._scale)
 
     def at(self, motion: Any, points: Array, phi: float, rows: Sequence[int]) -> Array:
         """Return the derivatives of lam, s, x, z, v, N and y at times with respect to some of the variables.

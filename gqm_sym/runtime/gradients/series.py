@@ -18,6 +18,9 @@ from gqm_sym.runtime.gradients.evaluation import CUBE
 # most the third number.
 MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
 
+# Factors of a series below this share of its largest one are rounding, as those of sines in a function that is even.
+MIN_FACTOR = 1e-17
+
 
 class Series:
     """Functions of a share u, periodic with period 1, given by their values at the midpoints of N equal intervals.
@@ -48,6 +51,7 @@ class Series:
             (values.real, integrals.real),
             (-values.imag, -integrals.imag),
         )
+        self._table[np.abs(self._table) <= MIN_FACTOR * np.abs(self._table).max(axis=2, keepdims=True)] = 0.0
         self._table[1, :, 0] -= integrals.real.sum(axis=1)
         self._table[1, :, -1] = values[:, 0].real
 
@@ -87,8 +91,9 @@ def add_series(table, waves, found):  # type: ignore[no-untyped-def]
             line[:] = 0.0
             for k in range(table.shape[2]):
                 factor, wave = table[part, j, k], waves[k]
-                for i in range(line.size):
-                    line[i] += factor * wave[i]
+                if factor != 0.0:
+                    for i in range(line.size):
+                        line[i] += factor * wave[i]
 
 
 @entry(types.void(CUBE, VECTOR, CUBE), checked=False)

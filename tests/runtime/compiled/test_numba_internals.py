@@ -72,7 +72,7 @@ def unchecked(x):
     return x / 0.7
 
 
-@compiled(types.void(types.intp, POINTER, POINTER, POINTER))
+@compiled(types.void(types.uintp, POINTER, POINTER, POINTER))
 def square(n, lam, p, out):
     lam, out = carray(lam, n), carray(out, (2, n))
     for i in range(n):

@@ -34,7 +34,7 @@ compiled = compiler(__file__, interface={INTERFACE})
 MANY = types.CPointer(types.float64)
 
 
-@compiled(types.void(types.intp, MANY, MANY, MANY, MANY))
+@compiled(types.void(types.uintp, MANY, MANY, MANY, MANY))
 def everything(n, first, second, third, out):
     first, second, third, out = carray(first, n), carray(second, n), carray(third, n), carray(out, ({{rows}}, n))
     for i in range(n):
@@ -62,7 +62,7 @@ def _results(function: Emitted, call: Any, seed: int, count: int) -> np.ndarray:
                 numbers[rng.integers(0, 8 * count, size=4)] = rng.choice(EXTREME, size=4)
             given.append(numbers)
         else:
-            given.append(count if kind == types.intp else float(rng.normal()))
+            given.append(count if kind == types.uintp else float(rng.normal()))
     call(*(value.ctypes.data if isinstance(value, np.ndarray) else value for value in given))
     out: np.ndarray = given[-1]
     out[np.isnan(out)] = np.nan  # either NaN is right

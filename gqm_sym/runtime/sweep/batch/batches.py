@@ -12,6 +12,7 @@ from numba import types
 
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -36,6 +37,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ZERO_BEHIND,
     Orbits,
     Scratch,
+    borrowed_orbits,
     contains,
     gather,
     partition,
@@ -50,8 +52,17 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
     start_search,
     start_search_behind,
 )
-from gqm_sym.runtime.sweep.batch.wells import find_proved, wells_of
-from gqm_sym.runtime.sweep.quantities import ANSWERED, ANSWERS, NOT_PERIODIC, PERIOD, SPAN_KNOWN, SPANS, TURNING_POINTS
+from gqm_sym.runtime.sweep.batch.wells import Wells, find_proved, set_ends_from_rest, wells_of
+from gqm_sym.runtime.sweep.quantities import (
+    ANSWERED,
+    ANSWERS,
+    NOT_PERIODIC,
+    PERIOD,
+    SPAN_KNOWN,
+    SPANS,
+    TURNING_POINTS,
+    Answers,
+)
 
 # The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
 # pieces stand for the proof that all orbits about an axis share.
@@ -111,7 +122,10 @@ def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers): 
         proved, unproved = n, 0
         if not kind.proved:
             if pieces == SHARED:
-                find_proved(fns, n, rows, wells)
+                distances = scratch.work[0, :n]
+                for j in range(n):
+                    distances[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
+                find_proved(fns, wells, distances, rows[STATE, :n])
             else:
                 p = orbits.params[: count * n].reshape(count, n)
                 prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
@@ -185,19 +199,54 @@ def find_orbits(fns, orbits, laps, domain, monotone, wells, scratch):  # type: i
 
 
 @Inner
+def fastest_method(fns):  # type: ignore[no-untyped-def]
+    """Return the kind of orbits about an axis for which the model has the fastest method."""
+    return AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION if fns.time_integrand else LIBRATION
+
+
+@Inner
 def kind_of_librations(fns, orbits, monotone, wells):  # type: ignore[no-untyped-def]
     """Return the common data of librations: whether all are even, and the fastest method for their time."""
     n, rows = orbits.size, orbits.rows
     mirrored, one_axis = not contains(rows[STATE, :n], NOWHERE), not contains(rows[TRIAL, :n], NOWHERE)
-    kind = LIBRATION
-    if mirrored and one_axis and (fns.time_integrand or fns.agm_arguments):
-        kind = AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION
+    about_axis = mirrored and one_axis
     # If no search gave the turning points, V**2 is monotone on either side of the axis.
     known = True
     for j in range(n):
         known &= rows[ZERO_BEHIND, j] == rows[ZERO_BEHIND, j]
-    about_axis = mirrored and one_axis
+    kind = fastest_method(fns) if about_axis else LIBRATION
     return OrbitKind(kind, mirrored, (monotone or known) and about_axis, about_axis and wells.proofs.size > 0)
+
+
+@Inner
+def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ignore[no-untyped-def]
+    """Answer batch after batch; the first four arguments and the last but one are those of `answer_batches`.
+
+    The buffers belong to the caller. Otherwise numba would count references to arrays at each call, by instructions
+    that wait for memory.
+    """
+    (first, spare, laps), scratch, domain, wells = buffers
+    columns, domain = borrowed(columns), borrowed(domain)
+    answers = Answers(borrowed(answers.values), borrowed(answers.status), borrowed(answers.route))
+    first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
+    chosen, others, work = borrowed(scratch.chosen), borrowed(scratch.others), borrowed(scratch.work)
+    scratch = Scratch(scratch.param_count, scratch.invariant_counts, chosen, others, work)
+    wells = Wells(borrowed(wells.proofs), wells.place, borrowed(wells.params), borrowed(wells.work))
+    for begin in range(0, answers.status.size, BATCH):
+        number = min(BATCH, answers.status.size - begin)
+        orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
+        load_launches(columns, begin, number, orbits, domain, scratch)
+        if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
+            kind = OrbitKind(fastest_method(fns), True, True, True)
+            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
+            continue
+        orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
+        if orbits.size:
+            kind = kind_of_librations(fns, orbits, monotone, wells)
+            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
+        if lap_count:
+            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False, False)
+            answer_orbits(fns, kind, laps_found, spare, wells, scratch, quantity, answers)
 
 
 @entry(
@@ -232,15 +281,5 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
-    wells = wells_of(columns)
-    for begin in range(0, answers.status.size, BATCH):
-        number = min(BATCH, answers.status.size - begin)
-        orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
-        load_launches(columns, begin, number, orbits, domain, scratch)
-        orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
-        if orbits.size:
-            kind = kind_of_librations(fns, orbits, monotone, wells)
-            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
-        if lap_count:
-            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False, False)
-            answer_orbits(fns, kind, laps_found, spare, wells, scratch, quantity, answers)
+    buffers = (first, spare, laps), scratch, domain, wells_of(columns)
+    answer_all(fns, columns, monotone, quantity, answers, buffers)

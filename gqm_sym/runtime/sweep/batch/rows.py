@@ -41,6 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import Array
 
 # The number of orbits in a batch, so that its arrays stay in the first-level cache; and the largest number of orbits in
@@ -98,6 +99,12 @@ class Scratch(NamedTuple):
     chosen: NDArray[np.int64]
     others: NDArray[np.int64]
     work: Array
+
+
+@Inner
+def borrowed_orbits(orbits):  # type: ignore[no-untyped-def]
+    """Return the orbits with arrays whose references numba does not count."""
+    return Orbits(orbits.size, borrowed(orbits.rows), borrowed(orbits.params))
 
 
 @Inner

@@ -37,7 +37,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ZERO_BEHIND,
     contains,
 )
-from gqm_sym.runtime.sweep.batch.wells import is_proved
+from gqm_sym.runtime.sweep.batch.wells import find_proved
 
 # The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
@@ -111,7 +111,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
 
 
 @Inner
-def by_symmetry(fns, n, rows, domain, wells):  # type: ignore[no-untyped-def]
+def by_symmetry(fns, n, rows, domain, wells, work):  # type: ignore[no-untyped-def]
     """Set both zeros of bodies released at rest in a well that is proved to rise on both sides of its axis.
 
     Such a body turns at its mirror image. For others ZERO_BEHIND stays NaN.
@@ -123,14 +123,19 @@ def by_symmetry(fns, n, rows, domain, wells):  # type: ignore[no-untyped-def]
         domain[4, :n],
         domain[5, :n],
     )
+    offsets, distances, proved = work[0, :n], work[1, :n], work[2, :n]
     for j in range(n):
         offset, step = (start[j] - places[j]) - places_low[j], steps[j]
         size = fabs(offset)
-        clear = size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j])) and (
-            step == 0.0 or size < MAX_AXIS_STEP_SHARE * step
+        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
+            (step == 0.0) | (size < MAX_AXIS_STEP_SHARE * step)
         )
-        if w0[j] == 0.0 and clear and is_proved(fns, wells, size):
-            rows[SEARCH_DIRECTION, j] = 1.0 if offset < 0.0 else -1.0
+        offsets[j], distances[j] = offset, choose(clear & (w0[j] == 0.0), size, nan)
+    find_proved(fns, wells, distances, proved)
+    for j in range(n):
+        if proved[j] == FOUND:
+            size = distances[j]
+            rows[SEARCH_DIRECTION, j] = 1.0 if offsets[j] < 0.0 else -1.0
             rows[ZERO, j], rows[ZERO_BEHIND, j], rows[AXIS_DISTANCE, j] = 2.0 * size, 0.0, size
 
 
@@ -184,7 +189,7 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
         if wells.proofs.size > 0 and not monotone:
-            by_symmetry(fns, n, rows, domain, wells)
+            by_symmetry(fns, n, rows, domain, wells, work)
     none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     axes = work[5, :n]
     for j in range(n):

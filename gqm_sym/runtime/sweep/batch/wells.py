@@ -6,20 +6,37 @@ end are multiples of an eighth of a power of two, so that a proof serves all orb
 for an orbit does not depend on the other orbits of the sweep.
 """
 
-from math import frexp, nan
+from math import fabs, nan
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.calls import call_bounds_batch
+from gqm_sym.runtime.compiled.intrinsics import bits, choose, from_bits
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.strided import AXIS, PARAMETERS, PLACE_LOW, element
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.sweep.batch.rows import FOUND, LANES, NOWHERE, OFFSET_HIGH, OFFSET_LOW, STATE
+from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS
+from gqm_sym.runtime.sweep.batch.rows import (
+    END_HIGH,
+    END_LOW,
+    FOUND,
+    LANES,
+    LAUNCH_PLACE,
+    LAUNCH_V2,
+    NOWHERE,
+    OFFSET_HIGH,
+    OFFSET_LOW,
+    SEARCH_DIRECTION,
+    STATE,
+    contains,
+)
 
-# Distances from the axis lie between these powers of two, and proofs end at so many distances for each of them.
-LEAST_EXPONENT, LARGEST_EXPONENT, PARTS = -64, 64, 8
+# Distances from the axis lie between these powers of two, and proofs end at PARTS distances for each of them, that is,
+# where the bits of a double from PART_BITS on change: those of its exponent and the first three of its fraction.
+LEAST_EXPONENT, LARGEST_EXPONENT, PARTS, PART_BITS = -64, 64, 8, 49
+FIRST_PART = (1023 + LEAST_EXPONENT) * PARTS
 
 # What is known of the proof up to a distance.
 UNTRIED, PROVED, FAILED = range(3)
@@ -84,23 +101,54 @@ def rises_up_to(fns, wells, distance, inner):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_proved(fns, wells, distance):  # type: ignore[no-untyped-def]
-    """Return whether V**2 of an orbit that ends at a distance from the axis is proved to vanish there only."""
-    share, exponent = frexp(distance)
-    if not (distance > 0.0 and LEAST_EXPONENT <= exponent < LARGEST_EXPONENT):
-        return False
-    part = int((share - 0.5) * (2 * PARTS))
-    k = (exponent - LEAST_EXPONENT) * PARTS + part
-    if wells.proofs[k] == UNTRIED:
-        inner = 0.5 * distance / share
-        good = rises_up_to(fns, wells, inner * (1.0 + (part + 1) / PARTS), inner)
-        wells.proofs[k] = PROVED if good else FAILED
-    return wells.proofs[k] == PROVED
+def try_proof(fns, wells, k):  # type: ignore[no-untyped-def]
+    """Set what is known of the proof number k."""
+    part = FIRST_PART + k
+    inner = from_bits(part // PARTS * PARTS << PART_BITS)
+    good = rises_up_to(fns, wells, from_bits((part + 1) << PART_BITS), inner)
+    wells.proofs[k] = PROVED if good else FAILED
 
 
 @Inner
-def find_proved(fns, n, rows, wells):  # type: ignore[no-untyped-def]
-    """Set STATE to FOUND for the orbits about the axis that are proved, and to NOWHERE for others."""
+def find_proved(fns, wells, distances, state):  # type: ignore[no-untyped-def]
+    """Set ``state`` to FOUND for each orbit about the axis that is proved to end at its distance from it, and at its
+    mirror image, and to NOWHERE for others; distances may be NaN.
+    """
+    proofs = wells.proofs
+    for j in range(distances.size):  # numba counts references to arrays at each call, so there is none in this loop
+        k, state[j] = (bits(distances[j]) >> PART_BITS) - FIRST_PART, NOWHERE
+        if 0 <= k < proofs.size:
+            if proofs[k] == UNTRIED:
+                try_proof(fns, wells, k)
+            state[j] = choose(proofs[k] == PROVED, FOUND, NOWHERE)
+
+
+@Inner
+def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ignore[no-untyped-def]
+    """Set both ends of all orbits if each body is released at rest in a well that is proved to rise on both sides of
+    its axis; return whether this is so.
+
+    Such a body turns at its mirror image, so no zero is searched. ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of
+    `strided`. If V**2 is ``monotone`` between axes, it is enough that the potential rises half way to the next axis.
+    """
+    if wells.proofs.size == 0:
+        return False
+    start, w0, direction = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[SEARCH_DIRECTION, :n]
+    low, high, a, b = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[END_LOW, :n], rows[END_HIGH, :n]
+    firsts, lasts, periods = domain[0, :n], domain[1, :n], domain[2, :n]
+    places, places_low, steps, distances = domain[3, :n], domain[4, :n], domain[5, :n], work[0, :n]
     for j in range(n):
-        distance = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
-        rows[STATE, j] = FOUND if is_proved(fns, wells, distance) else NOWHERE
+        offset, alone = (start[j] - places[j]) - places_low[j], steps[j] == 0.0
+        size, image, closed = fabs(offset), -2.0 * offset, periods[j] > 0.0
+        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
+            alone | (size < MAX_AXIS_STEP_SHARE * steps[j])
+        )
+        length = choose(closed, periods[j], choose(image > 0.0, lasts[j] - start[j], start[j] - firsts[j]))
+        inside = (firsts[j] <= start[j]) & (start[j] <= lasts[j]) & (fabs(image) <= length)
+        good = (w0[j] == 0.0) & (direction[j] != 0.0) & clear & inside
+        far = choose(monotone & (0.5 * steps[j] < size) & (steps[j] > 0.0), 0.5 * steps[j], size)
+        distances[j] = choose(good, far, nan)
+        low[j], high[j] = choose(image < 0.0, image, 0.0), choose(image < 0.0, 0.0, image)
+        a[j], b[j] = start[j] + low[j], start[j] + high[j]
+    find_proved(fns, wells, distances, rows[STATE, :n])
+    return not contains(rows[STATE, :n], NOWHERE)

@@ -8,7 +8,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from generated import cycloid_inverted, parabola_rolling
+from generated import circle, cycloid_inverted, parabola_rolling
 
 ULPS = 4.0
 ROLLING = {"a": 1.0, "beta": 0.4, "rho": 0.05, "g": 9.81, "m": 1.0}
@@ -51,6 +51,22 @@ def test_a_launch_alone_has_the_same_bits() -> None:
         assert np.array_equal(together.values, alone)
         singly = parabola_rolling.sweep(quantity, lam0, v0, **{**ROLLING, "rho": np.full(300, 0.05)})
         assert singly.values == pytest.approx(together.values, rel=5e-16, abs=0.0)
+
+
+@pytest.mark.parametrize("count", [1, 8, 131])
+def test_bodies_that_all_rest_have_the_same_bits(count: int) -> None:
+    """Where all bodies are released at rest, in their well or beyond the ends of the curve, no zero is searched; one
+    that is thrown among them changes no answer.
+    """
+    places = np.linspace(0.05, 6.2, count)
+    for module, given in ((cycloid_inverted, {"R": 1.0}), (parabola_rolling, ROLLING), (circle, {"L": 1.0})):
+        for lam0 in (places, np.append(places, -3.5), np.append(places, np.nan)):
+            searched, speeds = np.append(lam0, 1.0), np.append(np.zeros(lam0.size), 1e-3)
+            for quantity in ("half_period", "turning_points"):
+                rest = module.sweep(quantity, lam0, **given)
+                mixed = module.sweep(quantity, searched, speeds, **given)
+                assert np.array_equal(rest.values, mixed.values[:-1], equal_nan=True)
+                assert np.array_equal(rest.status, mixed.status[:-1])
 
 
 def test_a_cycloid_is_a_tautochrone() -> None:
