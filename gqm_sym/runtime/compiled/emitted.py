@@ -31,7 +31,11 @@ MAX_PYTHON_TIME = 0.02
 @cache
 def _c_function(signature: Any) -> Any:
     """Return the type of C's functions with numba's signature."""
-    kinds: dict[Any, Any] = {types.float64: ctypes.c_double, types.uintp: ctypes.c_size_t}
+    kinds: dict[Any, Any] = {
+        types.float64: ctypes.c_double,
+        types.intp: ctypes.c_ssize_t,
+        types.uintp: ctypes.c_size_t,
+    }
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 

@@ -229,3 +229,13 @@ def test_importing_a_module_compiles_nothing(tmp_path: Path, compiler: _Compiler
     assert compiler.compiled == []
     functions.bounds.compile()
     assert compiler.compiled == ["bounds"]
+
+
+@pytest.mark.parametrize("kind", [types.intp, types.uintp])
+def test_zero_is_a_number(kind: Any) -> None:
+    """A Python function that compiled code calls gets the number 0 as such, whatever the sign of its type."""
+    given: list[Any] = []
+    called = emitted._c_function(types.void(kind, types.float64))(lambda n, x: given.append((n, x)))
+    called(0, 0.5)
+    called(3, 1.5)
+    assert given == [(0, 0.5), (3, 1.5)]

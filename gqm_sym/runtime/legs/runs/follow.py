@@ -51,7 +51,15 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import point_buffer
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
 from gqm_sym.runtime.legs.panels.widest import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel
-from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_RECORD_FULL, END_SLOW, END_TOO_MANY_PANELS, END_TURN
+from gqm_sym.runtime.legs.runs.arrival import run_to_target
+from gqm_sym.runtime.legs.runs.ends import (
+    END_ASYMPTOTE,
+    END_PAUSE,
+    END_RECORD_FULL,
+    END_SLOW,
+    END_TOO_MANY_PANELS,
+    END_TURN,
+)
 from gqm_sym.runtime.legs.runs.route import RunStart
 from gqm_sym.runtime.legs.runs.run import run
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
@@ -219,10 +227,13 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
 
 @Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """Run to the end as one polynomial if that suffices, else by `run_to_end`; return the end, and the number of blocks
-    of the polynomial (`whole_tables`), or 0.
+    """Run to the end, or to a place whose passage is to be found, as one polynomial if that suffices, else by
+    `run_to_end`; return the end, and the number of blocks of the polynomial (`whole_tables`), or 0.
     """
     if start.v2 == 0.0 and start.blocks > 0:
+        end, blocks = run_to_target(forces, start, route, off, record)
+        if end.what == END_PAUSE:
+            return end, blocks
         end, blocks = run_whole(forces, start, route, off, record)
         if end.what == END_TURN:
             return end, blocks

@@ -79,7 +79,14 @@ def half_times(blocks: int) -> Array:
     return np.array([first, first[::-1]]).T
 
 
-to_nodes, to_means, to_coefficients, to_tails, to_end_terms, to_factors, to_half_times = (
+def arrival_time(blocks: int) -> Array:
+    """Return the matrix that gives the integral of f over ``y**-0.5 dy``, y from 0 to 1, from the values of f."""
+    by_node = tables(blocks * WIDE - 1)[3]
+    k = np.arange(len(by_node))
+    return np.array([2.0 / (1.0 - 4.0 * k * k) @ by_node]).T
+
+
+to_nodes, to_means, to_coefficients, to_tails, to_end_terms, to_factors, to_half_times, to_arrival_time = (
     multiply_one_of([partial(table, blocks) for blocks in BLOCKS])
-    for table in (nodes, means, coefficients, tails, end_terms, factors, half_times)
+    for table in (nodes, means, coefficients, tails, end_terms, factors, half_times, arrival_time)
 )

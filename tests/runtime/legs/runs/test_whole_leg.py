@@ -40,6 +40,7 @@ def test_tables(blocks: int) -> None:
         with mp.workdps(30):
             halves = [mp.quad(partial(_power, n), (a, a + mp.pi / 2), method="gauss-legendre") for a in (0, mp.pi / 2)]
         assert whole_tables.half_times(blocks).T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
+        assert whole_tables.arrival_time(blocks).T @ y**n == pytest.approx([1 / (n + 0.5)], abs=TABLE)
     assert np.abs(whole_tables.coefficients(blocks).T @ np.ones(y.size) - np.eye(y.size)[0]).max() <= TABLE
 
 
@@ -224,7 +225,7 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
         assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
         motion = module.solve(start, 0.0, **given)
         assert motion.legs[0].lam_end == pytest.approx(float(b), rel=0.0, abs=1e-15)
-        for share in map(mpf, ("0.0625", "0.375", "0.875")):
+        for share in map(mpf, ("0.0625", "0.375", "0.5", "0.875")):
             place = a + (b - a) * share
             time = float(body.time(a, b, -1, share))
             for found in (motion.lam(time), module.solve(start, 0.0, **(given | {"t_max": time})).legs[0].lam_end):

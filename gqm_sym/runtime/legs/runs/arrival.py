@@ -1,0 +1,139 @@
+"""The time from a turn to a place before the next turn, as one polynomial.
+
+With the distance h of the place and the share y of it that lies behind the body, ``W = h y C`` with a smooth C > 0, and
+the time is the integral of ``f = ds sqrt(h/C)`` over ``y**-0.5 dy``. Nothing is subtracted on the way, so this holds as
+long as V**2 at the place is not small. The width is given, which takes fewer values of the forces than a whole leg
+(`whole_leg`), whose other turn has to be found first.
+"""
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.legs.leg_record import PASSAGE, ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
+from gqm_sym.runtime.legs.panels.breaks import offset, span_before
+from gqm_sym.runtime.legs.panels.equation import (
+    EXPM1_Q,
+    FORCE,
+    LOAD,
+    MEAN,
+    NODES,
+    SPEED,
+    TAILS,
+    TIME_RATE,
+    W_FACTOR,
+    March,
+    Panel,
+    W,
+    copy_row,
+    damped_row,
+    difference_row,
+)
+from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of_block
+from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
+from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
+from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
+from gqm_sym.runtime.legs.runs.whole_rows import (
+    are_rows_resolved,
+    begin_leg,
+    blocks_for,
+    extent_of_row,
+    fill_load,
+    fill_times,
+    has_no_kink,
+    is_load_resolved,
+    keeps_sign,
+    sample_leg,
+    size_of_row,
+    whole_buffer,
+)
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_arrival_time, to_means
+
+# The largest number of times that V**2 is computed from forces that depend on it, and the change of V**2 as a share of
+# its largest value that is rounding only.
+MAX_TRIES, SETTLED = 12, 1e-15
+
+grown_row = over_rows(lambda factor, y, h: factor * (h * y), WIDE)
+
+
+@Inner
+def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
+    to_means(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+    change = 0.0
+    for at in range(0, blocks * WIDE, WIDE):
+        factor, w, new = blocks * W_FACTOR + at, blocks * W + at, blocks * SPEED + at
+        damped_row(work, factor, factor, blocks * EXPM1_Q + at)
+        grown_row(work, new, factor, blocks * NODES + at, h)
+        difference_row(work, w, new, w)
+        change = max(change, size_of_block(work, w))
+        copy_row(work, w, new)
+    return change, extent_of_row(blocks, work, W)[1]
+
+
+@Inner
+def reaches(forces, march, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows up to LOAD for a place at the distance ``h``; return whether the body is fast there."""
+    begin_leg(blocks, work)
+    for _ in range(MAX_TRIES):
+        if not sample_leg(forces, march, panel, blocks, h, work):
+            return False
+        change, size = fill_v2_from_turn(blocks, h, work)
+        if not work[blocks * W + blocks * WIDE - 1] >= HIGH_V2_RATIO * size:
+            return False
+        if forces.linear or change <= SETTLED * size:
+            fill_load(blocks, work)
+            return True
+    return False
+
+
+@Inner
+def is_resolved(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the time rate; return whether all rows are resolved and V**2 and N each have one sign up to the place, and
+    the number of blocks to try next, or 0.
+    """
+    fine, ratio = are_rows_resolved(blocks, h, work)
+    load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
+    if not (fine and load_fine):
+        return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
+    noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]
+    if not (
+        keeps_sign(blocks, work, W_FACTOR, 1, noise)
+        and keeps_sign(blocks, work, LOAD, panel.contact_sign, ZERO_TOLERANCE * load_noise)
+    ):
+        return False, 0
+    if forces.kinked:
+        has_one_sign, ratio = has_no_kink(blocks, work)
+        if not has_one_sign:
+            return False, blocks_for(ratio, blocks)
+    fine, ratio = fill_times(blocks, h, work)
+    return fine, blocks_for(ratio, blocks)
+
+
+@Inner
+def run_to_target(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """Follow the body from a turn to the place whose passage is to be found, if it passes it fast on one polynomial.
+
+    Parameters and Returns are those of `whole_leg.run_whole`; the end, if there is one, has the code END_PAUSE.
+    """
+    breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
+    while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:
+        upcoming += 1
+    room = offset(route.limit if upcoming == breaks.size else breaks[upcoming], origin, v)
+    h, nu, what, blocks = offset(route.target, origin, v), start.contact_sign, END_NONE, 0
+    march, span, place, v2 = March(origin, v, 0.0, 1.0), span_before(breaks, upcoming, v, off), (route.target, 0.0), 0.0
+    if route.reading.what == PASSAGE and 0.0 < h < room:
+        if nu == 0:
+            nu = sign_of_load(forces, start.place, 0.0, point_buffer())
+        work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
+        while blocks > 0:
+            if not reaches(forces, march, panel, blocks, h, work):
+                blocks = 0
+                break
+            fine, onwards = is_resolved(forces, panel, blocks, h, work)
+            if fine:
+                what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
+                to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
+                record[TIME_FROM_START], record[TIME_FROM_END] = work[blocks * TAILS], 0.0
+                break
+            blocks = onwards if onwards <= MAX_BLOCKS else 0
+    return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks
