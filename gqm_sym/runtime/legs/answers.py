@@ -33,6 +33,7 @@ from gqm_sym.runtime.legs.body import (
     HORIZON,
     LAM0,
     LAPS,
+    LAST_AT,
     LEAST_SIZE,
     LEAST_SWING,
     MAY_REST,
@@ -318,6 +319,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         body[STATUS] = 1.0 if is_tiny(record, body[LEAST_SIZE]) else 0.0
         if what in (END_TURN, END_REST):
             pack(record)
+        body[LAST_AT] = used
         used += int(record[USED])
         if what != END_TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
