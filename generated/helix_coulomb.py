@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 13, input 3f2dfaf376e9, body a28947ac3282
+# interface 14, input 3f2dfaf376e9, body 4fd87e63608e
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -27,10 +27,10 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=13)
+compiled = compiler(__file__, interface=14)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, STATIC_BALANCE,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, SQUARED_CONTACT, STATIC_BALANCE,
     CompiledFunctions, CompiledModel, DissipativeFunctions, ExactLaw, Pass1InSpace, cos, iadd, imul, ipow, isqrt, sin,
 )
 
@@ -127,6 +127,35 @@ def speed_equation(n, places, speeds, v, nu, p, out):
         out[2, i] = _u7
         out[3, i] = _u5/ds
         out[4, i] = 0
+
+
+@compiled(SQUARED_CONTACT)
+def squared_contact(n, places, p, out):
+    """Coefficients of 1, V**2 and V**4 in (N/m)**2, and the factor of -v*|N|/m in dV**2/dtheta; v = sgn(ds/dt)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (4, n))
+    R, c, mu, g = p[0], p[1], p[2], p[3]
+    _t0 = R**2
+    _t1 = _t0 + c**2
+    _t2 = sqrt(_t1)
+    _t4 = 1/_t1
+    _t5 = _t4*c
+    _c0 = 1/_t2
+    _c1 = _t2
+    _t7 = _c0*g
+    for i in range(n):
+        theta = places[i]
+        _t3 = R*sin(theta)
+        _t6 = R*cos(theta)
+        ds = _c1
+        turn_x = _t3*_t5
+        turn_y = -_t5*_t6
+        turn_z = _t0*_t4
+        load_x = _t6*_t7
+        load_y = _t3*_t7
+        out[0, i] = load_x**2 + load_y**2
+        out[1, i] = (2*load_x*turn_x + 2*load_y*turn_y)/ds
+        out[2, i] = (turn_x**2 + turn_y**2 + turn_z**2)/ds**2
+        out[3, i] = 2*ds*mu
 
 
 @compiled(STATIC_BALANCE)
@@ -324,7 +353,7 @@ MODEL = CompiledModel(
     path_in_space=path_in_space, signed=False, sided=False,
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=False),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=False, squared_contact=squared_contact),
     exact=ExactLaw(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope, exact_y,
         exact_load_along_curvature,

@@ -87,6 +87,20 @@ def static_balance(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     return _in_pieces(lowering, loss, "static_balance", (lowering.names("places"),), doc, _Law(loss.holds, (), {}))
 
 
+def squared_contact(lowering: Lowering, loss: Dissipation) -> tuple[FunctionIR, ...]:
+    """Return the function for the square of the contact force, and for the factor of friction; nothing for other
+    laws.
+    """
+    if not loss.squared_contact:
+        return ()
+    doc = (
+        f"Coefficients of 1, V**2 and V**4 in (N/m)**2, and the factor of -v*|N|/m in dV**2/d{lowering.place}; "
+        "v = sgn(ds/dt)."
+    )
+    law = _Law(loss.squared_contact, (), {})
+    return (_in_pieces(lowering, loss, "squared_contact", (lowering.names("places"),), doc, law),)
+
+
 def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
     """Return the law itself over a namespace of operations: dW/dλ as a function of the place, W and both signs."""
     w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))

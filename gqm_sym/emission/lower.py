@@ -8,7 +8,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import FORWARDS, Lowering
-from gqm_sym.emission.dissipative import chart_law, speed_equation, speed_slope, static_balance
+from gqm_sym.emission.dissipative import chart_law, speed_equation, speed_slope, squared_contact, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
@@ -31,7 +31,8 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         batch = (*load_map(lowering), *batch_functions(lowering))
     else:
         energy = lowering.effective_potential()
-        functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss), energy), ()
+        law = (speed_equation(lowering, loss), *squared_contact(lowering, loss), static_balance(lowering, loss))
+        functions, batch = (*law, energy), ()
     of_axes = exact_axis_orbits(lowering) if loss is None and not model.curve.charted else ()
     exact = (*lowering.exact(), *of_axes, *lowering.inertia(), *lowering.trigonometric_values())
     return ModuleIR(

@@ -18,7 +18,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 13
+INTERFACE = 14
 
 # Functions that the runtime has in vectorised forms; all others are those of the standard library.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
@@ -141,6 +141,7 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
 def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
     """Return the arguments of ``CompiledModel`` as text; empty ones are omitted from the module."""
     compiled = [name for name in _COMPILED_FUNCTIONS if name in names]
+    squared = [(name, name) for name in names if name == "squared_contact"]
     of_a_motion = 1 if module.dissipation else len(compiled)
     return {
         "name_text": repr(module.name),
@@ -166,7 +167,7 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "separated": _separated(module.separated) if module.separated else "",
         "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
         "monotone": module.monotone,
-        "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
+        "dissipation": ", ".join(f"{flag}={value}" for flag, value in (*module.dissipation, *squared)),
         "exact_class": _exact_class(module),
         "exact_formulas": _listed(_exact_formulas(module), _WIDTH - 8),
     }

@@ -25,6 +25,8 @@ potential_divdiff1     n, a, lam, d, p, out           U[a, lam] [m2/s2/[lam]], d
 potential_divdiff2     n, a, b, da, db, p, out        U[a, lam, b] [m2/s2/[lam]**2], ds/dlam at lam
 bounds                 lo, hi, p, out                 lower and upper bound of dU/dlam, then of ds/dlam
 speed_equation         n, lam, v2, v, nu, p, out      ds/dlam, P [m2/s2/[lam]], Q [1/[lam]], n0 [m/s2], kappa
+squared_contact        n, lam, p, out                 coefficients of 1, V**2 and V**4 in (N/m)**2; f, where -v f |N|/m
+                                                      is the part of dV**2/dlam that is due to friction
 static_balance         n, lam, p, out                 tangential acceleration of a body at rest that is about to move
                                                       forwards, and backwards, its static friction included [m/s2]
 separated_terms        n, a, lam, d, p, out           parts of U[a, lam], ds/dlam, kappa, parts of n0 = N/m at rest
@@ -38,6 +40,9 @@ dissipative one has ``speed_equation`` and ``static_balance`` instead. For its e
 sgn(ds/dt) and nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P
 and Q are its linearisation at the given ``v2``, where ``P - Q*v2`` is the law itself. The contact force is ``N =
 m*(kappa*W + n0)``.
+
+``squared_contact`` belongs to laws on curves in no vertical plane in which N/m is the root of a polynomial in V**2, and
+which apart from friction are linear in V**2.
 
 Only modules of space curves have ``path_in_space``. If such a curve lies in no vertical plane, the contact force has a
 length and no sign: N is that length, kappa the length of the curvature vector, and n0 the value of N/m at rest. With
@@ -91,7 +96,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 13
+INTERFACE = 14
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -120,7 +125,7 @@ TURNING_POINT_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
 
 SPEED_EQUATION = types.void(COUNT, MANY, MANY, REAL, REAL, MANY, MANY)
 RIDER_LOADS = SPEED_EQUATION
-STATIC_BALANCE = types.void(COUNT, MANY, MANY, MANY)
+SQUARED_CONTACT = STATIC_BALANCE = types.void(COUNT, MANY, MANY, MANY)
 
 FIELD = types.void(COUNT, MANY, MANY, MANY, MANY)
 SEGMENT = types.void(COUNT, MANY, MANY, MANY)
@@ -211,6 +216,8 @@ class Dissipation(NamedTuple):
         Whether it has a kink where the curvature changes sign. A leg is then computed in parts.
     linear : bool
         Whether it is linear in V**2.
+    squared_contact : int
+        The memory cell with the address of this function; 0 if there is none.
     """
 
     speed_equation: int
@@ -218,6 +225,7 @@ class Dissipation(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+    squared_contact: int
 
 
 class DissipativeFunctions(NamedTuple):
@@ -228,11 +236,13 @@ class DissipativeFunctions(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+    squared_contact: Any = None
 
     def addresses(self) -> Dissipation:
         """Return the memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
-        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
+        squared_contact = self.squared_contact.address if self.squared_contact else 0
+        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear, squared_contact)
 
 
 class SeparatedTerms(NamedTuple):

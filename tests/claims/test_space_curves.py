@@ -168,6 +168,57 @@ def test_a_helix_with_friction() -> None:
     assert [leg.end for leg in motion.legs] == ["horizon"]
 
 
+@pytest.mark.parametrize("mu", ["0.2", "0"])
+def test_sweeps_of_a_helix_in_pieces(mu: str, build: Build) -> None:
+    """Along a rail of many pieces of a helix, with friction or with drag alone, sweeps agree with the closed forms."""
+    curvature, pieces = "cos(1/2)**2/2", 40
+    piece = gqm.transition(length="3/10", yaw=curvature, roll="cos(1/2)*sin(1/2)/2")
+    rail = gqm.Curve.piecewise([piece] * pieces, start=("0", "0", "0"), heading=("0", "-1/2"))
+    force = gqm.Gravity() + (gqm.CoulombFriction() if mu != "0" else gqm.QuadraticDrag(b="1/10"))
+    module = build(f"helix_in_pieces_{mu[-1]}", rail, force)
+    given = {"mu": float(mu)} if mu != "0" else {}
+    cosine, kappa = np.cos(0.5), np.cos(0.5) ** 2 / 2
+    with mp.workdps(30):
+        for w in ("1", "20", "40"):
+            if mu != "0":
+                way, time = helix_truth(w)
+            else:
+                limit = mpf("98.1") * mp.sin(mpf("0.5"))
+                way, time = -5 * mp.log(1 - mpf(w) / limit), 10 * mp.atanh(mp.sqrt(mpf(w) / limit)) / mp.sqrt(limit)
+            found = {
+                quantity: float(module.sweep(quantity, 0.0, 0.0, **asked, **given).values)
+                for quantity, asked in (
+                    ("time_at", {"lam": float(way)}),
+                    ("v_max", {"t_max": float(time)}),
+                    ("normal_force_max", {"t_max": float(time)}),
+                    ("normal_force_min", {"t_max": float(time)}),
+                )
+            }
+            assert found["time_at"] == pytest.approx(float(time), rel=2e-15)
+            assert found["v_max"] == pytest.approx(np.sqrt(float(w)), rel=4e-15)
+            assert found["normal_force_max"] == pytest.approx(np.hypot(9.81 * cosine, kappa * float(w)), rel=4e-15)
+            assert found["normal_force_min"] == pytest.approx(9.81 * cosine, rel=4e-15)
+
+
+@pytest.mark.parametrize("force", [gqm.CoulombFriction(), gqm.QuadraticDrag(b="1/20")])
+def test_a_length_that_almost_vanishes_is_not_negative(force: gqm.Kernel, build: Build) -> None:
+    """On a vertical part of a rail N is zero, and its square has few digits beside that; further on a body begins with
+    the contact force of its weight.
+    """
+    bend = {"yaw": "1/10", "pitch": "pi/8"}
+    pieces = [gqm.transition(length="1"), gqm.transition(length="4", **bend), gqm.transition(length="1")]
+    rail = gqm.Curve.piecewise(pieces, start=("0", "0", "4"), heading=("0", "-pi/2"))
+    module = build(f"vertical_part_{force.drag != 0}", rail, gqm.Gravity() + force)
+    given = {} if force.drag else {"mu": 0.05}
+    launches = np.linspace(0.5, 1.5, 11)
+    swept = module.sweep("normal_force_min", launches, 0.0, t_max=1.0, **given).values
+    assert swept.min() >= 0.0
+    assert swept[:6] == pytest.approx(0.0, abs=1e-14)
+    # A load that grows along the way is the smallest at rest.
+    at_rest = [float(module.pass1(lam, lam0=lam, v0=0.0, **given).normal_force) for lam in launches[6:].tolist()]
+    assert swept[6:] == pytest.approx(at_rest, rel=1e-14)
+
+
 def test_a_helix_too_rough_holds_the_body() -> None:
     """Uphill the body stops where friction and gravity have used up its energy, and with tan(slope) < mu it stays
     there.

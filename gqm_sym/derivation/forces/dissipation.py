@@ -41,6 +41,9 @@ class Dissipation:
         The contact force per unit mass in terms of the pieces: its value at rest, and the factor of W. For a curve in
         no vertical plane it has no sign, and if the law is not linear in W the first is the whole force; on a banked
         curve both are components along the upward direction of riders.
+    squared_contact
+        On a curve in no vertical plane, for one body: the coefficients of 1, W and W² in (N/m)², and the factor of
+        -v |N|/m in dW/dλ, all in terms of the pieces. Apart from friction the law is linear in W. Empty for other laws.
     friction, kinked, linear
         Whether the law depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
@@ -51,6 +54,7 @@ class Dissipation:
     acceleration: sp.Expr
     holds: tuple[sp.Expr, sp.Expr]
     contact: tuple[sp.Expr, ...]
+    squared_contact: tuple[sp.Expr, ...]
     friction: bool
     kinked: bool
     linear: bool
@@ -105,7 +109,9 @@ def dissipation(
     if UPRIGHT[0] in pieces:
         contact = UPRIGHT
     slope = differentiate(other, W)
-    linear = W not in sp.expand(slope).free_symbols and not rubbing
+    linear = W not in sp.expand(slope).free_symbols
+    squared = _squared_contact(kernel) if linear and mean_car_load is None and TURNS[0] in pieces else ()
+    linear = linear and not rubbing
     if linear:
         slope = sp.expand(slope)
     constant_part = sp.expand(other - slope * W) if linear else other - slope * W
@@ -126,10 +132,21 @@ def dissipation(
             _static_balance(kernel, resistance, extra, load, -1),
         ),
         contact=contact,
+        squared_contact=squared,
         friction=bool(kernel.friction),
         kinked=bool(resistance.atoms(sp.Abs)),
         linear=linear,
     )
+
+
+def _squared_contact(kernel: Kernel) -> tuple[sp.Expr, ...]:
+    """Return the forms of `Dissipation.squared_contact`; nothing in a rotating frame, where N contains sqrt(W)."""
+    if kernel.spin:
+        return ()
+    at_rest = sp.Add(*(load**2 for load in LOADS))
+    mixed = sp.Add(*(2 * turn * load for turn, load in zip(TURNS, LOADS, strict=True))) / SIGMA
+    turning = sp.Add(*(turn**2 for turn in TURNS)) / SIGMA**2
+    return at_rest, mixed, turning, 2 * kernel.friction * SIGMA / kernel.inertia
 
 
 def _static_balance(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, load: sp.Expr, direction: int) -> sp.Expr:

@@ -68,6 +68,7 @@ call_integrand_invariants_batch = _caller("integrand_invariants_batch")
 call_agm_arguments_batch = _caller("agm_arguments_batch")
 call_turning_point_batch = _caller("turning_point_batch")
 
+call_squared_contact = _caller("squared_contact")
 call_static_balance = _caller("static_balance")
 call_segment = _caller("segment")
 call_field = _caller("field")

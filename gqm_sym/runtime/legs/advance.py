@@ -76,7 +76,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TURN,
 )
 from gqm_sym.runtime.legs.runs.follow import direction_from_rest, follow
-from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 
@@ -86,7 +86,7 @@ from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 # has left the range of doubles.
 END_REST, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW = range(10, 14)
 
-DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean), Dissipation)
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean, INTEGER), Dissipation)
 
 # The width of the first panel as a share of the first step of a search. The narrower it is, the more digits early times
 # have.
@@ -150,9 +150,10 @@ def room_kept(breaks: int) -> int:
 @Inner
 def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
     """Return the data kept of the gaps between breaks; empty if a leg cannot be followed by them, because its panels
-    are read or the law is not linear.
+    are read, or the law is neither linear nor friction of the contact force in space.
     """
-    return joints.gaps if reading.what != PANELS and dissipation.linear else joints.gaps[:0]
+    is_possible = dissipation.linear or dissipation.squared_contact != 0
+    return joints.gaps if reading.what != PANELS and is_possible else joints.gaps[:0]
 
 
 @Inner
@@ -212,7 +213,7 @@ def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-u
     Next to an equilibrium the body turns, or moves on, over a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
-    forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
+    forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v, 0)
     contact_sign = sign_of_load(forces, place, 0.0, point)
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):

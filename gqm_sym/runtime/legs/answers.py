@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.compiled.calls import call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
@@ -32,6 +33,7 @@ from gqm_sym.runtime.legs.body import (
     HORIZON,
     LAM0,
     LAPS,
+    LAST_AT,
     LEAST_SIZE,
     LEAST_SWING,
     MAY_REST,
@@ -77,7 +79,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_NARROW,
     END_TURN,
 )
-from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.route import Reading
 
 # The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
@@ -135,7 +137,8 @@ class Track(NamedTuple):
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
-        return dissipation.linear and self.breaks.size > 0 and self.chart.size > 0
+        is_possible = dissipation.linear or dissipation.squared_contact != 0
+        return is_possible and self.breaks.size > 0 and self.chart.size > 0
 
 
 class Findings(NamedTuple):
@@ -205,7 +208,11 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
     if question < LEAST_LOAD:
         return 0.0, FOUND
     point = point_buffer()
-    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1), body[LAM0], 0.0, 0, point)
+    if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
+        point[0] = body[LAM0]
+        call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
+        return sqrt(point[2]), FOUND
+    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1, 0), body[LAM0], 0.0, 0, point)
     return point[5], FOUND
 
 
@@ -233,7 +240,7 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
 def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
     """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
     point = point_buffer()
-    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1), body[PLACE], body[V2], 0, point)
+    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1, 0), body[PLACE], body[V2], 0, point)
     return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
 
 
@@ -243,8 +250,10 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     findings = Findings(inf, -inf)
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     function, sign = sought_extreme(question)
+    has_length = function == LENGTH and dissipation.squared_contact != 0
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, Reading(reads, function != SPEED, sign, findings.peak), record)
+        reading = Reading(reads, function != SPEED, has_length, sign, findings.peak)
+        what = advance(dissipation, p, joints, body, reading, record)
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
         if what in (END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_OUT_OF_DOMAIN, END_OVERFLOW):
             break
@@ -279,12 +288,12 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
     """
     for k in range(SIZE):
         before[k] = body[k]
-    what = advance(dissipation, p, joints, body, Reading(TIMES, False, 1.0, -inf), record)
+    what = advance(dissipation, p, joints, body, Reading(TIMES, False, False, 1.0, -inf), record)
     if what in (END_TURN, END_REST, END_LIMIT, END_RECORD_FULL):
         return what
     for k in range(SIZE):
         body[k] = before[k]
-    return advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), record)
+    return advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), record)
 
 
 @Inner
@@ -301,7 +310,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         if keeps:
             what = follow_leg(dissipation, p, joints, body, bodies[1 + count], record)
         else:
-            what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), record)
+            what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), record)
         if what == END_RECORD_FULL:
             break
         count += 1
@@ -310,6 +319,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         body[STATUS] = 1.0 if is_tiny(record, body[LEAST_SIZE]) else 0.0
         if what in (END_TURN, END_REST):
             pack(record)
+        body[LAST_AT] = used
         used += int(record[USED])
         if what != END_TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
@@ -362,7 +372,7 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         if question <= LEGS:
             what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else END_REST
         elif question == RUN_AGAIN:
-            what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[0])
+            what = advance(dissipation, p, joints, body, Reading(PANELS, False, False, 1.0, -inf), records[0])
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:

@@ -20,7 +20,6 @@ from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
     BEGIN_LOW,
-    CHANGE_COUNT,
     LAPS_BEFORE,
 )
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece, leg_record, tabulated
@@ -138,14 +137,15 @@ class DissipativeMotion(FollowedMotion):
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        shown = self._all_runs[: self._beginning or None]
-        if self._driver.track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in shown)):
+        if self._driver.track.corners.size or (cuts_at_changes and self._has_changes()):
             return super().legs
         return Rows(self._up_to_horizon(merged(self._runs_as_legs(), self._internal_ends)))
 
     def _place_on_last_leg(self, t: float) -> float:
-        run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
-        record = run.record if run.passed is None else run.passed
+        record = self._driver.runs.last_turned
+        if record is None or not record[BEGIN] <= t:
+            run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
+            record = run.record if run.passed is None else run.passed
         place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
         return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
 

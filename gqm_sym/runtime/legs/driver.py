@@ -29,6 +29,7 @@ from gqm_sym.runtime.legs.body import (
     HIGH,
     LAM0,
     LAPS,
+    LAST_AT,
     LEAST_SIZE,
     LEAST_SWING,
     LOW,
@@ -47,11 +48,11 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
-from gqm_sym.runtime.legs.endings import END_NAMES, cusp_ahead, end_name, failure, force_cancels
+from gqm_sym.runtime.legs.endings import cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
-from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START, USED
-from gqm_sym.runtime.legs.leg_segments import Run, panelled
+from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
+from gqm_sym.runtime.legs.leg_segments import Run, Runs, TurnedLegs, panelled
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
     END_LIMIT,
@@ -82,11 +83,6 @@ PASSED = END_TURN, END_REST, END_LIMIT
 SWINGS_AHEAD = 4.0
 
 
-def turned(record: Array, before: Array | None) -> Run:
-    """Return a run to a turn. Each launch has one, so this avoids the constructor of a named tuple, which is slow."""
-    return tuple.__new__(Run, (record, END_TURN, END_NAMES[END_TURN], None, before, None))
-
-
 class Driver:
     """A body that is driven by some more legs at each request.
 
@@ -102,8 +98,8 @@ class Driver:
     Attributes
     ----------
     problem : Problem
-    runs : list of Run
-        The runs so far that have not been removed from this list.
+    runs : Runs
+        The runs so far that have not been removed from it.
     body : array
         The lines of the body (`legs.body`); the first one is its present state.
     ending : str
@@ -131,7 +127,7 @@ class Driver:
     def __init__(self, problem: Problem, horizon: float, first: FirstLeg) -> None:
         self.problem, self._horizon, self.body = problem, horizon, first.body
         self._conditions = conditions_of(problem)
-        self.runs: list[Run] = []
+        self.runs = Runs()
         self._store(*self._completed(first.what, first.records))
 
     @property
@@ -188,18 +184,16 @@ class Driver:
         number = self.body.item
         if what != END_TURN and not number(DIRECTION) and not number(TURNS):
             return  # the body stays where it is
-        count, at = int(number(VALUE)), 0
+        count, at = int(number(VALUE)), int(number(LAST_AT))
         line = records.reshape(-1)[: int(number(TOTAL))].copy()  # most legs take a small part of the space
-        before = self.body[1 : 1 + count].copy() if self._conditions.passes and self._frame is None else [None] * count
-        for k in range(count - 1):
-            end = at + int(line.item(at + USED))
-            self.runs.append(turned(line[at:end], before[k]))
-            at = end
+        before = self.body[1 : 1 + count].copy() if self._conditions.passes and self._frame is None else None
         self._last_record = last = line[at:]
         if what == END_TURN and self._frame is None and not number(STATUS):
-            self.runs.append(turned(last, before[-1]))
-        else:
-            self._end_run(what, last, before[-1])
+            self.runs.append(TurnedLegs(line, count, at, before))
+            return
+        if count > 1:
+            self.runs.append(TurnedLegs(line, count - 1, -1, before))
+        self._end_run(what, last, None if before is None else before[-1])
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""

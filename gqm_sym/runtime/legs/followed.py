@@ -16,7 +16,7 @@ from gqm_sym.runtime.legs.conditions import follow_first_leg
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
-from gqm_sym.runtime.legs.leg_record import BEGIN, HEADING
+from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import END_TURN
 from gqm_sym.runtime.motion.events import Leg, passages
@@ -37,7 +37,7 @@ class FollowedMotion(Motion):
         if first.what == END_TURN and not first.body.item(STATUS):
             heading = first.records.item(HEADING)
         else:  # the leg is stored at once, so that an impossible launch is refused
-            runs = self._driver.runs
+            runs = self._driver.runs.all()
             heading = runs[0].record[HEADING] if runs else 0
         if problem.w0 == 0.0:
             self.direction = int(heading)
@@ -125,28 +125,30 @@ class FollowedMotion(Motion):
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
         self._follow_again()
-        for run in self._driver.runs:
+        for run in self._driver.runs.all():
             self._layout.lay(run)
-        self._driver.runs.clear()
+        self._driver.runs.replace([])
         return self._layout.segments
 
     @property
     def _all_runs(self) -> list[Run]:
         """The runs so far."""
-        return [*self._layout.runs, *self._driver.runs]
+        return [*self._layout.runs, *self._driver.runs.all()]
 
     def _runs_as_legs(self) -> list[Leg]:
         """Return the runs of `legs`, which are not cut at changes of the contact sign and at corners."""
-        everything, lap = self._all_runs, self.problem.period
-        shown, legs, stop = everything[: self._beginning or None], [], self._driver.elapsed
-        if len(shown) < len(everything):
-            stop = everything[len(shown)].record.item(BEGIN)
-        for run in reversed(shown):
-            leg = run.leg(lap, stop)
-            legs.append(leg)
-            stop = leg.t_start
-        legs.reverse()
-        return legs
+        found, stop, lap = [], self._driver.elapsed, self.problem.period
+        for part in reversed([*self._layout.runs, *self._driver.runs.parts]):
+            legs = part.legs(lap, stop)
+            found.append(legs)
+            stop = legs[0].t_start
+        shown = [leg for legs in reversed(found) for leg in legs]
+        return shown[: self._beginning or None]
+
+    def _has_changes(self) -> bool:
+        """Return whether N changes its sign on a run of `legs`."""
+        parts = [*self._layout.runs, *self._driver.runs.parts]
+        return any([count for part in parts for count in part.change_counts][: self._beginning or None])
 
     def _known_end(self) -> float:
         """Return the time at which the motion ends, as far as is known; infinite if it is not."""
@@ -160,7 +162,7 @@ class FollowedMotion(Motion):
         """
         driver = self._driver
         if not self._known_beginning and self._horizon == inf and not driver.ending and driver.is_endless:
-            self._known_beginning = len(self._all_runs)
+            self._known_beginning = len(self._layout.runs) + len(driver.runs)
         return self._known_beginning
 
     def _follow_next(self) -> None:
@@ -191,12 +193,12 @@ class FollowedMotion(Motion):
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""
         runs: list[Run] = []
-        for run in self._driver.runs:
+        for run in self._driver.runs.all():
             parts = self._driver.with_panels(run)
             if len(self._layout.runs) + len(runs) < self._beginning:
                 self._known_beginning += len(parts) - 1
             runs += parts
-        self._driver.runs = runs
+        self._driver.runs.replace(runs)
 
     def _is_ahead(self, places: Array) -> bool:
         """Return whether one of the places lies ahead of the part that has been computed."""

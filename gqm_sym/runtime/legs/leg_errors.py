@@ -63,15 +63,14 @@ from gqm_sym.runtime.legs.panels.equation import (
     Panel,
     Q,
     W,
-    begin_panel,
     fill_rates,
     panel_buffer,
     set_nodes,
     slope_at,
-    solve_panel,
 )
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
+from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
 
 # Roundings of V**2, of a place and of a time, in units in the last place. Laws that are not linear in V**2 take many
 # panels to a turn, each of which rounds V**2.
@@ -288,7 +287,15 @@ def carry(dissipation, p, turns, before, share, terms, charts, record):  # type:
     """
     p, record, forward = borrowed(p), borrowed(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
-    forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
+    forces = Forces(
+        dissipation.speed_equation,
+        p,
+        dissipation.friction,
+        dissipation.kinked,
+        dissipation.linear,
+        v,
+        dissipation.squared_contact,
+    )
     errors, sizes = (before.place, before.v2, share), (terms, borrowed(charts))
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, sizes, record)
     rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))

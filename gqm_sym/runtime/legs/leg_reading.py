@@ -80,6 +80,10 @@ SPEED, LOAD, LENGTH = range(3)
 # The largest share of the last two coefficients of a function that a panel resolves.
 MAX_TAIL = 1e-13
 
+# The smallest square of a length as a share of the largest on the panel that has enough digits; and a length as a share
+# of the largest that cannot be told from zero.
+LEAST_SQUARE, ROUNDING = 1e-3, 4e-16
+
 # An extreme is located to this share of a panel, which suffices because the function is flat there.
 FLAT_PART = 1e-9
 
@@ -251,7 +255,8 @@ def peak_of_values(blocks, values, first, last, sign, best):  # type: ignore[no-
 
 @Inner
 def peak_of_function(blocks, values, part, asked, best):  # type: ignore[no-untyped-def]
-    """Return `peak_of_values` for a function on a part of a panel; NaN for a length whose square is not resolved.
+    """Return `peak_of_values` for a function on a part of a panel; NaN for a length whose square is not resolved, or so
+    small that it has too few digits.
 
     The square of a length is smooth also where the length almost vanishes. The panels of a leg resolve its law, of
     which the contact force is a small part if friction is small.
@@ -267,6 +272,8 @@ def peak_of_function(blocks, values, part, asked, best):  # type: ignore[no-unty
     if not fabs(values[2 * wide - 2]) + fabs(values[2 * wide - 3]) <= MAX_TAIL * largest:
         return nan
     square = peak_of_values(blocks, values, first, last, sign, best * fabs(best))
+    if sign < 0.0 and square > best * fabs(best) and -square < LEAST_SQUARE * largest:
+        return best if -best <= ROUNDING * sqrt(largest) else nan
     return sqrt(square) if square >= 0.0 else -sqrt(-square)
 
 

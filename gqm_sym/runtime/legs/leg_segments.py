@@ -8,7 +8,8 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.compiled.registers import borrowed
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE
 from gqm_sym.runtime.legs.frames.local_frame import Frame
@@ -32,11 +33,12 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_ERROR,
     TIME_FROM_END,
     TIME_FROM_START,
+    USED,
     WHOLE,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
-from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_PAUSE
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE, END_PAUSE, END_TURN
 from gqm_sym.runtime.legs.runs.whole_panels import lay_panels
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segments.segment import Segment
@@ -47,6 +49,9 @@ from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 # The largest phase angle on a leg that tends to an equilibrium. The distance from there is then exp(-MAX_PHASE_ANGLE)
 # times the length of the leg, the smallest that doubles can represent.
 MAX_PHASE_ANGLE = 690.0
+
+# The name of the end of a leg that ends at a turn.
+TURN = "turn"
 
 
 @entry(
@@ -170,13 +175,18 @@ class Run(NamedTuple):
         """``c/2`` of the march variable; infinite if that is the distance."""
         return float(self.record[HALF_C])
 
-    def leg(self, lap: float, t_end: float) -> Leg:
-        """Return the leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
-        head = self.record[: END + 1].tolist()  # more numbers would take longer than the rest
+    def legs(self, lap: float, t_end: float) -> list[Leg]:
+        """Return the run as one leg, which ends at a time in s; the curve's period is ``lap``, or 0."""
+        head = self.record[: END + 1].tolist()
         start, before = head[START], head[LAPS_BEFORE] * lap
         end = start if self.what == END_LIFTOFF_AT_ONCE else head[END]
         t_end = inf if self.what == END_ASYMPTOTE else t_end
-        return Leg(start + before, end + before, head[BEGIN], t_end, int(head[HEADING]), self.end)
+        return [Leg(start + before, end + before, head[BEGIN], t_end, int(head[HEADING]), self.end)]
+
+    @property
+    def change_counts(self) -> list[float]:
+        """How often N changes its sign, as an item of a list."""
+        return [self.record.item(CHANGE_COUNT)]
 
     @property
     def changes(self) -> list[float]:
@@ -201,6 +211,117 @@ class Run(NamedTuple):
 
     def _rows(self, begin: int, count: int, columns: int) -> Array:
         return self.record[begin : begin + count * columns].reshape(count, columns)
+
+
+@entry(MATRIX(VECTOR, INTEGER, REAL, REAL), checked=False)
+def rows_of_turned(line, count, lap, stop):  # type: ignore[no-untyped-def]
+    """Return, for each of some legs that end at turns, both ends, the times there, the direction, and how often
+    N changes its sign.
+
+    Parameters
+    ----------
+    line : array
+        The records of the legs, one directly behind the other.
+    count : int
+        The number of legs.
+    lap : float
+        The curve's period, or 0.
+    stop : float
+        The time at which the last leg ends.
+    """
+    line, rows, at = borrowed(line), np.empty((count, 6)), 0
+    for k in range(count):
+        record = line[at:]
+        before = record[LAPS_BEFORE] * lap
+        rows[k, 0], rows[k, 1], rows[k, 2] = record[START] + before, record[END] + before, record[BEGIN]
+        rows[k, 3], rows[k, 4], rows[k, 5] = stop, record[HEADING], record[CHANGE_COUNT]
+        if k > 0:
+            rows[k - 1, 3] = record[BEGIN]
+        at += int(record[USED])
+    return rows
+
+
+class TurnedLegs(NamedTuple):
+    """Legs that one call of compiled code has followed, each of which ends at a turn.
+
+    Attributes
+    ----------
+    line : array
+        Their records, one directly behind the other (`leg_record`).
+    size : int
+        The number of legs.
+    last_at : int
+        Where the record of the last one begins; -1 if other runs follow.
+    before : array or None
+        The line of the body before each leg, as in `Run`.
+    """
+
+    line: Array
+    size: int
+    last_at: int
+    before: Array | None
+
+    def runs(self) -> list[Run]:
+        """Return a run for each leg."""
+        runs, at = [], 0
+        for k in range(self.size):
+            end = at + int(self.line[at + USED])
+            before = None if self.before is None else self.before[k]
+            runs.append(Run(self.line[at:end], END_TURN, TURN, None, before))
+            at = end
+        return runs
+
+    def legs(self, lap: float, t_end: float) -> list[Leg]:
+        """Return the legs, the last of which ends at a time in s; the curve's period is ``lap``, or 0."""
+        rows = rows_of_turned(self.line, self.size, lap, t_end).tolist()
+        return [Leg(start, end, since, until, int(v), TURN) for start, end, since, until, v, _ in rows]
+
+    @property
+    def change_counts(self) -> list[float]:
+        """How often N changes its sign on each leg."""
+        counts: list[float] = rows_of_turned(self.line, self.size, 0.0, 0.0)[:, 5].tolist()
+        return counts
+
+
+class Runs:
+    """The runs of a body that have no segments yet, in the order of time.
+
+    Legs that end at turns stay as compiled code has left them until they are needed one by one, because of most motions
+    only the legs or the end are asked for.
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[Run | TurnedLegs] = []
+
+    def append(self, part: Run | TurnedLegs) -> None:
+        """Append a run, or legs."""
+        self._parts.append(part)
+
+    def replace(self, runs: list[Run]) -> None:
+        """Replace all runs by others."""
+        self._parts = list(runs)
+
+    def __len__(self) -> int:
+        return sum(part.size if isinstance(part, TurnedLegs) else 1 for part in self._parts)
+
+    def all(self) -> list[Run]:
+        """Return all runs."""
+        runs: list[Run] = []
+        for part in self._parts:
+            runs += part.runs() if isinstance(part, TurnedLegs) else [part]
+        self.replace(runs)
+        return runs
+
+    @property
+    def parts(self) -> list[Run | TurnedLegs]:
+        """The runs, and legs that are not runs yet."""
+        return self._parts
+
+    @property
+    def last_turned(self) -> Array | None:
+        """The record of the last run, if it is among the legs that stay as compiled code has left them."""
+        last = self._parts[-1] if self._parts else None
+        return last.line[last.last_at :] if isinstance(last, TurnedLegs) and last.last_at >= 0 else None
 
 
 def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float, panels: Array) -> Segment:

@@ -70,8 +70,8 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
         return None
     question = QUESTIONS[quantity]
     if quantity.startswith("normal_force") and not formulas.signed:
-        # The rows of a leg hold the length of the contact force only if its law depends on it.
-        if loss.linear or formulas.sided or formulas.directed:
+        # The rows of a leg hold the length of the contact force, or the module has its square.
+        if loss.squared_contact is None and (loss.linear or formulas.sided or formulas.directed):
             return None
         question = legs.LEAST_LENGTH if question == legs.LEAST_LOAD else legs.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value

@@ -207,7 +207,7 @@ def frame_near(
         _begin(rows, own, k)
         row[TERMS:] = _divided(fit.powers[k], (row[ORIGIN] - row[CENTRE]) / half) / half
     speed_equation, static_balance = frame_functions()
-    functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear)
+    functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear, 0)
     head = [float(dissipation.speed_equation), middle, low, size, float(len(rows))]
     frame = Frame(functions, np.array([*head, *rows.ravel(), *p]), 0.0)
     if not frame.slope:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.calls import call_speed_equation, call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import copied, fused, on_stack, over_rows
 from gqm_sym.runtime.compiled.types import Array
@@ -33,8 +33,8 @@ MAX_Q = 2.0
 MAX_SERIES_Q = 0.25
 EXPM1_TERMS = tuple(1.0 / factorial(k) for k in range(13, 1, -1))
 
-# The largest number of iterations for forces that are not linear in V**2.
-MAX_ITERATIONS = 40
+# A number that keeps the length of a force that vanishes from being zero.
+LEAST_SQUARE = 1e-300
 
 # A distance larger than all others; an infinite one would make results NaN.
 FARTHEST = 1e300
@@ -66,12 +66,19 @@ FARTHEST = 1e300
 # SIZES        for each of the rows before P the size that its coefficients are compared with
 # TAILS        last and middle coefficients of the row examined last, and its mean
 # NODES        the nodes as shares of a panel
+# AT_REST to   the rows of `squared_contact`: the coefficients of (N/m)**2, and v times the factor of friction
+# RUBBING
 # ============ ====================================================================================================
 #
 # The resolution of the rows before P can be tested.
 TIME_RATE, LOAD, W_FACTOR, FORCE, Q_RATE, DS, P, Q, N0, KAPPA = range(0, 10 * WIDE, WIDE)
 W, D, EXPM1_Q, MEAN, GRADED, SPEED, ARC_RATE, OFFSET, SERIES, SIZES, TAILS, NODES = range(10 * WIDE, 22 * WIDE, WIDE)
-panel_buffer = on_stack(22 * WIDE)
+AT_REST, MIXED, TURNING, RUBBING = range(22 * WIDE, 26 * WIDE, WIDE)
+
+# Rows for a law with friction in space (`solving`): P and Q without friction; N/m, and its derivative with respect to
+# V**2.
+PLAIN_P, PLAIN_Q, LENGTH, LENGTH_SLOPE = range(26 * WIDE, 30 * WIDE, WIDE)
+panel_buffer = on_stack(30 * WIDE)
 
 # Formulas for one row from others. Here y is the march variable from the panel's start, where the distance grows at the
 # rate ``slope``, and u is the direction in which the panel is run.
@@ -84,11 +91,13 @@ force_row = over_rows(lambda p, expm1, u: u * p * (1.0 + expm1), WIDE)
 solution_row = over_rows(lambda gained, expm1, v2: v2 + (gained - v2 * expm1) / (1.0 + expm1), WIDE)
 graded_integral_row = over_rows(lambda y, mean, graded, slope: y * (slope * mean + y * graded), WIDE)
 damped_row = over_rows(lambda mean, expm1: mean / (1.0 + expm1), WIDE)
+difference_row = over_rows(lambda one, other: one - other, WIDE)
 factor_row = over_rows(lambda w, y, shift: w / ((y + shift) * (y + shift)), WIDE)
 load_row = over_rows(lambda ds, n0, kappa, w: ds * (n0 + kappa * w), WIDE)
 load_per_mass_row = over_rows(lambda n0, kappa, w: n0 + kappa * w, WIDE)
 load_size_row = over_rows(lambda ds, n0, kappa, w: abs(ds) * (abs(n0) + abs(kappa * w)), WIDE)
 root_row = over_rows(np.sqrt, WIDE)
+length_row = over_rows(lambda a, b, c, w: np.sqrt(a + w * (b + w * c) + LEAST_SQUARE), WIDE)
 time_rate_row = over_rows(lambda ds, speed, factor: factor * ds / speed, WIDE)
 arc_rate_row = over_rows(lambda ds, y, slope, g: ds * (slope + 2.0 * g * y), WIDE)
 
@@ -116,6 +125,8 @@ class Forces(NamedTuple):
         As in `interface.Dissipation`.
     direction : int
         The sign of dlam/dt.
+    squared_contact : int
+        As in `interface.Dissipation`; it may be 0 for single places.
     """
 
     speed_equation: int
@@ -124,6 +135,7 @@ class Forces(NamedTuple):
     kinked: bool
     linear: bool
     direction: int
+    squared_contact: int
 
 
 class March(NamedTuple):
@@ -205,18 +217,20 @@ def set_nodes(work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def begin_panel(forces, march, panel, width, work):  # type: ignore[no-untyped-def]
-    """Lay the nodes of a panel; if the forces are linear in V**2, also fill the rows that `sample` fills."""
+def lay_places(march, panel, row, work):  # type: ignore[no-untyped-def]
+    """Fill a row with the places on the curve for the distances in the row D."""
     origin, u = march.origin, march.direction
-    product(work, OFFSET, NODES, width)
-    distance_row(work, D, OFFSET, slope_at(panel.left, march), march.g)
-    linear_row(work, ARC_RATE, D, origin[0] + (u * distance(panel.left, march) + origin[1]), float(u))
+    linear_row(work, row, D, origin[0] + (u * distance(panel.left, march) + origin[1]), float(u))
     if panel.span[0] > -inf or panel.span[1] < inf:
         for j in range(WIDE):
-            work[ARC_RATE + j] = within(work[ARC_RATE + j], panel.span)
-    copy_row(work, W, panel.v2)
-    if forces.linear:
-        sample(forces, march, panel, work)
+            work[row + j] = within(work[row + j], panel.span)
+
+
+@Inner
+def fill_square(forces, row, work):  # type: ignore[no-untyped-def]
+    """Fill the rows AT_REST to RUBBING at the places in a row."""
+    places, out = work[row : row + WIDE], work[AT_REST : AT_REST + 4 * WIDE]
+    call_squared_contact(forces.squared_contact, WIDE, places, forces.params, out)
 
 
 @Inner
@@ -261,52 +275,13 @@ def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Do the work of `integrate` for forces that are not linear in V**2, by Newton's method; return inf if it does not
-    converge.
-    """
-    v, nu = float(forces.direction), float(panel.contact_sign)
-    work[W] = max(panel.v2, 1e-300)  # laws may contain its square root
-    call_speed_equation(forces.speed_equation, 1, work, (ARC_RATE, W, MEAN), v, nu, forces.params)
-    # The first approximation is linear, with the slope of V**2 at the panel's start.
-    slope = max(march.direction * (work[MEAN + 1] - work[MEAN + 2] * work[W]), 0.0)
-    linear_row(work, W, D, panel.v2, slope)
-    last_change = inf
-    for _ in range(MAX_ITERATIONS):
-        sample(forces, march, panel, work)
-        total = integrate(march, panel, SPEED, work)
-        if not total < inf:
-            return inf
-        change, size = 0.0, 0.0
-        for j in range(WIDE):
-            change, size = max(change, fabs(work[SPEED + j] - work[W + j])), max(size, fabs(work[SPEED + j]))
-        copy_row(work, W, SPEED)
-        if not change < inf:
-            return inf
-        # Each iteration squares the error, until changes are rounding only.
-        if change <= 4e-16 * size or (change <= 1e-13 * size and change >= 0.5 * last_change):
-            return total
-        last_change = change
-    return inf
-
-
-@Inner
-def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Compute W on a panel prepared by `begin_panel`, and all rows that do not need W > 0.
-
-    Return q over the panel, or inf if the panel is too wide to be solved.
-    """
-    total = integrate(march, panel, W, work) if forces.linear else solve_nonlinear(forces, march, panel, work)
-    if not total < inf:
-        return inf
-    if panel.v2 == 0.0:
-        damped_row(work, W_FACTOR, GRADED if march.g > 0.0 else MEAN, EXPM1_Q)
-    elif march.g > 0.0 and panel.left == 0.0:
-        factor_row(work, W_FACTOR, W, OFFSET, 0.5 * march.c)
-    else:
-        copy_row(work, W_FACTOR, W)
-    load_row(work, LOAD, DS, N0, KAPPA, W)
-    return total
+def fill_length(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Replace the rows N0 and KAPPA of a computed panel by the length of the contact force per mass, and 0."""
+    if forces.linear:
+        lay_places(march, panel, SERIES, work)
+        fill_square(forces, SERIES, work)
+    length_row(work, N0, AT_REST, MIXED, TURNING, W)
+    copy_row(work, KAPPA, 0.0)
 
 
 @Inner

@@ -9,6 +9,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     DS,
     KAPPA,
     LOAD,
+    MEAN,
     N0,
     Q_RATE,
     TAILS,
@@ -17,17 +18,18 @@ from gqm_sym.runtime.legs.panels.equation import (
     P,
     W,
     as_factor,
-    begin_panel,
     distance,
+    fill_length,
     fill_rates,
     load_row,
+    product,
     slope_at,
-    solve_panel,
 )
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
     are_resolved,
+    examine,
     growth,
     growth_towards,
     is_curve_resolved,
@@ -37,6 +39,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     set_sizes,
     size_at,
 )
+from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
 
 # A width of a few units in the last place of the curve's parameter.
 MIN_RELATIVE_WIDTH = 1e-15
@@ -44,6 +47,9 @@ MIN_RELATIVE_WIDTH = 1e-15
 # If the ratio of the time rate's coefficients to those of all other functions is above this, a turning point is taken
 # to lie ahead.
 TURNING_RATIO = 10.0
+
+# The largest share of the last coefficients of the square of the contact force, if its extremes are read.
+LENGTH_TAIL = 2e-14
 
 # The ratio of V**2 at a panel's end to the largest V**2 so far above which time is resolved. Below it a turn is
 # expected, and time is counted from there.
@@ -87,6 +93,8 @@ class PanelRequest(NamedTuple):
         largest at both ends.
     resolve_load : bool
         Whether N must be resolved as far as its changes of sign require.
+    resolve_length : bool
+        Whether the square of the length of the contact force must be resolved, as its extremes require.
     """
 
     max_width: float
@@ -94,6 +102,7 @@ class PanelRequest(NamedTuple):
     largest_v2: float
     timing: int
     resolve_load: bool
+    resolve_length: bool
 
 
 @Inner
@@ -179,6 +188,24 @@ def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore[no-untyped-def]
+    """Return whether the rows from W_FACTOR to ``last`` are resolved, and the contact force as far as that is required;
+    and the largest ratio of their middle coefficients to their sizes.
+    """
+    fine, worst = are_resolved(work, W_FACTOR, last)
+    if request.resolve_load:
+        load_fine, ratio = is_load_resolved(work)
+        fine, worst = fine and load_fine, max(worst, ratio)
+    if request.resolve_length:
+        fill_length(forces, march, panel, work)
+        product(work, MEAN, N0, N0)
+        size = size_of(work, MEAN)
+        tail, middle, _ = examine(work, MEAN, size)
+        fine, worst = fine and tail <= LENGTH_TAIL * size, max(worst, middle / size)
+    return fine, worst
+
+
+@Inner
 def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
     """Find the widest panel from a given start that can be resolved.
 
@@ -226,11 +253,8 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
             width, ends_at_kink = 0.5 * width, False
             continue
         largest_v2 = set_sizes(panel.v2, as_factor(panel.v2, march, panel.left), work)
-        fine, worst = are_resolved(work, W_FACTOR, last)
+        fine, worst = are_all_resolved(forces, march, panel, request, last, work)
         worst = max(worst, ratio)
-        if request.resolve_load:
-            load_fine, ratio = is_load_resolved(work)
-            fine, worst = fine and load_fine, max(worst, ratio)
         factor = growth(worst)
         if fine and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)

@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     W,
     copy_row,
     damped_row,
+    difference_row,
 )
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of_block
@@ -35,7 +36,6 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
     blocks_for,
-    difference_row,
     extent_of_row,
     fill_load,
     fill_times,

@@ -17,15 +17,14 @@ from gqm_sym.runtime.legs.panels.equation import (
     Q,
     W,
     as_factor,
-    begin_panel,
     distance,
     fill_rates,
     marched,
-    solve_panel,
 )
 from gqm_sym.runtime.legs.panels.point import slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, size_of, to_coefficients
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE, first_change_of, size_at
+from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
 from gqm_sym.runtime.legs.panels.widest import MIN_RELATIVE_WIDTH
 
 

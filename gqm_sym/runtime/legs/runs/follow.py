@@ -44,6 +44,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     March,
     Panel,
     W,
+    fill_length,
     panel_buffer,
     set_nodes,
 )
@@ -98,10 +99,10 @@ def next_stop(march, passed, length_back, record, breaks, remaining):  # type: i
 
 
 @Inner
-def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
+def run_back(forces, end, breaks, off, reading, record, used):  # type: ignore[no-untyped-def]
     """Store the panels of a leg that turns, followed back from the turn to the middle of its run.
 
-    Parameters and Returns are those of `approach`, with panels for rows.
+    Parameters and Returns are those of `approach`, with panels for rows, and what is read of them.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -118,12 +119,14 @@ def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
         if not has_space(record, at, end.change_count):
             return NO_SPACE
         panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, v, off))
-        request = PanelRequest(max_width, step, 0.0, ALWAYS, False)
+        request = PanelRequest(max_width, step, 0.0, ALWAYS, False, reading.length)
         width, step, _timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
             break
         right = left + width
         passed, left = (stop, sqrt(stop)) if width == max_width else (right * right, right)
+        if reading.length:
+            fill_length(forces, march, panel, work)
         add_panel(record, at, left, width, work)
         count, v2 = count + 1, work[W + COUNT]
         if passed >= length:
@@ -161,7 +164,7 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
         if stop <= left:
             break
         panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, forces.direction, off))
-        request = PanelRequest(stop - left, step, 0.0, NEVER, False)
+        request = PanelRequest(stop - left, step, 0.0, NEVER, False, False)
         width, step, _timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
             break
@@ -285,7 +288,8 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     """
     breaks = route.breaks
     forces = Forces(
-        dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
+        *(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear),
+        *(start.direction, dissipation.squared_contact),
     )
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     record[WHOLE] = 0.0
@@ -297,7 +301,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     direction, could_stay = start.direction, True
     if what == END_TURN:
         if not is_whole:
-            back = run_back(forces, end, breaks, off, record, used)
+            back = run_back(forces, end, breaks, off, route.reading, record, used)
             record[TIME_FROM_END] = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
         direction, could_stay = direction_from_rest(dissipation.static_balance, p, here, here, direction)

@@ -6,17 +6,18 @@ With the middle M of G's range in ``u = w + M``, and the rest of it in ``H = G -
 integral of ``ds sqrt(1 + E)/sqrt(u + H)``. As a series it is a sum of powers of 1/u, each with the integral of ``ds
 sqrt(1 + E) H**k``, which is kept. The series is used if H is small compared with u; nearer to a turn V**2 and the rate
 of time are found at nodes from the rows that are kept.
+
+Along curves in space the rows also give the square of N/m as a polynomial in V**2 (`interface`). If the law contains
+its root because of friction, it is the kept rows of the rest of the law, and friction, from which V**2 follows by
+Newton's method, without another look at the curve.
 """
 
 from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
@@ -35,42 +36,55 @@ from gqm_sym.runtime.legs.panels.breaks import clearance, offset
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
-    FORCE,
     KAPPA,
     LOAD,
     MEAN,
     N0,
-    OFFSET,
-    Q_RATE,
-    SERIES,
     SPEED,
     TAILS,
     TIME_RATE,
     March,
     Panel,
     W,
-    begin_panel,
     copy,
-    fill_force,
     load_per_mass_row,
     load_row,
     load_size_row,
     marched,
-    product,
     root_row,
     solution_row,
     time_rate_row,
 )
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, LEBESGUE, WIDE, extent, size_of, to_means, to_tails
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
     FAR_FROM_ZERO_RATIO,
-    ONE_SIGN_RATIO,
-    are_resolved,
     examine,
-    is_curve_resolved,
     keeps_sign,
-    kink,
-    size_at,
+)
+from gqm_sym.runtime.legs.runs.gap_data import (
+    END_EXPM1,
+    END_GAINED,
+    FACTORS,
+    FILLED,
+    FIRST_ROW,
+    GAP_COLUMNS,
+    GAP_ROWS,
+    LARGEST_REST,
+    LEAST_DAMPING,
+    LEAST_KAPPA,
+    LEAST_N0,
+    MAX_SHARE,
+    MIDDLE_GAINED,
+    MOST_DAMPING,
+    MOST_KAPPA,
+    MOST_N0,
+    POWERS,
+    Bounds,
+    fill_gap,
+    fill_length_on_gap,
+    lengths_on,
+    range_of,
+    solve_on_gap,
 )
 from gqm_sym.runtime.legs.runs.route import CurveAhead
 
@@ -78,79 +92,8 @@ from gqm_sym.runtime.legs.runs.route import CurveAhead
 # largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
 GAP_V2_RATIO = 2.0**-6
 
-# The largest share of u that H may be, and the number of powers that are summed then.
-MAX_SHARE, POWERS = 0.1, 16
-
-# The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
-# largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature; the factors of the powers; and
-# rows from which V**2, N and time follow.
-STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
-LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
-FACTORS = 16
-FIRST_ROW = FACTORS + POWERS
-GAP_ROWS = (EXPM1_Q, SPEED, DS, N0, KAPPA)
-GAP_COLUMNS = FIRST_ROW + len(GAP_ROWS) * WIDE
-FILLED, REFUSED = 1.0, 2.0
-
 # N on a gap is far from zero if it is more than this share of the largest values of its parts.
 FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
-
-undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
-share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
-
-
-@Inner
-def range_of(work, row):  # type: ignore[no-untyped-def]
-    """Return bounds of the polynomial through a row of values."""
-    low, high = extent(work, row)
-    beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
-    return low - beyond, high + beyond
-
-
-@Inner
-def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Fill the data kept of a gap, the panel from one break to the next, from ``gaps[at]`` on."""
-    gaps[at] = REFUSED
-    begin_panel(forces, march, panel, width, work)
-    if not fill_force(march, work) < inf:
-        return
-    to_means(work, FORCE, work, MEAN)
-    product(work, SPEED, OFFSET, MEAN)
-    work[size_at(FORCE)] = size_of(work, FORCE)
-    if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
-        return
-    if forces.kinked and not kink(work) > 1.0:
-        return
-    for row in (N0, KAPPA):
-        if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):
-            return
-    for k, row in enumerate(GAP_ROWS):
-        copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
-    (least, most), (low, high) = extent(work, EXPM1_Q), extent(work, SPEED)
-    middle, largest = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
-    gaps[at + END_EXPM1], gaps[at + END_GAINED] = work[EXPM1_Q + COUNT], work[SPEED + COUNT]
-    gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
-    gaps[at + LEAST_DAMPING], gaps[at + MOST_DAMPING] = 1.0 / (1.0 + most), 1.0 / (1.0 + least)
-    gaps[at + LEAST_N0], gaps[at + MOST_N0] = range_of(work, N0)
-    gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = range_of(work, KAPPA)
-    undamped_row(work, SERIES, DS, EXPM1_Q, width)
-    share_row(work, MEAN, SPEED, middle, largest)
-    binomial = 1.0
-    for k in range(POWERS):
-        to_tails(work, SERIES, work, TAILS)
-        gaps[at + FACTORS + k] = binomial * work[TAILS + 6]
-        product(work, SERIES, SERIES, MEAN)
-        binomial *= -(k + 0.5) / (k + 1.0)
-    gaps[at] = FILLED
-
-
-class Bounds(NamedTuple):
-    """Bounds of V**2 and of the contact force per mass on a gap."""
-
-    least_v2: float
-    most_v2: float
-    least_load: float
-    most_load: float
 
 
 @Inner
@@ -176,28 +119,31 @@ def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Return the time over a gap, V**2 at its end, and the largest V**2 on it; fill V**2, Y and the rate of time at
-    nodes.
+def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Return the time over a gap, V**2 at its end, the largest V**2 on it, and E at its end; fill V**2, Y and the rate
+    of time at nodes.
 
     The time is NaN if the curve or the time is not resolved, V**2 vanishes, or N may change its sign.
     """
     if gaps[at] != FILLED:
-        return nan, nan, nan
-    for k, row in enumerate(GAP_ROWS):
-        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
-    solution_row(work, W, SPEED, EXPM1_Q, v2)
+        return nan, nan, nan, nan
+    if forces.linear:
+        for k, row in enumerate(GAP_ROWS):
+            copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
+        solution_row(work, W, SPEED, EXPM1_Q, v2)
+    elif not solve_on_gap(forces, v2, width, gaps, at, work):
+        return nan, nan, nan, nan
     load_row(work, LOAD, DS, N0, KAPPA, W)
     load_size_row(work, MEAN, DS, N0, KAPPA, W)
-    end, (low, high) = work[W + COUNT], extent(work, W)
+    end, (low, high), lost = work[W + COUNT], extent(work, W), work[EXPM1_Q + COUNT]
     if not (min(low, end) > 0.0 and contact_sign * work[LOAD] > 0.0):
-        return nan, end, high
+        return nan, end, high, lost
     root_row(work, SPEED, W)
     time_rate_row(work, TIME_RATE, DS, SPEED, 1.0)
     fine = examine(work, TIME_RATE, size_of(work, TIME_RATE))[2]
     if not (fine and keeps_sign(work, LOAD, FAR_SHARE * extent(work, MEAN)[1])):
-        return nan, end, high
-    return width * work[TAILS + 6], end, high
+        return nan, end, high, lost
+    return width * work[TAILS + 6], end, high, lost
 
 
 # The relative error of times that are summed in another order.
@@ -243,6 +189,25 @@ def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def pass_gap(forces, reading, v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Return what `pass_by_rows` does, by powers if that is possible and rows are not read; and whether they are."""
+    time, lost, reads = nan, 0.0, reading.what == PEAKS
+    end, bounds = nan, Bounds(0.0, inf, 0.0, inf)
+    if forces.linear:
+        time, end, bounds = pass_by_powers(v2, contact_sign, gaps, at)
+        lost = gaps[at + END_EXPM1]
+    if reads and time > 0.0 and reading.length:
+        bounds = lengths_on(gaps, at, bounds.least_v2, bounds.most_v2)
+    top, has_values = bounds.most_v2, reads and not (time > 0.0 and not may_be_peak(reading, bounds))
+    if has_values or not time > 0.0:
+        time, end, top, lost = pass_by_rows(forces, v2, contact_sign, width, gaps, at, work)
+    if has_values and not forces.linear and time > 0.0:
+        low, high = range_of(work, W)
+        has_values = may_be_peak(reading, lengths_on(gaps, at, max(low, 0.0), high))
+    return time, end, top, lost, has_values
+
+
+@Inner
 def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
     """Return whether a gap contains the place or the time up to which a leg is read, which requires a panel."""
     if route.reading.what == PASSAGE:
@@ -255,7 +220,7 @@ def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
 def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
     """Pass gaps from the break ahead on, as long as V**2 is large and follows from the kept data."""
     (left, run_length, v2, largest_v2, ahead, count), v, spent = before, march.direction, 0.0
-    breaks, gaps, upcoming, reads = route.breaks, route.gaps, ahead.upcoming, route.reading.what
+    breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
     to, total, total_low, may_join = HEAD + count * COLUMNS, 0.0, 0.0, False
     for k in range(count):
         spent += record[HEAD + k * COLUMNS + TIME]
@@ -272,13 +237,10 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
             off, begin_at = clearance(low, high), low if v > 0 else high
             panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
             fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
-        time, end, bounds = pass_by_powers(v2, contact_sign, gaps, at)
-        top, has_values = bounds.most_v2, reads == PEAKS and not (time > 0.0 and not may_be_peak(route.reading, bounds))
-        if has_values or not time > 0.0:
-            time, end, top = pass_by_rows(v2, contact_sign, width, gaps, at, work)
+        time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, gaps, at, work)
         if not time > 0.0 or is_read_inside(route, (start, stop), (spent, spent + time)):
             break
-        largest_v2 = max(largest_v2 / (1.0 + gaps[at + END_EXPM1]), max(v2, top))
+        largest_v2 = max(largest_v2 / (1.0 + lost), max(v2, top))
         v2, upcoming, spent = end, upcoming + 1, spent + time
         run_length = offset(stop, march.origin, v)
         # Successive gaps from which only the time is read become one entry of the record.
@@ -286,6 +248,8 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         total, rounding = two_sum(total if may_join and not has_values else 0.0, time)
         total_low = rounding + (total_low if may_join and not has_values else 0.0)
         if has_values:
+            if route.reading.length:
+                fill_length_on_gap(gaps, at, work)
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)

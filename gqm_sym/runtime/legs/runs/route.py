@@ -61,6 +61,8 @@ class Reading(NamedTuple):
         TIMES to PANELS (`leg_record`).
     force : bool
         For PEAKS, whether the contact force is read in place of the speed.
+    length : bool
+        Whether that is the length of the contact force, which the law need not contain (`equation.fill_length`).
     sign : float
         1 for the largest, -1 for the smallest.
     best : float
@@ -69,6 +71,7 @@ class Reading(NamedTuple):
 
     what: int
     force: bool
+    length: bool
     sign: float
     best: float
 

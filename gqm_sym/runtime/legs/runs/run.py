@@ -15,6 +15,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     Panel,
     W,
     distance,
+    fill_length,
     marched,
     panel_buffer,
     set_nodes,
@@ -53,8 +54,11 @@ def enter_change(record, count, place):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def enter_panel(record, count, right, width, work):  # type: ignore[no-untyped-def]
+def enter_panel(forces, march, panel, reading, record, count, right, work):  # type: ignore[no-untyped-def]
     """Store a panel that ends at w = ``right`` in the record; return the number of panels."""
+    width = right - panel.left
+    if reading.length:
+        fill_length(forces, march, panel, work)
     add_panel(record, HEAD + count * COLUMNS, right, width, work)
     return count + 1
 
@@ -113,7 +117,11 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
         width, step, is_timed = next_panel(
-            forces, march, panel, PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True), work
+            forces,
+            march,
+            panel,
+            PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True, route.reading.length),
+            work,
         )
         if width == 0.0:
             what, run_length, v2 = end_at_once(forces, march, panel, run_length, point)
@@ -141,7 +149,9 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         right, ends_here = left + width, change.first <= 1.0
         if ends_here:
             right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, run_length, work, point)
-        recorded = recorded if searching else enter_panel(record, recorded, right, right - left, work)
+        recorded = (
+            recorded if searching else enter_panel(forces, march, panel, route.reading, record, recorded, right, work)
+        )
         at_stop, panel_count = not ends_here and width == max_width, panel_count + 1
         largest_v2 = largest_after(largest_v2, v2, ends_here, work)
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)

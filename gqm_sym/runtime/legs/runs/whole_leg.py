@@ -50,6 +50,7 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
+from gqm_sym.runtime.legs.panels.solving import is_settled
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
@@ -96,10 +97,6 @@ ROUGH_STEP = 0.03
 # The smallest and the largest factor by which the width grows if no turn is found on it.
 MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
 
-# The change of V**2 as a share of its largest value that is rounding only; and a share below which it is, if changes do
-# not decrease any more.
-SETTLED, NEARLY_SETTLED = 1e-15, 1e-13
-
 # The rounding error of a mean in units in the last place of its largest term.
 MEAN_ROUNDINGS = 4.0
 
@@ -145,7 +142,7 @@ def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # 
     A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width. If the
     forces are not linear in V**2, the same steps are those of Newton's method for V**2.
     """
-    h, last, at, change, is_settled = min(width, room), np.inf, blocks * TAILS, np.inf, forces.linear
+    h, last, at, change, settled = min(width, room), np.inf, blocks * TAILS, 0.0, forces.linear
     begin_leg(blocks, work)
     for _ in range(MAX_TRIES):
         if not sample_leg(forces, march, panel, blocks, h, work):
@@ -153,14 +150,14 @@ def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # 
         if not forces.linear:
             before = change
             change, size = fill_v2(blocks, h, work)
-            is_settled = change <= SETTLED * size or (change <= NEARLY_SETTLED * size and change >= 0.5 * before)
+            settled = is_settled(change, before, size, forces.squared_contact != 0)
         to_end_terms(blocks, work, blocks * FORCE, work, at)
         factor = 0.0
         if work[at + 1] < 0.0:
             step = step_to_turn(work, at)
             rounding = ULP * (MEAN_ROUNDINGS + fabs(march.origin[0]) / h)
             if (
-                is_settled
+                settled
                 and last <= LAST_STEP
                 and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE)
             ):
@@ -191,7 +188,7 @@ def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untype
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
     if load_fine and reading.what == PEAKS and reading.force:
-        load_fine, load_ratio = is_contact_force_resolved(blocks, work)
+        load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, blocks, work)
     if not (fine and load_fine):
         return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
     noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]

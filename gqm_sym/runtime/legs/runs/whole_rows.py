@@ -4,11 +4,11 @@ Rows are those of a panel (`panels.equation`) with more nodes: with ``blocks`` b
 the row ``r`` of a panel begins at ``blocks * r``.
 """
 
-from math import fabs, inf, log, pi
+from math import fabs, inf, log, pi, sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.calls import call_speed_equation, call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack, over_rows
 from gqm_sym.runtime.legs.panels.breaks import within
@@ -35,6 +35,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     W,
     copy_row,
     damped_row,
+    difference_row,
     fill_expm1,
     force_row,
     linear_row,
@@ -65,10 +66,12 @@ from gqm_sym.runtime.legs.runs.whole_tables import (
 ROWS = 22
 whole_buffer = on_stack(ROWS * MAX_BLOCKS * WIDE)
 
+# The rows of a module's function `squared_contact`.
+square_buffer = on_stack(4 * MAX_BLOCKS * WIDE)
+
 # A bound on the Lebesgue constant for all numbers of nodes (`polynomials.LEBESGUE`).
 LEBESGUE = 4.0
 
-difference_row = over_rows(lambda one, other: one - other, WIDE)
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 
@@ -224,14 +227,34 @@ def is_load_resolved(blocks, contact_sign, work):  # type: ignore[no-untyped-def
 
 
 @Inner
-def is_contact_force_resolved(blocks, work):  # type: ignore[no-untyped-def]
-    """Return whether N itself is resolved, as its extremes require, and the ratio of its middle coefficients."""
+def is_contact_force_resolved(forces, is_length, blocks, work):  # type: ignore[no-untyped-def]
+    """Return whether N itself is resolved, as its extremes require, and the ratio of its middle coefficients.
+
+    If it is a length, that is its square, which is smooth also where it almost vanishes; the rows N0 and KAPPA become
+    the length and 0.
+    """
+    if is_length:
+        fill_lengths(forces, blocks, work)
     for at in range(0, blocks * WIDE, WIDE):
         n0, kappa, w = blocks * N0 + at, blocks * KAPPA + at, blocks * W + at
         load_per_mass_row(work, blocks * SERIES + at, n0, kappa, w)
+        if is_length:
+            product(work, blocks * SERIES + at, n0, n0)
     size = size_of_row(blocks, work, SERIES)
     _tail, middle, fine = examine_row(blocks, work, SERIES, size)
     return fine, middle / size
+
+
+@Inner
+def fill_lengths(forces, blocks, work):  # type: ignore[no-untyped-def]
+    """Replace the rows N0 and KAPPA by the length of the contact force per mass, and 0 (`equation.fill_length`)."""
+    wide, terms = blocks * WIDE, square_buffer()
+    places = work[blocks * ARC_RATE : blocks * ARC_RATE + wide]
+    call_squared_contact(forces.squared_contact, wide, places, forces.params, terms)
+    for j in range(wide):
+        w = work[blocks * W + j]
+        square = terms[j] + w * (terms[wide + j] + w * terms[2 * wide + j])
+        work[blocks * N0 + j], work[blocks * KAPPA + j] = sqrt(max(square, 0.0)), 0.0
 
 
 @Inner

@@ -292,8 +292,9 @@ def test_friction_in_space(
     for leg, place, end in zip(legs[: len(turns)], turns, ends, strict=True):
         assert leg.lam_end == pytest.approx(float(mpf(place)), abs=9.0 * float(np.spacing(float(start))))
         assert leg.t_end == pytest.approx(float(end), rel=1e-15)
-    there, expected = {"lam": float(passage[0])}, (passage[1], *largest)
-    for quantity, value in zip(("time_at", "v_max", "normal_force_max"), expected, strict=True):
+    least = module.solve(start, 0, mu=mu, c_d=c_d, t_max=3).normal_force_min.value
+    there, expected = {"lam": float(passage[0])}, (passage[1], *largest, repr(least))
+    for quantity, value in zip(("time_at", "v_max", "normal_force_max", "normal_force_min"), expected, strict=True):
         asked = {"t_max": 3.0, **(there if quantity == "time_at" else {})}
         swept = module.sweep(quantity, [float(start)], 0.0, mu=float(mu), c_d=float(c_d), **asked)
         assert float(swept.values[0]) == pytest.approx(float(mpf(value)), rel=2e-15)

@@ -1,0 +1,178 @@
+"""V**2 on a panel for the forces on it, which need not be linear in V**2.
+
+Friction of the contact force in space makes the law ``P - Q W - f |N|/m``, where ``(N/m)**2`` is a polynomial in W with
+coefficients that depend on the place alone, as P, Q and f do. So the curve is looked at once for all iterations.
+"""
+
+from math import inf, sqrt
+
+from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.legs.panels.equation import (
+    ARC_RATE,
+    AT_REST,
+    DS,
+    EXPM1_Q,
+    GRADED,
+    KAPPA,
+    LENGTH,
+    LENGTH_SLOPE,
+    LOAD,
+    MEAN,
+    MIXED,
+    N0,
+    NODES,
+    OFFSET,
+    PLAIN_P,
+    PLAIN_Q,
+    Q_RATE,
+    RUBBING,
+    SPEED,
+    TURNING,
+    W_FACTOR,
+    D,
+    P,
+    Q,
+    W,
+    copy_row,
+    damped_row,
+    difference_row,
+    distance_row,
+    factor_row,
+    fill_square,
+    integrate,
+    lay_places,
+    length_row,
+    linear_row,
+    load_row,
+    product,
+    q_rate_row,
+    sample,
+    slope_at,
+)
+from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of_block
+
+# The largest number of iterations for forces that are not linear in V**2.
+MAX_ITERATIONS = 40
+
+# The change of V**2 in an iteration as a share of its largest value that is rounding only; and a share below which it
+# is, if changes do not decrease any more.
+ROUNDED, NEARLY_ROUNDED = 4e-16, 1e-13
+
+length_slope_row = over_rows(lambda b, c, w, length: (0.5 * b + w * c) / length, WIDE)
+rubbed_p_row = over_rows(lambda p, rubbing, length, slope, w: p - rubbing * (length - slope * w), WIDE)
+rubbed_q_row = over_rows(lambda q, rubbing, slope: q + rubbing * slope, WIDE)
+sum_row = over_rows(lambda one, other: one + other, WIDE)
+
+
+@Inner
+def split_law(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Fill the rows for a law with friction in space, apart from those that depend on V**2."""
+    copy_row(work, W, 0.0)
+    sample(forces, march, panel, work)
+    fill_square(forces, ARC_RATE, work)
+    product(work, RUBBING, RUBBING, float(forces.direction))
+    # The law at rest, without the friction there.
+    length_row(work, LENGTH, AT_REST, MIXED, TURNING, W)
+    length_slope_row(work, LENGTH_SLOPE, MIXED, TURNING, W, LENGTH)
+    product(work, PLAIN_P, RUBBING, LENGTH)
+    sum_row(work, PLAIN_P, P, PLAIN_P)
+    product(work, PLAIN_Q, RUBBING, LENGTH_SLOPE)
+    difference_row(work, PLAIN_Q, Q, PLAIN_Q)
+
+
+@Inner
+def rub(march, panel, work):  # type: ignore[no-untyped-def]
+    """Fill the rows P and Q_RATE of a law with friction in space, for the values of V**2 in the row W."""
+    length_row(work, LENGTH, AT_REST, MIXED, TURNING, W)
+    length_slope_row(work, LENGTH_SLOPE, MIXED, TURNING, W, LENGTH)
+    rubbed_p_row(work, P, PLAIN_P, RUBBING, LENGTH, LENGTH_SLOPE, W)
+    rubbed_q_row(work, Q, PLAIN_Q, RUBBING, LENGTH_SLOPE)
+    q_rate_row(work, Q_RATE, Q, OFFSET, slope_at(panel.left, march), march.g, float(march.direction))
+
+
+@Inner
+def begin_panel(forces, march, panel, width, work):  # type: ignore[no-untyped-def]
+    """Lay the nodes of a panel; if the forces are linear in V**2, or apart from friction, also fill the rows
+    that do not depend on it.
+    """
+    product(work, OFFSET, NODES, width)
+    distance_row(work, D, OFFSET, slope_at(panel.left, march), march.g)
+    lay_places(march, panel, ARC_RATE, work)
+    copy_row(work, W, panel.v2)
+    if forces.linear:
+        sample(forces, march, panel, work)
+    elif forces.squared_contact != 0:
+        split_law(forces, march, panel, work)
+
+
+@Inner
+def slope_at_start(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Return the increase of V**2 with the distance at a panel's start, or 0 if it decreases."""
+    if forces.squared_contact != 0:
+        w = panel.v2
+        length = sqrt(work[AT_REST] + w * (work[MIXED] + w * work[TURNING]))
+        return max(march.direction * (work[PLAIN_P] - work[PLAIN_Q] * w - work[RUBBING] * length), 0.0)
+    v, nu = float(forces.direction), float(panel.contact_sign)
+    work[W] = max(panel.v2, 1e-300)  # laws may contain its square root
+    call_speed_equation(forces.speed_equation, 1, work, (ARC_RATE, W, MEAN), v, nu, forces.params)
+    return max(march.direction * (work[MEAN + 1] - work[MEAN + 2] * work[W]), 0.0)
+
+
+@Inner
+def is_settled(change, last_change, size, is_contact_known):  # type: ignore[no-untyped-def]
+    """Return whether V**2 has converged; ``last_change`` is that of the iteration before, or 0 in the first.
+
+    Each iteration squares the error, until changes are rounding only. The contact force belongs to V**2 before the
+    change. Where it is not computed from V**2 afterwards (``is_contact_known``), the change must be rounding only too.
+    """
+    if change <= ROUNDED * size or (change <= NEARLY_ROUNDED * size and change >= 0.5 * last_change > 0.0):
+        return True
+    return is_contact_known and change * change * change <= ROUNDED * size * last_change * last_change
+
+
+@Inner
+def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Do the work of `integrate` for forces that are not linear in V**2, by Newton's method; return inf if it does not
+    converge.
+    """
+    # The first approximation is linear, with the slope of V**2 at the panel's start.
+    linear_row(work, W, D, panel.v2, slope_at_start(forces, march, panel, work))
+    last_change = 0.0
+    for _ in range(MAX_ITERATIONS):
+        if forces.squared_contact != 0:
+            rub(march, panel, work)
+        else:
+            sample(forces, march, panel, work)
+        total = integrate(march, panel, SPEED, work)
+        if not total < inf:
+            return inf
+        difference_row(work, W, SPEED, W)
+        change, size = size_of_block(work, W), size_of_block(work, SPEED)
+        copy_row(work, W, SPEED)
+        if not change < inf:
+            return inf
+        if is_settled(change, last_change, size, forces.squared_contact != 0):
+            return total
+        last_change = change
+    return inf
+
+
+@Inner
+def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Compute W on a panel prepared by `begin_panel`, and all rows that do not need W > 0.
+
+    Return q over the panel, or inf if the panel is too wide to be solved.
+    """
+    total = integrate(march, panel, W, work) if forces.linear else solve_nonlinear(forces, march, panel, work)
+    if not total < inf:
+        return inf
+    if panel.v2 == 0.0:
+        damped_row(work, W_FACTOR, GRADED if march.g > 0.0 else MEAN, EXPM1_Q)
+    elif march.g > 0.0 and panel.left == 0.0:
+        factor_row(work, W_FACTOR, W, OFFSET, 0.5 * march.c)
+    else:
+        copy_row(work, W_FACTOR, W)
+    load_row(work, LOAD, DS, N0, KAPPA, W)
+    return total

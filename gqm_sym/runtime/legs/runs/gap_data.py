@@ -1,0 +1,196 @@
+"""The data kept of the gaps between two breaks of the curve (`gaps`), and V**2 on a gap with friction in space."""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.legs.panels.equation import (
+    ARC_RATE,
+    AT_REST,
+    DS,
+    EXPM1_Q,
+    FORCE,
+    KAPPA,
+    LENGTH,
+    MEAN,
+    MIXED,
+    N0,
+    NODES,
+    OFFSET,
+    PLAIN_P,
+    PLAIN_Q,
+    Q_RATE,
+    RUBBING,
+    SERIES,
+    SPEED,
+    TAILS,
+    TURNING,
+    D,
+    March,
+    Panel,
+    W,
+    copy,
+    copy_row,
+    fill_force,
+    fill_square,
+    length_row,
+    product,
+)
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, LEBESGUE, WIDE, extent, size_of, to_means, to_tails
+from gqm_sym.runtime.legs.panels.resolution import (
+    ONE_SIGN_RATIO,
+    are_resolved,
+    examine,
+    is_curve_resolved,
+    kink,
+    size_at,
+)
+from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_nonlinear
+
+# The largest share of u that H may be, and the number of powers that are summed then.
+MAX_SHARE, POWERS = 0.1, 16
+
+# The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
+# largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature, and of the coefficients of
+# (N/m)**2; the factors of the powers; and rows from which V**2, N and time follow. With friction in space the first
+# two of the rows are those of P and Q without friction.
+STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
+LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
+BOUNDS_OF_SQUARE, FACTORS = 11, 24
+FIRST_ROW = FACTORS + POWERS
+GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, SPEED, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
+SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
+FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
+GAP_COLUMNS = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
+FILLED, REFUSED = 1.0, 2.0
+
+# The share of the square of the contact force in its terms below which it loses digits.
+LEAST_SHARE = 1e-2
+
+square_size_row = over_rows(lambda a, c, w: a + c * (w * w), WIDE)
+undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
+share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
+
+
+@Inner
+def range_of(work, row):  # type: ignore[no-untyped-def]
+    """Return bounds of the polynomial through a row of values."""
+    low, high = extent(work, row)
+    beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
+    return low - beyond, high + beyond
+
+
+@Inner
+def keep_rows(forces, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Keep the rows of a gap."""
+    for k, row in enumerate(GAP_ROWS if forces.linear else FRICTION_ROWS):
+        copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
+    for k, row in enumerate(SQUARE_ROWS):
+        copy(gaps, at + FIRST_SQUARE + k * WIDE, work, row)
+
+
+@Inner
+def is_square_kept(gaps, at, work):  # type: ignore[no-untyped-def]
+    """Keep bounds of the coefficients of (N/m)**2; return whether these are resolved."""
+    is_resolved, first, last = True, size_of(work, AT_REST), size_of(work, TURNING)
+    for row, size in ((AT_REST, first), (MIXED, 2.0 * sqrt(first * last)), (TURNING, last)):
+        is_resolved = is_resolved and examine(work, row, size)[0] <= ONE_SIGN_RATIO * size
+    to = at + BOUNDS_OF_SQUARE
+    gaps[to], gaps[to + 1] = range_of(work, AT_REST)
+    gaps[to + 2], gaps[to + 3] = range_of(work, MIXED)
+    gaps[to + 4], gaps[to + 5] = range_of(work, TURNING)
+    return is_resolved
+
+
+@Inner
+def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Fill the data kept of a gap, the panel from one break to the next, from ``gaps[at]`` on."""
+    gaps[at] = REFUSED
+    begin_panel(forces, march, panel, width, work)
+    if not forces.linear:
+        if is_curve_resolved(width, work)[0] and is_square_kept(gaps, at, work) and size_of(work, PLAIN_Q) < inf:
+            keep_rows(forces, gaps, at, work)
+            gaps[at] = FILLED
+        return
+    if not fill_force(march, work) < inf:
+        return
+    to_means(work, FORCE, work, MEAN)
+    product(work, SPEED, OFFSET, MEAN)
+    work[size_at(FORCE)] = size_of(work, FORCE)
+    if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
+        return
+    if forces.kinked and not kink(work) > 1.0:
+        return
+    for row in (N0, KAPPA):
+        if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):
+            return
+    if forces.squared_contact != 0:
+        fill_square(forces, ARC_RATE, work)
+        if not is_square_kept(gaps, at, work):
+            return
+    keep_rows(forces, gaps, at, work)
+    (least, most), (low, high) = extent(work, EXPM1_Q), extent(work, SPEED)
+    middle, largest = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
+    gaps[at + END_EXPM1], gaps[at + END_GAINED] = work[EXPM1_Q + COUNT], work[SPEED + COUNT]
+    gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
+    gaps[at + LEAST_DAMPING], gaps[at + MOST_DAMPING] = 1.0 / (1.0 + most), 1.0 / (1.0 + least)
+    gaps[at + LEAST_N0], gaps[at + MOST_N0] = range_of(work, N0)
+    gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = range_of(work, KAPPA)
+    undamped_row(work, SERIES, DS, EXPM1_Q, width)
+    share_row(work, MEAN, SPEED, middle, largest)
+    binomial = 1.0
+    for k in range(POWERS):
+        to_tails(work, SERIES, work, TAILS)
+        gaps[at + FACTORS + k] = binomial * work[TAILS + 6]
+        product(work, SERIES, SERIES, MEAN)
+        binomial *= -(k + 0.5) / (k + 1.0)
+    gaps[at] = FILLED
+
+
+class Bounds(NamedTuple):
+    """Bounds of V**2 and of the contact force per mass on a gap."""
+
+    least_v2: float
+    most_v2: float
+    least_load: float
+    most_load: float
+
+
+@Inner
+def lengths_on(gaps, at, low, high):  # type: ignore[no-untyped-def]
+    """Return bounds of V**2 and of the length of the contact force on a gap where V**2 lies between two values."""
+    to = at + BOUNDS_OF_SQUARE
+    least = gaps[to] + min(gaps[to + 2] * low, gaps[to + 2] * high) + gaps[to + 4] * low * low
+    most = gaps[to + 1] + max(gaps[to + 3] * low, gaps[to + 3] * high) + gaps[to + 5] * high * high
+    return Bounds(low, high, sqrt(max(least, 0.0)), sqrt(max(most, 0.0)))
+
+
+@Inner
+def fill_length_on_gap(gaps, at, work):  # type: ignore[no-untyped-def]
+    """Replace the rows N0 and KAPPA by the length of the contact force per mass, and 0."""
+    for k, row in enumerate(SQUARE_ROWS):
+        copy(work, row, gaps, at + FIRST_SQUARE + k * WIDE)
+    length_row(work, N0, AT_REST, MIXED, TURNING, W)
+    copy_row(work, KAPPA, 0.0)
+
+
+@Inner
+def solve_on_gap(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Fill the row W for a law with friction in space; return whether it converges and V**2, the force and N are
+    resolved.
+    """
+    for k, row in enumerate(FRICTION_ROWS):
+        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
+    for k, row in enumerate(SQUARE_ROWS):
+        copy(work, row, gaps, at + FIRST_SQUARE + k * WIDE)
+    product(work, OFFSET, NODES, width)
+    copy_row(work, D, OFFSET)
+    march, panel = March((0.0, 0.0), forces.direction, 0.0, 1.0), Panel(0.0, v2, 1, (-inf, inf))
+    if not solve_nonlinear(forces, march, panel, work) < inf:
+        return False
+    square_size_row(work, MEAN, AT_REST, TURNING, W)
+    low = extent(work, LENGTH)[0]
+    return low * low > LEAST_SHARE * extent(work, MEAN)[1] and examine(work, FORCE, size_of(work, FORCE))[2]
