@@ -146,8 +146,8 @@ def symmetric_orbits(
         (SINE_SQUARED, waves.sine(rate * HALF / 2) ** 2),
         (COSINE_FOURTH, cosine**4),
     )
-    degrees = [_degree(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
-    cancels = waves.sign < 0 and any(MAX_DEGREE < degree < inf for degree in degrees)
+    degrees = [_degree_inside(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
+    cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
     times = None if cancels else integrand, divisor, invariants
     square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
     if square is None:
@@ -207,6 +207,12 @@ def _degree(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
     if form.is_Pow and form.exp.is_Integer and form.exp > 0:
         return int(form.exp) * _degree(form.base, symbols)
     return inf
+
+
+def _degree_inside(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
+    """Return the largest degree of the polynomials in a form."""
+    degree = _degree(form, symbols)
+    return degree if degree < inf else max(_degree_inside(part, symbols) for part in form.args)
 
 
 def _with_agm(
