@@ -238,7 +238,7 @@ ONLY_IN = {
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},
-    "scipy": {"runtime", "smoothing", "fitting", "design"},
+    "scipy": {"runtime", "smoothing", "fitting", "design", "derivation"},
     "torch": {"torch"},
     "sympy": {
         "cli",

@@ -1,11 +1,10 @@
 """Events along a motion: turning points, changes of contact, corners and ends."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from math import sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -42,8 +41,7 @@ SINGULAR_SHARE = 1e-8
 LAUNCH_SHARE = 1e-14
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """An event at one time of a motion.
 
     Attributes
@@ -66,8 +64,7 @@ class Event:
     z: float
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
+class Leg(NamedTuple):
     """A part of the motion in one direction, with the reason for its end.
 
     Attributes

@@ -1,11 +1,10 @@
 """Legs and events as tuples that display as tables."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, fields
 from html import escape
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-T = TypeVar("T")
+T = TypeVar("T", bound=NamedTuple)
 
 # The titles of columns that have a unit; that of the curve parameter depends on the curve.
 HEADINGS = {
@@ -21,15 +20,14 @@ HEADINGS = {
 
 
 class Rows(tuple[T, ...]):
-    """A tuple of records of one class, which notebooks display as a table."""
+    """A tuple of named tuples of one class, which notebooks display as a table."""
 
     __slots__ = ()
 
     def _repr_html_(self) -> str:
         if not self:
             return "<p>none</p>"
-        titles = [field.name for field in fields(self[0])]  # type: ignore[arg-type]
-        return table([HEADINGS.get(name, name) for name in titles], (astuple(row) for row in self))  # type: ignore[call-overload]
+        return table([HEADINGS.get(name, name) for name in self[0]._fields], self)
 
 
 def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:

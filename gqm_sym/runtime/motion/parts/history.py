@@ -1,7 +1,6 @@
 """The legs and the events of a motion."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from math import inf
 from typing import Any
@@ -51,7 +50,7 @@ class History(Positions):
                 end = last if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
-                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * trajectory.lap, t_end=inf)
+                legs[-1] = legs[-1]._replace(lam_end=timed.segment.b + timed.laps * trajectory.lap, t_end=inf)
         return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
