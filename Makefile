@@ -76,6 +76,7 @@ mutate: $(VENV)/.dev ## change the code at random and list the changes that no t
 	WORKERS=$(WORKERS) $(BIN)/python scripts/mutate.py $(or $(COUNT),300) $(or $(SEED),0)
 
 bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the alternatives' (docs/benchmarks.md)
+	$(BIN)/gqm warm
 	$(BIN)/python benchmarks/stages.py
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/python benchmarks/comparison.py

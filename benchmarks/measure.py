@@ -49,9 +49,16 @@ class Result:
         return not self.error <= self.row.line
 
 
+# The time in seconds for which calls are not counted, so that functions that Python runs at first are compiled by then.
+UNCOUNTED = 0.3
+
+
 def measured(row: Row) -> Result:
-    """Measure a row: the median time of some calls, after a first call that is not counted."""
+    """Measure a row: the median time of some calls, after first calls that are not counted."""
+    begin = perf_counter()
     value = row.call()
+    while perf_counter() - begin < UNCOUNTED:
+        row.call()
     times = []
     for _ in range(row.repeats):
         start = perf_counter()

@@ -41,7 +41,6 @@ PATHS = (
 # Families with the range of launches.
 FAMILIES: tuple[tuple[Callable[[], Any], float, float], ...] = (
     (lambda: gqm.families.circle(L=1), -1.0, 1.3),
-    (lambda: gqm.families.ellipse(a=2, b=1), -2.8, -0.2),
     (lambda: gqm.families.parabola(a="7/10"), -1.2, 1.2),
     (lambda: gqm.families.catenary(c="4/5"), -1.2, 1.2),
     (lambda: gqm.families.cycloid(R=1), -2.5, 2.5),

@@ -34,13 +34,16 @@ NEAR, NEARER, DIGITS = sp.Float("1e-12", 90), sp.Float("1e-24", 90), 90
 # Unit tangents that differ by less than this are equal; curvatures that grow by more than this factor towards a place
 # are infinite there.
 MAX_TANGENT_DIFFERENCE, MAX_CURVATURE_GROWTH = 1e-3, 10
+# At a cusp a derivative is at most this share of its values nearby.
+MAX_DERIVATIVE = 1e-10
 
 Function = Callable[[float], float]
 Vector = tuple[sp.Expr, ...]
 
 
-def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
-    """Refuse a curve whose tangent or curvature jumps inside the domain, or whose curvature is infinite there.
+def check_corners(curve: Curve, defaults: Mapping[str, Value | None], *, with_radius: bool = False) -> None:
+    """Refuse a curve whose tangent or curvature jumps inside the domain, or whose curvature is infinite there; if a
+    body rolls on it ``with_radius``, a curve with a cusp inside the domain too.
 
     Raises
     ------
@@ -53,6 +56,31 @@ def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
         check_budget()
         for low, high in _changes(_function(zero, lam, values), curve, values):
             _compare(curve, values, zero, _root(zero.xreplace(values), lam, low, high))
+    if with_radius:
+        check_cusps(curve, values)
+
+
+def check_cusps(curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> None:
+    """Refuse a curve with a cusp inside the domain, where the path of the centre of a body with a radius jumps.
+
+    Raises
+    ------
+    DeclarationError
+        If both derivatives vanish where one of them changes its sign.
+    """
+    from scipy.optimize import brentq
+
+    lam = curve.parameter
+    first = [_function(differentiate(form, lam), lam, values) for form in (curve.x, curve.z)]
+    for one, other in (first, first[::-1]):
+        for low, high in _changes(one, curve, values):
+            check_budget()
+            at = brentq(one, low, high)
+            if abs(other(at)) <= MAX_DERIVATIVE * max(abs(other(low)), abs(other(high))):
+                raise DeclarationError(
+                    f"rolling: the {curve.kind} curve has a cusp at {lam.name} = {round(at, 9):.6g}, where the centre "
+                    "of a body with a radius has no path beside it; end the domain there, or leave the radius out"
+                )
 
 
 def check_powers(

@@ -119,7 +119,7 @@ def derive(
         if curve.period is not None:
             check_period(curve.kind, curve.point, lam, curve.period, values)
         check_powers(curve.coordinates, curve, values)
-        check_corners(curve, values)
+        check_corners(curve, values, with_radius=bool(kernel.radius))
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
         curve = replace(curve, **{name: without_known_absolute_values(form, signs) for name, form in curve.coordinates})
     # A rotating frame pushes a body out of every vertical plane.

@@ -24,14 +24,19 @@ LAUNCHES = {
     "circle": (-2.0, 2.0),
     "circle_rotating": (0.5, 1.5),
     "circle_spring": (-1.5, 2.0),
+    "cycloid_inverted": (3.5, 5.5),
     "double_well": (0.4, 1.1),
+    "ellipse": (-2.2, -0.7),
     "kepler": (0.5, 1.5),
     "line_spring": (-2.0, 2.0),
     "log_spiral": (-0.5, 0.3),
     "parabola": (-1.0, 1.0),
     "parabola_rolling": (-0.6, 0.6),
+    "pendulum": (-2.8, -0.4),
+    "quartic": (-0.9, 0.9),
     "rolling_circle": (-1.5, 1.5),
     "rotating_parabola": (-0.6, 0.6),
+    "viviani": (0.3, 1.2),
 }
 
 
@@ -56,3 +61,29 @@ def test_gradients_of_periods(name: str, data: Any) -> None:
         truth = (period(STEP) - period(-STEP)) / (2 * mpf(STEP.numerator) / STEP.denominator)
         # Where the derivative vanishes, the difference is 1e-22, the square of the step.
         assert abs(found - truth) <= 2.0 * ULP * abs(truth) + 1e-20, (by, values)
+
+
+@pytest.mark.parametrize("name", LAUNCHES)
+@settings(max_examples=2, deadline=None)
+@given(data=st.data())
+def test_gradients_of_swept_periods(name: str, data: Any) -> None:
+    """Gradients in sweeps are right to two units in the last place of the integral of the absolute values, which is at
+    most four times the derivative where double precision is used.
+    """
+    module, (low, high) = load(str(ROOT / "generated" / f"{name}.py"), name), LAUNCHES[name]
+    place = low + (high - low) * data.draw(st.integers(1, 255)) / 256
+    speed = data.draw(st.sampled_from([0.0, 0.125, 0.5]))
+    arguments = inspect.signature(module.solve).parameters
+    values = {p: float(Fraction(str(arguments[p].default))) for p in module.PARAMETERS}
+    values |= {"lam0": place, "v0": speed}
+    # At rest the derivative by the speed is one-sided.
+    by = data.draw(st.sampled_from(sorted(values if speed else set(values) - {"v0"})))
+
+    def period(moved: Fraction) -> mpf:
+        beside = {key: str(Fraction(value) + (moved if key == by else 0)) for key, value in values.items()}
+        return mpf(module.solve(**beside).period_to(DIGITS))
+
+    swept = module.sweep("period", **values, gradient=by)
+    with mp.workdps(DIGITS):
+        truth = (period(STEP) - period(-STEP)) / (2 * mpf(STEP.numerator) / STEP.denominator)
+        assert abs(float(swept.gradient[0]) - truth) <= 8.0 * ULP * abs(truth) + 1e-20, (by, values)

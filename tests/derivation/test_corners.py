@@ -47,6 +47,19 @@ def test_what_is_smooth_or_a_cusp_passes(text):
     derived(text)
 
 
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_a_cusp_inside_is_refused_with_a_radius(axis):
+    """The centre would jump from one side of the cusp to the other; a motion went through it as if nothing were."""
+    rolling = gqm.Gravity() + gqm.Rolling(radius="rho", beta="2/5")
+    forms = {"x": "k*(u - sin(u))", "z": "-cos(u)"} if axis == "x" else {"x": "1 - cos(u)", "z": "k*(sin(u) - u)"}
+    curve = gqm.Curve.parametric(**forms, parameter="u", parameters={"k": 1})
+    gqm.derive(curve, gqm.Gravity())
+    with pytest.raises(DeclarationError, match=r"a cusp at u = -?0, where the centre"):
+        gqm.derive(curve, rolling)
+    inside = gqm.Curve.parametric(**forms, parameter="u", parameters={"k": 1}, domain=(0, "2*pi"))
+    gqm.derive(inside, rolling)
+
+
 @pytest.mark.parametrize(
     ("text", "degrees"),
     [("abs(x)", 90.0), ("3*abs(x)/4", 2 * math.degrees(math.atan(0.75))), ("x + abs(x)", math.degrees(math.atan(2)))],

@@ -62,8 +62,9 @@ def sweep_with_gradient(
         spans = sweep(formulas, "turning_points", launches, parameters, None, solve)
         periods = found if quantity in PERIODS else sweep(formulas, "period", launches, parameters, None, solve)
         which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
-        table = np.stack(columns[:-1], axis=1)[which]
-        ends = spans.values.reshape(-1, 2)[which]
+        table, ends = np.stack(columns[:-1], axis=1), spans.values.reshape(-1, 2)
+        if which.size < len(table):
+            table, ends = table[which], ends[which]
         several = launches_of(formulas, table[:, :-1], table[:, -1], ends)
         values = found.values.reshape(found.status.size, *shape[:-1])[which]
         if which.size:

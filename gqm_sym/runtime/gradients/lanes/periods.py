@@ -106,12 +106,17 @@ def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ..
     found = np.full((len(launches.given), len(rows)), nan)
     is_open = np.full(len(found), bool(rows))
     for stage in stages(formulas, launches, rows):
+        if not is_open.any():
+            break
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
         for most in () if program is None else PASSES if isinstance(program, LaneProgram) else (0,):
             if chosen.size:
                 out, states = carried_out(stage, program, rows, (chosen, launches.even[chosen] != UNEVEN), most)
                 is_answered = states == ANSWERED
+                if is_answered.all():
+                    found[chosen], is_open[chosen] = out, False
+                    break
                 found[chosen[is_answered]], is_open[chosen[is_answered]] = out[is_answered], False
                 chosen = chosen[states == OPEN]
     return found
@@ -159,8 +164,8 @@ def carried_out(
     most : int
         The largest number of intervals of the trapezoidal rule, for a program in double precision.
     """
-    chosen, mirrored = which
-    launched, source = stage.launched[chosen], stage.given[0]
+    (chosen, mirrored), source = which, stage.given[0]
+    launched = stage.launched if chosen.size == len(stage.launched) else stage.launched[chosen]
     out, states = np.empty((chosen.size, len(rows))), np.full(chosen.size, ANSWERED, dtype=np.int8)
     turns = [(end_program, end, getattr(source, "source", source), rows) for end in range(2)] if stage.has_turns else []
     makers = [*turns, (stage.make, *stage.given)]

@@ -179,13 +179,17 @@ def mean_program(orbits: Orbits) -> Program | None:
         share, difference = 2 * (share * (shrink * shrink)), difference * shrink
         rest = rest + share
     half_period = op.pi / a
-    weights = (Fraction(1, 2) + rest) * half_period, (Fraction(1, 2) - rest) * half_period
+    # Minus the derivatives of the half period with respect to both squares.
+    weights = [
+        half_period * share / (2 * square)
+        for share, square in zip((Fraction(1, 2) + rest, Fraction(1, 2) - rest), squares, strict=True)
+    ]
     partials_of = [gradient(op, square, [half, *p]) for square in squares]
     found = [op.number(0)] * len(moves)
     for j, move in enumerate(moves):
-        for square, weight, parts in zip(squares, weights, partials_of, strict=True):
+        for weight, parts in zip(weights, partials_of, strict=True):
             change = sum((by * part for by, part in zip(parts, move, strict=True)), op.number(0))
-            found[j] = found[j] - weight * (change / (2 * square))
+            found[j] = found[j] - weight * change
     return in_double_double(op, [difference / a, *found])
 
 
