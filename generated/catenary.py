@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 14, input 2558bd3a8d44, body 4011e9090626
+# interface 14, input 2558bd3a8d44, body 4fc548cd8e49
 """Bead on a hanging chain
 
 x              = x
@@ -319,15 +319,15 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         c, half = p[0, i], halves[i]
-        _t0 = half/c
-        _t1 = _t0/4
-        _t2 = cosh(_t1)
-        _t3 = 1/_t2**2
-        _t4 = _t2**4
-        out[0, i] = _t3*sinh(_t1)**2
-        out[1, i] = _t3
-        out[2, i] = cosh(_t0/2)/_t4
-        out[3, i] = _t4
+        _t0 = half/(2*c)
+        _t1 = cosh(_t0)
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        out[0, i] = _t4*sinh(_t0)**2
+        out[1, i] = 2/_t2
+        out[2, i] = 4*_t1*_t4
+        out[3, i] = _t3/4
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -357,14 +357,15 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     c, g = p[0], p[1]
-    _t0 = half/c
-    _t1 = _t0/4
-    _t2 = op.cosh(_t1)
-    _t3 = 1/_t2**4
-    _t4 = sine2/_t2**2
-    _t5 = _t3*sine2*op.cosh(_t0/2) + cosine2
-    _t6 = _t4*op.sinh(_t1)**2
-    return _t3*c*(4*_t6 + (_t6 + 1)**2)**2/(_t5*g*(_t4 + cosine2)**4), 4*_t5*c*g
+    _t0 = half/(2*c)
+    _t1 = op.cosh(_t0)
+    _t2 = _t1 + 1
+    _t3 = 1/_t2**2
+    _t4 = _t3*sine2
+    _t5 = 4*_t1*_t4 + cosine2
+    _t6 = _t4*op.sinh(_t0)**2
+    _t7 = 4*c
+    return _t3*_t7*(4*_t6 + (_t6 + 1)**2)**2/(_t5*g*(cosine2 + 2*sine2/_t2)**4), _t5*_t7*g
 
 
 MODEL = CompiledModel(

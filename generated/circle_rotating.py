@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 14, input a74aedd594f9, body 66bff68d892a
+# interface 14, input a74aedd594f9, body c974640f40e1
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -339,14 +339,15 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]
-        _t0 = half/4
-        _t1 = cos(_t0)
-        _t2 = half/2
-        _t3 = _t1**4
-        out[0, i] = sin(_t0)**2/_t1**2
-        out[1, i] = cos(_t2)/_t3
-        out[2, i] = sin(_t2)**2
-        out[3, i] = _t3
+        _t0 = half/2
+        _t1 = sin(_t0)**2
+        _t2 = cos(_t0)
+        _t3 = (_t2 + 1)**2
+        _t4 = 1/_t3
+        out[0, i] = _t1*_t4
+        out[1, i] = 4*_t2*_t4
+        out[2, i] = _t1
+        out[3, i] = _t3/4
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -385,18 +386,19 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     L, Omega, g = p[0], p[1], p[2]
-    _t0 = half/4
-    _t1 = op.cos(_t0)
-    _t2 = 1/_t1**4
-    _t3 = half/2
-    _t4 = _t2*sine2*op.cos(_t3) + cosine2
-    _t5 = Omega**2
-    _t6 = sine2*op.sin(_t0)**2/_t1**2
-    _t7 = 4*L
-    _t8 = (_t6 + 1)**2
+    _t0 = half/2
+    _t1 = op.sin(_t0)**2
+    _t2 = op.cos(_t0)
+    _t3 = 1/(_t2 + 1)**2
+    _t4 = _t3*sine2
+    _t5 = _t1*_t4
+    _t6 = (_t5 + 1)**2
+    _t7 = 4*_t2*_t4 + cosine2
+    _t8 = Omega**2
     _t9 = L*_t8
-    _t10 = L*_t5*_t8 - _t5*_t6*_t7 - _t5*_t9*op.sin(_t3)**2 - _t8*g
-    return -_t2*_t9/(_t10*_t4), -_t10*_t4*_t7/_t8
+    _t10 = L*_t6*_t8 - _t1*_t6*_t9 - 4*_t5*_t9 - _t6*g
+    _t11 = 4*L
+    return -_t11*_t3*_t6/(_t10*_t7), -_t10*_t11*_t7/_t6
 
 
 MODEL = CompiledModel(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 14, input bcc7b1afa151, body 51b5997d05f6
+# interface 14, input bcc7b1afa151, body b14b0107122b
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -359,9 +359,10 @@ def agm_arguments_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
         L, w, h, g, half = p[0, i], p[1, i], p[2, i], p[3, i], halves[i]
-        _t0 = (g - h*w**2)/L
-        out[0, i] = _t0*cos(half/4)**4
-        out[1, i] = _t0*cos(half/2)
+        _t0 = cos(half/2)
+        _t1 = (g - h*w**2)/L
+        out[0, i] = _t1*(_t0 + 1)**2/4
+        out[1, i] = _t0*_t1
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -394,7 +395,7 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_agm_arguments(op, half, p):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
     L, w, h, g = p[0], p[1], p[2], p[3]
-    return (g - h*w**2)*op.cos(half/4)**4/L, (g - h*w**2)*op.cos(half/2)/L
+    return (g - h*w**2)*(op.cos(half/2) + 1)**2/(4*L), (g - h*w**2)*op.cos(half/2)/L
 
 
 MODEL = CompiledModel(

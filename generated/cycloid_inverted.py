@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 14, input 01e055bdd46f, body 172c1ec1346f
+# interface 14, input 01e055bdd46f, body 9780c9f2d04b
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -327,15 +327,15 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]
-        _t0 = half/4
+        _t0 = half/2
         _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = cos(half/2)
-        _t4 = _t1**4
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t3
-        out[2, i] = _t3/_t4
-        out[3, i] = _t4
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        out[0, i] = _t4*sin(_t0)**2
+        out[1, i] = 2*_t1/_t2
+        out[2, i] = 4*_t1*_t4
+        out[3, i] = _t3/4
 
 
 @compiled(BOUNDS_BATCH)
@@ -354,14 +354,13 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     R, g = p[0], p[1]
-    _t0 = half/4
+    _t0 = half/2
     _t1 = op.cos(_t0)
-    _t2 = 1/_t1**4
-    _t3 = sine2/_t1**2
-    _t4 = op.cos(half/2)
-    _t5 = _t2*_t4*sine2 + cosine2
-    _t6 = 4*R
-    return _t2*_t6*(_t3*_t4 + cosine2)**2/(_t5*g*(_t3*op.sin(_t0)**2 + 1)**2), _t5*_t6*g
+    _t2 = _t1 + 1
+    _t3 = 1/_t2**2
+    _t4 = _t3*sine2
+    _t5 = 4*_t1*_t4 + cosine2
+    return 16*R*_t3*(2*_t1*sine2/_t2 + cosine2)**2/(_t5*g*(_t4*op.sin(_t0)**2 + 1)**2), 4*R*_t5*g
 
 
 MODEL = CompiledModel(

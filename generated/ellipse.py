@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 14, input 81dc4ee20e82, body b605a6224c89
+# interface 14, input 81dc4ee20e82, body 0b310b95cd17
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -340,15 +340,15 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]
-        _t0 = half/4
+        _t0 = half/2
         _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = cos(half/2)
-        _t4 = _t1**4
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t3
-        out[2, i] = _t3/_t4
-        out[3, i] = _t4
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        out[0, i] = _t4*sin(_t0)**2
+        out[1, i] = 2*_t1/_t2
+        out[2, i] = 4*_t1*_t4
+        out[3, i] = _t3/4
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -378,15 +378,15 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     a, b, g = p[0], p[1], p[2]
-    _t0 = half/4
+    _t0 = half/2
     _t1 = op.cos(_t0)
-    _t2 = 1/_t1**4
-    _t3 = op.cos(half/2)
-    _t4 = _t2*_t3*sine2 + cosine2
-    _t5 = sine2/_t1**2
-    _t6 = _t5*op.sin(_t0)**2
-    _t7 = (_t3*_t5 + cosine2)**2
-    return _t2*(16*_t6*_t7*b**2 + a**2*(-4*_t6 + _t7)**2)/(_t4*b*g*(_t6 + 1)**4), 4*_t4*b*g
+    _t2 = _t1 + 1
+    _t3 = 1/_t2**2
+    _t4 = _t3*sine2
+    _t5 = 4*_t1*_t4 + cosine2
+    _t6 = _t4*op.sin(_t0)**2
+    _t7 = (2*_t1*sine2/_t2 + cosine2)**2
+    return 4*_t3*(16*_t6*_t7*b**2 + a**2*(-4*_t6 + _t7)**2)/(_t5*b*g*(_t6 + 1)**4), 4*_t5*b*g
 
 
 MODEL = CompiledModel(

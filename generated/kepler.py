@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 14, input a0162e77d64e, body b134848cf927
+# interface 14, input a0162e77d64e, body dd2d0a4f28d6
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -475,22 +475,21 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
     for i in range(n):
         a, ecc, half = p[0, i], p[1, i], halves[i]
-        _t0 = half/4
-        _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = half/2
-        _t4 = cos(_t3)
-        _t5 = _t1**4
-        _t6 = sin(_t3)**2
-        _t7 = sqrt(4*_t6*(1 - _t6)*(1 - ecc**2) + (-2*_t6 - ecc + 1)**2)
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t4
-        out[2, i] = _t4/_t5
-        out[3, i] = _t6
-        out[4, i] = _t5
+        _t0 = half/2
+        _t1 = sin(_t0)**2
+        _t2 = cos(_t0)
+        _t3 = _t2 + 1
+        _t4 = _t3**2
+        _t5 = 1/_t4
+        _t6 = sqrt(4*_t1*(1 - _t1)*(1 - ecc**2) + (-2*_t1 - ecc + 1)**2)
+        out[0, i] = _t1*_t5
+        out[1, i] = 2*_t2/_t3
+        out[2, i] = 4*_t2*_t5
+        out[3, i] = _t1
+        out[4, i] = _t4/4
         out[5, i] = fabs(a)
-        out[6, i] = 1/_t7
-        out[7, i] = _t7
+        out[6, i] = 1/_t6
+        out[7, i] = _t6
 
 
 @compiled(BOUNDS_BATCH)
@@ -513,29 +512,28 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     a, ecc, k = p[0], p[1], p[2]
     _t0 = abs(a)
-    _t1 = half/4
+    _t1 = half/2
     _t2 = op.cos(_t1)
-    _t3 = 1/_t2**4
-    _t4 = half/2
-    _t5 = op.cos(_t4)
-    _t6 = _t3*_t5*sine2 + cosine2
-    _t7 = sine2/_t2**2
-    _t8 = _t7*op.sin(_t1)**2
+    _t3 = _t2 + 1
+    _t4 = 1/_t3**2
+    _t5 = _t4*sine2
+    _t6 = 4*_t2*_t5 + cosine2
+    _t7 = op.sin(_t1)**2
+    _t8 = _t5*_t7
     _t9 = _t8 + 1
     _t10 = _t9**2
     _t11 = 1/_t10
-    _t12 = op.sin(_t4)**2
-    _t13 = 1 - ecc**2
-    _t14 = op.sqrt(4*_t12*_t13*(1 - _t12) + (-2*_t12 - ecc + 1)**2)
-    _t15 = (_t5*_t7 + cosine2)**2
-    _t16 = 16*_t8
-    _t17 = 4*_t8
-    _t18 = _t10*ecc
-    _t19 = _t10 + _t12*_t18 + _t17*ecc - _t18
-    _t20 = -_t10
-    _t21 = op.sqrt((_t13*_t16*(-_t17 - _t20) + (-_t18 - _t20 - 8*_t8)**2)/_t9**4)
-    _t22 = _t14 + _t21
-    return _t0*_t11*_t14*_t21*_t22*_t3*a**2*(_t13*(_t15 - _t17)**2 + _t15*_t16)/(2*_t19*_t6*ecc*k), 8*_t11*_t19*_t6*ecc*k/(_t0*_t14*_t21*_t22)
+    _t12 = 1 - ecc**2
+    _t13 = op.sqrt(4*_t12*_t7*(1 - _t7) + (-2*_t7 - ecc + 1)**2)
+    _t14 = (2*_t2*sine2/_t3 + cosine2)**2
+    _t15 = 16*_t8
+    _t16 = 4*_t8
+    _t17 = _t10*ecc
+    _t18 = _t10 + _t16*ecc + _t17*_t7 - _t17
+    _t19 = -_t10
+    _t20 = op.sqrt((_t12*_t15*(-_t16 - _t19) + (-_t17 - _t19 - 8*_t8)**2)/_t9**4)
+    _t21 = _t13 + _t20
+    return 2*_t0*_t11*_t13*_t20*_t21*_t4*a**2*(_t12*(_t14 - _t16)**2 + _t14*_t15)/(_t18*_t6*ecc*k), 8*_t11*_t18*_t6*ecc*k/(_t0*_t13*_t20*_t21)
 
 
 MODEL = CompiledModel(

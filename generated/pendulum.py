@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 14, input f60615287831, body c6d9f73771b3
+# interface 14, input f60615287831, body b787ed7d748c
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -306,9 +306,10 @@ def agm_arguments_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
         L, g, half = p[0, i], p[1, i], halves[i]
-        _t0 = g/L
-        out[0, i] = _t0*cos(half/4)**4
-        out[1, i] = _t0*cos(half/2)
+        _t0 = cos(half/2)
+        _t1 = g/L
+        out[0, i] = _t1*(_t0 + 1)**2/4
+        out[1, i] = _t0*_t1
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -337,7 +338,7 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_agm_arguments(op, half, p):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
     L, g = p[0], p[1]
-    return g*op.cos(half/4)**4/L, g*op.cos(half/2)/L
+    return g*(op.cos(half/2) + 1)**2/(4*L), g*op.cos(half/2)/L
 
 
 MODEL = CompiledModel(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 14, input 2a76ceb4277a, body c18d99a27868
+# interface 14, input 2a76ceb4277a, body 798c9ac72462
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -313,9 +313,10 @@ def agm_arguments_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (2, n))
     for i in range(n):
         L, beta, g, half = p[0, i], p[1, i], p[2, i], halves[i]
-        _t0 = g/(L*(beta + 1))
-        out[0, i] = _t0*cos(half/4)**4
-        out[1, i] = _t0*cos(half/2)
+        _t0 = cos(half/2)
+        _t1 = g/(L*(beta + 1))
+        out[0, i] = _t1*(_t0 + 1)**2/4
+        out[1, i] = _t0*_t1
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -345,7 +346,7 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_agm_arguments(op, half, p):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
     L, beta, g = p[0], p[1], p[2]
-    return g*op.cos(half/4)**4/(L*(beta + 1)), g*op.cos(half/2)/(L*(beta + 1))
+    return g*(op.cos(half/2) + 1)**2/(4*L*(beta + 1)), g*op.cos(half/2)/(L*(beta + 1))
 
 
 MODEL = CompiledModel(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 14, input c93b8a64a5a5, body f2b6cc47f5e4
+# interface 14, input c93b8a64a5a5, body 87aaa011cdab
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -392,15 +392,15 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         half = halves[i]
-        _t0 = half/8
+        _t0 = half/4
         _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = cos(half/4)
-        _t4 = _t1**4
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t3
-        out[2, i] = _t3/_t4
-        out[3, i] = _t4
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        out[0, i] = _t4*sin(_t0)**2
+        out[1, i] = 2*_t1/_t2
+        out[2, i] = 4*_t1*_t4
+        out[3, i] = _t3/4
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -430,15 +430,16 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     a, g = p[0], p[1]
-    _t0 = half/8
+    _t0 = half/4
     _t1 = op.cos(_t0)
-    _t2 = 1/_t1**4
-    _t3 = op.cos(half/4)
-    _t4 = _t2*_t3*sine2 + cosine2
-    _t5 = sine2/_t1**2
-    _t6 = _t5*op.sin(_t0)**2
-    _t7 = (_t6 + 1)**4
-    return 2*_t2*a*(16*_t6*(_t3*_t5 + cosine2)**2 + _t7)/(_t4*_t7*g), 8*_t4*a*g
+    _t2 = _t1 + 1
+    _t3 = 1/_t2**2
+    _t4 = _t3*sine2
+    _t5 = _t4*op.sin(_t0)**2
+    _t6 = (_t5 + 1)**4
+    _t7 = 4*_t1*_t4 + cosine2
+    _t8 = 8*a
+    return _t3*_t8*(16*_t5*(2*_t1*sine2/_t2 + cosine2)**2 + _t6)/(_t6*_t7*g), _t7*_t8*g
 
 
 MODEL = CompiledModel(

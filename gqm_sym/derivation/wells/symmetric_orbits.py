@@ -137,14 +137,14 @@ def symmetric_orbits(
     by_square = {_SINE: 4 * Y / more**2, _COSINE: less**2 / more**2}
     divisor = sp.together(slope.xreplace(by_square)) * ONE_MINUS_YT  # each takes one division
     integrand = 4 * sp.together(metric.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
-    sine, cosine = waves.sine(rate * HALF / 4), waves.cosine(rate * HALF / 4)
-    double = waves.cosine(rate * HALF / 2)
+    # The squares of a cosine and a tangent of half an argument, by functions of the argument itself.
+    sine, cosine = waves.sine(rate * HALF / 2), waves.cosine(rate * HALF / 2)
     invariants = (
-        (T, (sine / cosine) ** 2),
-        (ONE_MINUS_T, (double if waves.sign < 0 else 1) / cosine**2),
-        (ONE_MINUS_TT, double / cosine**4),
-        (SINE_SQUARED, waves.sine(rate * HALF / 2) ** 2),
-        (COSINE_FOURTH, cosine**4),
+        (T, (sine / (1 + cosine)) ** 2),
+        (ONE_MINUS_T, (2 * cosine if waves.sign < 0 else 2) / (1 + cosine)),
+        (ONE_MINUS_TT, 4 * cosine / (1 + cosine) ** 2),
+        (SINE_SQUARED, sine**2),
+        (COSINE_FOURTH, (1 + cosine) ** 2 / 4),
     )
     degrees = [_degree_inside(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
     cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
