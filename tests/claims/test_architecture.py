@@ -107,6 +107,7 @@ TESTED_THROUGH = {
     "gradients/charts/orbit.py": "runtime/gradients/test_charts.py",
     "gradients/charts/programs.py": "runtime/gradients/test_charts.py",
     "gradients/charts/shaped_pieces.py": "runtime/gradients/test_charts.py",
+    "gradients/charts/space_programs.py": "runtime/gradients/test_space_charts.py",
     "gradients/evaluation.py": "runtime/gradients/test_quantities.py",
     "gradients/formula_orbit.py": "runtime/gradients/test_quantities.py",
     "gradients/lanes/assembly.py": "runtime/gradients/lanes/test_differences.py",

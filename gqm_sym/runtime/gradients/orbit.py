@@ -12,6 +12,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.gradients.programs import AnySource
+from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import Formulas
 
 
@@ -27,8 +28,9 @@ def requested_quantity(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
-        "gradients: there are none along tracks in space without formulas, tracks of rolling bodies with a radius or "
-        "of trains, and curves that are known in doubles only; declare the curve by formulas"
+        "gradients: there are none along tracks of rolling bodies with a radius or of trains, with losses along "
+        "tracks in space without formulas, and along curves that are known in doubles only; declare the curve by "
+        "formulas"
     )
 
 
@@ -41,10 +43,11 @@ def check_force(formulas: Formulas, quantity: str) -> None:
         If the quantity depends on the contact force, and that has neither a sign nor a formula.
     """
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
+    has_force = has_force or (isinstance(formulas.exact, ExactPotential) and not formulas.directed)
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
-            f"gradients: there are none of {quantity}, because the contact force has no known derivatives along points "
-            "and pieces in space, nor on a space curve in a rotating frame"
+            f"gradients: there are none of {quantity}, because the contact force has no known derivatives on a space "
+            "curve in a rotating frame, nor with losses along points and pieces in space"
         )
 
 

@@ -68,9 +68,7 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
-        formulas = self.problem.formulas
-        is_planar = formulas.path_in_space is None and not formulas.rolling_radius
-        if not is_planar or self.problem.true_pieces is None or self.problem.tape is None:
+        if self.problem.formulas.rolling_radius or self.problem.true_pieces is None or self.problem.tape is None:
             raise without_formulas()
         passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
         if passage is None:

@@ -32,10 +32,11 @@ from gqm_sym.runtime.gradients.charts.programs import (
     speed_program,
 )
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_path_program
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
-from gqm_sym.runtime.gradients.path import PathRows
+from gqm_sym.runtime.gradients.path import PRODUCT, PathRows
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
@@ -94,9 +95,8 @@ def source_along(problem: Problem) -> ChartSource:
     formulas = problem.formulas
     assert isinstance(formulas.exact, ExactPotential)
     names = list(formulas.parameters)
-    return ChartSource(
-        formulas.exact.effective_potential, formulas.inertia, len(names), names.index("m"), shaping_of(formulas)
-    )
+    kind, potential = ChartSource if formulas.path_in_space is None else SpaceSource, formulas.exact.effective_potential
+    return kind(potential, formulas.inertia, len(names), names.index("m"), shaping_of(formulas))
 
 
 class ChartOrbitDerivatives(OrbitDerivatives):
@@ -162,8 +162,9 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             beyond = (column[1] - edge) + column[2]
             if abs(beyond) <= AT_EDGE:
                 both = np.array([[column[0], column[0] + edge], [edge, -edge], [0.0, 0.0]])
-                dx, dz = self._shape.coordinates(both)[4:8:2]
-                speeds = np.hypot(dx, dz)
+                d = self._shape.dimension
+                rates = self._shape.coordinates(both)[2 * d : 4 * d : 2]
+                speeds = np.hypot(*rates) if d == 2 else np.linalg.norm(rates, axis=0)
                 column[:] = column[0] + edge, -edge, beyond * speeds[0] / speeds[1]
         return turns
 
@@ -282,8 +283,10 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` at arc lengths, with derivatives at the points of the curve."""
         path = self._shape.path(self._shape.places(lam))
-        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:], parts=1)
-        return PathRows(found.reshape(6, self.source.parameters + 2, lam.size))
+        in_space = isinstance(self.source, SpaceSource)
+        program = space_path_program(self.source) if in_space else chart_path_program(self.source)
+        found = values(program, self.parameters, path[0], None, *path[1:], parts=1)
+        return PathRows(found.reshape(8 if in_space else 6, self.source.parameters + 2, lam.size))
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
         """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
@@ -300,7 +303,10 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             force = [2.0 * rows[0] * mass_curvature[0] + load[0]]
             force.append(2.0 * (rows[1] * mass_curvature[0] + rows[0] * mass_curvature[-1]) + load[-1])
             partials = [np.vstack([row[1:-1], by_variables]) for row in (mass_curvature, load)]
-            rows = np.vstack([*force, 2.0 * (rows[2:] * mass_curvature[0] + rows[0] * partials[0]) + partials[1]])
+            of_variables = 2.0 * (rows[2:] * mass_curvature[0] + rows[0] * partials[0]) + partials[1]
+            if isinstance(self.source, SpaceSource):
+                force, of_variables = _length_rows(path, rows)
+            rows = np.vstack([*force, of_variables])
         here, before, after = np.moveaxis(rows.reshape(len(rows), 3, place.size), 1, 0)
         curvature = (after[1] - before[1]) / (steps[2] - steps[1])
         return np.vstack([here[:2], curvature, here[2:]])
@@ -310,6 +316,25 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         moved = moved.copy()
         moved[list(self.source.shaping)] -= self._shape.shifts(self._shape.places(lam))[:, 0]
         return moved
+
+
+def _length_rows(path: PathRows, rows: Array) -> tuple[list[Array], Array]:
+    """Return the length of the contact force along a path and its derivative with respect to the place, and those with
+    respect to all variables, given half of V**2 with its derivatives in the same order.
+    """
+    curvature, load, product, w = path.curvature, path.load, path.rows[PRODUCT], 2.0 * rows[0]
+    length = np.sqrt((curvature[0] * w) ** 2 + 2.0 * product[0] * w + load[0] ** 2)
+    by_half = 2.0 * (curvature[0] ** 2 * w + product[0])
+
+    def change(of_curvature: Array, of_product: Array, of_load: Array, of_half: Array) -> Array:
+        at_rest = curvature[0] * of_curvature * w**2 + of_product * w + load[0] * of_load
+        changed: Array = (at_rest + by_half * of_half) / length
+        return changed
+
+    none = np.zeros((LAUNCH_VARIABLES, length.size))
+    bent, mixed, still = (np.vstack([row[1:-1], none]) for row in (curvature, product, load))
+    along = change(curvature[-1], product[-1], load[-1], rows[1])
+    return [length, along], change(bent, mixed, still, rows[2:])
 
 
 def _sum(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:

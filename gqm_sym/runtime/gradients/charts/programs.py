@@ -16,9 +16,12 @@ from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, LocalMotion, Program, assemble
 
-# The number of coordinates of a point (x, z, their derivatives with respect to u, and the curvature), and that of a
-# displacement.
-POINT, DISPLACEMENT = 5, 2
+
+def size_of_point(dimension: int) -> int:
+    """Return the number of coordinates of a point: those of its place, their derivatives with respect to u, and the
+    curvature.
+    """
+    return 5 if dimension == 2 else 9
 
 
 class ChartSource(NamedTuple):
@@ -43,6 +46,11 @@ class ChartSource(NamedTuple):
     shaping: tuple[int, ...]
 
     @property
+    def dimension(self) -> int:
+        """The number of coordinates of a place."""
+        return 2
+
+    @property
     def variables(self) -> int:
         """The number of variables of differentiation."""
         return self.parameters + LAUNCH_VARIABLES
@@ -55,7 +63,7 @@ class ChartSource(NamedTuple):
     @property
     def point(self) -> int:
         """The coordinates of a point, and those of its displacements."""
-        return POINT + DISPLACEMENT * len(self.shaping)
+        return size_of_point(self.dimension) + self.dimension * len(self.shaping)
 
     @property
     def coordinates(self) -> int:
@@ -76,9 +84,19 @@ class ChartSource(NamedTuple):
     def _displacements(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
         """Return the displacement of a point to the left of the curve by each parameter that shapes it."""
         dx, dz = numbers[2:4]
-        moves = [numbers[POINT + i : POINT + i + 2] for i in range(0, self.point - POINT, DISPLACEMENT)]
+        moves = self._moves(numbers)
         speed = op.sqrt(dx * dx + dz * dz)
         return [(k, (z * dx - x * dz) / speed) for k, (x, z) in zip(self.shaping, moves, strict=True)]
+
+    def _moves(self, numbers: Sequence[TapeNumber]) -> list[Sequence[TapeNumber]]:
+        """Return the displacement of a point by each parameter that shapes the curve."""
+        return [
+            numbers[i : i + self.dimension] for i in range(size_of_point(self.dimension), self.point, self.dimension)
+        ]
+
+    def _strains(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
+        """Return the relative change of arc length at a point with each parameter that shapes the curve."""
+        return [(k, -(numbers[4] * across)) for k, across in self._displacements(op, numbers)]
 
     def local(self, op: Recorder, lam: TapeNumber) -> LocalMotion:
         """Record the motion at the point with the given coordinates."""
@@ -91,8 +109,8 @@ class ChartSource(NamedTuple):
             by_parameters[k] = by_parameters[k] - launch_slope * shift
         half, one, zero = (v0 * v0 / 2 + energy) + (launched - value), op.number(1), op.number(0)
         strains = [zero] * self.parameters
-        for k, across in self._displacements(op, op.places[1:]):
-            strains[k] = -(op.places[POINT] * across)
+        for k, strain in self._strains(op, op.places[1:]):
+            strains[k] = strain
         return LocalMotion(half, -slope, [*by_parameters, launch_slope, v0, one], one, zero, strains)
 
     def one_plus_beta(self, op: Recorder) -> TapeNumber:

@@ -16,11 +16,19 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.charts.double_double.pieces import (
+    DX,
+    DY,
+    DZ,
+    IN_SAMPLES,
     NODES,
     TRUE_CURVE,
     TruePieces,
+    X,
+    Y,
+    Z,
     chebyshev_fit,
     fill_points,
+    is_in_space,
     place_at,
     sample_places,
     stacked_places,
@@ -32,9 +40,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, multiply
 from gqm_sym.runtime.double_double.nodes import RULE
-from gqm_sym.runtime.gradients.charts.programs import (
-    POINT,
-)
+from gqm_sym.runtime.gradients.charts.programs import size_of_point
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.launch.formulas import Formulas, true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
@@ -63,13 +69,17 @@ def fill_places(curve, number, lengths, places):  # type: ignore[no-untyped-def]
 
 @entry(types.void(TRUE_CURVE, MATRIX, MATRIX), checked=False)
 def fill_coordinates(curve, places, rows):  # type: ignore[no-untyped-def]
-    """Fill x, z and their derivatives with respect to u, two doubles each, at places."""
+    """Fill x and z, in space x, y and z, and then their derivatives with respect to u, two doubles each, at places."""
     curve, u, points = unshared(curve), stacked_places(), stacked_points()
     for i in range(places.shape[1]):
         u[0], u[RULE] = places[1, i], places[2, i]
         fill_points(curve, int(places[0, i]), 1, u, points)
-        for row in range(8):
-            rows[row, i] = points[row * RULE]
+        if is_in_space(curve):
+            for k, column in enumerate((X, Y, Z, DX, DY, DZ)):
+                rows[2 * k, i], rows[2 * k + 1, i] = points[column], points[column + RULE]
+        else:
+            for row in range(8):
+                rows[row, i] = points[row * RULE]
 
 
 @entry(types.void(TRUE_CURVE, INTEGER, MATRIX, MATRIX), checked=False)
@@ -120,6 +130,18 @@ class ShapedPieces:
         self._smoothed: dict[int, Array] = {}
         self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]
 
+    @property
+    def dimension(self) -> int:
+        """The number of coordinates."""
+        rows: int = self.pieces.curve.terms.shape[1]
+        return rows // 2
+
+    @property
+    def _terms(self) -> Array:
+        """The coefficients of the coordinates in doubles."""
+        terms: Array = self.pieces.curve.terms[:, ::2]
+        return terms if self.dimension == 2 else terms[:, IN_SAMPLES]
+
     def _make(self, first: int, last: int) -> None:
         """Make the pieces of all curves from one piece number to another."""
         for side in (self.pieces, *(side for _, *sides in self._beside for side in sides)):
@@ -130,17 +152,17 @@ class ShapedPieces:
         programs take.
         """
         self._make(int(places[0].min()), int(places[0].max()))
-        rows, curvature = [np.empty((8, places.shape[1]))], np.zeros((2, places.shape[1]))
+        d = self.dimension
+        rows, curvature = [np.empty((4 * d, places.shape[1]))], np.zeros((2 if d == 2 else 6, places.shape[1]))
         fill_coordinates(self.pieces.curve, places, rows[0])
         if self._beside:
-            _, _, dx, dz, bend_x, bend_z = _derivatives(self.pieces.curve.terms[:, ::2], places, 3)
-            curvature[0] = (dx * bend_z - dz * bend_x) / (dx * dx + dz * dz) ** 1.5
+            curvature[::2] = _curvature(_derivatives(self._terms, places, 3)[d:])
         rows.append(curvature)
         for step, *sides in self._beside:
             before, after = np.empty((2, *rows[0].shape))
             fill_coordinates(sides[0].curve, places, before)
             fill_coordinates(sides[1].curve, places, after)
-            rows.append(_quotient(before[:4], after[:4], step))
+            rows.append(_quotient(before[: 2 * d], after[: 2 * d], step))
         return np.concatenate(rows)
 
     def places(self, high: Array, low: Array | float = 0.0) -> Array:
@@ -171,10 +193,15 @@ class ShapedPieces:
         """Return the increase of the arc length from the start point to the points of the curve at places: a row for
         each parameter.
         """
-        rows = self.coordinates(places)[::2]
-        (dx, dz), moved = rows[2:4], rows[POINT:]
+        rows, d = self.coordinates(places)[::2], self.dimension
+        if d == 2:
+            (dx, dz), moved = rows[2:4], rows[size_of_point(d) :]
+            along = (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        else:
+            rates, moved = rows[d : 2 * d], rows[size_of_point(d) :].reshape(-1, d, places.shape[1])
+            along = (moved * rates).sum(axis=1) / np.sqrt((rates * rates).sum(axis=0))
         # Points of equal u are displaced along the curve as well.
-        shifts: Array = self.arc_length_changes(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        shifts: Array = self.arc_length_changes(places) - along
         return shifts
 
     def path(self, places: Array, orders: int = 4) -> Array:
@@ -183,25 +210,25 @@ class ShapedPieces:
         """
         if places.size:
             self._make(int(places[0].min()), int(places[0].max()))
-        rows = [_derivatives(self.pieces.curve.terms[:, ::2], places, orders)]
+        d, rows = self.dimension, [_derivatives(self._terms, places, orders)]
         if self._beside:
             count = len(self.pieces.curve.counts)
             for k in np.unique(places[0].astype(np.int64) % count).tolist():
                 if k not in self._smoothed:
                     self._smoothed[k] = self._smooth(k)
-            terms = np.zeros((count, 2 * len(self._beside), NODES))
+            terms = np.zeros((count, d * len(self._beside), NODES))
             for k, found in self._smoothed.items():
                 terms[k] = found
-            rows += [_derivatives(terms[:, 2 * i : 2 * i + 2], places, 3) for i in range(len(self._beside))]
+            rows += [_derivatives(terms[:, d * i : d * i + d], places, 3) for i in range(len(self._beside))]
         return np.concatenate(rows)
 
     def _smooth(self, k: int) -> Array:
-        """Return the displacements of x and z on a piece, for each parameter, as coefficients of powers of u.
+        """Return the displacements of the coordinates on a piece, for each parameter, as coefficients of powers of u.
 
         The Chebyshev series are cut where their coefficients are rounding, so that derivatives do not amplify it.
         """
         places = np.array([np.full(NODES, float(k)), *sample_places()])
-        samples = self.coordinates(places)[2 * POINT :]
+        samples = self.coordinates(places)[2 * size_of_point(self.dimension) :]
         series = np.empty((len(samples) // 2, NODES))
         fill_series(samples, chebyshev_fit(), series)
         powers = np.zeros_like(series)
@@ -235,6 +262,18 @@ def _quotient(before: Array, after: Array, step: float) -> Array:
     out = np.empty_like(before)
     out[::2], out[1::2] = total / (2.0 * step), ((high - total) + low) / (2.0 * step)
     return out
+
+
+def _curvature(derivatives: Array) -> Array:
+    """Return the curvature, in space as a vector, from the first two derivatives of the coordinates."""
+    if len(derivatives) == 4:
+        dx, dz, bend_x, bend_z = derivatives
+        bend: Array = (dx * bend_z - dz * bend_x) / (dx * dx + dz * dz) ** 1.5
+        return bend
+    rates, bends = derivatives[:3], derivatives[3:]
+    square = (rates * rates).sum(axis=0)
+    across: Array = (bends - rates * ((rates * bends).sum(axis=0) / square)) / square
+    return across
 
 
 def _derivatives(terms: Array, places: Array, count: int) -> Array:

@@ -16,8 +16,9 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     has_converged,
 )
 
-# The largest numbers of intervals of the trapezoidal rule, in successive passes over the orbits that are left.
-PASSES = (32, 128, 256)
+# The largest numbers of intervals of the trapezoidal rule, in successive passes over the orbits that are left. More of
+# them would take longer than double-double arithmetic.
+PASSES = (32, 128)
 
 # The smallest ratio of the smallest to the largest regular factor of V**2.
 MIN_FACTOR_RATIO = 0.1
