@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 14, input 2558bd3a8d44, body 4fc548cd8e49
+# interface 14, input 2558bd3a8d44, body 776eb32d1e22
 """Bead on a hanging chain
 
 x              = x
@@ -369,8 +369,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',),
-    source=__file__, load_map=load_map,
+    name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',), source=__file__,
     units={'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -380,7 +379,7 @@ MODEL = CompiledModel(
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=4,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 14, input 8861fdb976fb, body fd0e93796c68
+# interface 14, input 8861fdb976fb, body 0b96c06e84be
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -342,8 +342,7 @@ def exact_agm_arguments(op, half, p):
 
 
 MODEL = CompiledModel(
-    name='circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__, load_map=load_map,
+    name='circle', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -353,7 +352,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=2,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, agm_arguments=exact_agm_arguments,

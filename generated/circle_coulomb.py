@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 14, input b0d8ff0ac753, body f4f74acefc85
+# interface 14, input b0d8ff0ac753, body 251cc275532a
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -243,8 +243,7 @@ def equilibria(*, between: Any = None, L: Any = '1', mu: Any = '0.15', mu_static
 
 
 MODEL = CompiledModel(
-    name='circle_coulomb', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    name='circle_coulomb', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'g': 'm/s**2', 'm': 'kg', 'mu': '1', 'mu_static': '1', 'theta': '1'},
     at_least=(('mu', '0'), ('mu_static', 'mu')),
     functions=CompiledFunctions(

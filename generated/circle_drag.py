@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 14, input f2f11f54325e, body 577ce8364541
+# interface 14, input f2f11f54325e, body 4aec8ca1ac75
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -240,8 +240,7 @@ def equilibria(*, between: Any = None, L: Any = '1', b: Any = '0.1', g: Any = '9
 
 
 MODEL = CompiledModel(
-    name='circle_drag', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    name='circle_drag', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'b': 'kg/m', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('b', '0'),),
     functions=CompiledFunctions(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 14, input 38113942f710, body dfd5718c5fd1
+# interface 14, input 38113942f710, body cd9a234555bb
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -242,8 +242,7 @@ def equilibria(*, between: Any = None, L: Any = '0.02', gamma: Any = '0.072', el
 
 
 MODEL = CompiledModel(
-    name='circle_droplet', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    name='circle_droplet', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'theta': '1'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
     functions=CompiledFunctions(

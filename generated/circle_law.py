@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 14, input 2718db879066, body 467b6bfa2d65
+# interface 14, input 2718db879066, body a17eaed84a9d
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -245,8 +245,7 @@ def equilibria(*, between: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any =
 
 
 MODEL = CompiledModel(
-    name='circle_law', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__,
+    name='circle_law', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'c1': '1/m', 'c2': 's**2/m**3', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 14, input a74aedd594f9, body c974640f40e1
+# interface 14, input a74aedd594f9, body 4e62a0bee912
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -402,8 +402,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__, load_map=load_map,
+    name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'Omega': '1/s', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -414,7 +413,7 @@ MODEL = CompiledModel(
         integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
         orbit_rows=4, integrand_rows=4,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

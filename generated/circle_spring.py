@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 14, input bcc7b1afa151, body b14b0107122b
+# interface 14, input bcc7b1afa151, body 868062bb872a
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -399,8 +399,7 @@ def exact_agm_arguments(op, half, p):
 
 
 MODEL = CompiledModel(
-    name='circle_spring', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__, load_map=load_map,
+    name='circle_spring', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'g': 'm/s**2', 'h': 'm', 'm': 'kg', 'theta': '1', 'w': '1/s'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -410,7 +409,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=8,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, agm_arguments=exact_agm_arguments,

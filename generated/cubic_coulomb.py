@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 14, input f472752dd3ba, body 66a9687f555d
+# interface 14, input f472752dd3ba, body 3794db2d8f5d
 """Cubic track with Coulomb friction
 
 x              = x
@@ -246,8 +246,7 @@ def equilibria(*, between: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any 
 
 
 MODEL = CompiledModel(
-    name='cubic_coulomb', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='cubic_coulomb', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 'mu': '1', 'x': 'm'},
     at_least=(('mu', '0'),),
     functions=CompiledFunctions(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 14, input 01e055bdd46f, body 9780c9f2d04b
+# interface 14, input 01e055bdd46f, body 43095703099d
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -364,8 +364,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='cycloid_inverted', parameter='theta', parameters=PARAMETERS, positive=('R',),
-    source=__file__, load_map=load_map,
+    name='cycloid_inverted', parameter='theta', parameters=PARAMETERS, positive=('R',), source=__file__,
     units={'R': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -375,7 +374,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
         integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=4, integrand_rows=4,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

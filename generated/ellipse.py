@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 14, input 81dc4ee20e82, body 0b310b95cd17
+# interface 14, input 81dc4ee20e82, body 20f618acfcdc
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -390,8 +390,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
-    source=__file__, load_map=load_map,
+    name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'), source=__file__,
     units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -402,7 +401,7 @@ MODEL = CompiledModel(
         integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
         orbit_rows=4, integrand_rows=4,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 14, input f2717a5ad91f, body ba11714c0335
+# interface 14, input f2717a5ad91f, body ab55e8662fa5
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -254,8 +254,7 @@ def equilibria(*, between: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any 
 
 
 MODEL = CompiledModel(
-    name='ellipse_drag', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
-    source=__file__,
+    name='ellipse_drag', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'), source=__file__,
     units={'a': 'm', 'b': 'm', 'b_air': 'kg/m', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('b_air', '0'),),
     functions=CompiledFunctions(

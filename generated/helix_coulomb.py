@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 14, input 3f2dfaf376e9, body 4fd87e63608e
+# interface 14, input 3f2dfaf376e9, body 8da3f9a89d63
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -343,8 +343,7 @@ def equilibria(*, between: Any = None, R: Any = '2', c: Any = '-1.1', mu: Any = 
 
 
 MODEL = CompiledModel(
-    name='helix_coulomb', parameter='theta', parameters=PARAMETERS, positive=('R',),
-    source=__file__,
+    name='helix_coulomb', parameter='theta', parameters=PARAMETERS, positive=('R',), source=__file__,
     units={'R': 'm', 'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'mu': '1', 'theta': '1'},
     at_least=(('mu', '0'),),
     functions=CompiledFunctions(

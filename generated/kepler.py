@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 14, input a0162e77d64e, body dd2d0a4f28d6
+# interface 14, input a0162e77d64e, body eff4b42030c7
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -537,8 +537,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
-    source=__file__, load_map=load_map,
+    name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',), source=__file__,
     units={'E': '1', 'a': 'm', 'ecc': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -548,7 +547,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
         integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=15, integrand_rows=8,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

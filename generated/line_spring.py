@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 14, input 702c9ef6b67b, body 43be2b7d61b2
+# interface 14, input 702c9ef6b67b, body a37be2b147a6
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -319,8 +319,7 @@ def exact_agm_arguments(op, half, p):
 
 
 MODEL = CompiledModel(
-    name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__, load_map=load_map,
+    name='line_spring', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 'w': '1/s', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -329,7 +328,7 @@ MODEL = CompiledModel(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         agm_arguments=agm_arguments_batch, turning_point=turning_point_batch, bounds=bounds_batch,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, agm_arguments=exact_agm_arguments,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 14, input a497e433309c, body 24c35208e0c3
+# interface 14, input a497e433309c, body 58e62e411463
 """Loop of a roller coaster
 
 x              = x(s)
@@ -248,8 +248,7 @@ CHART = Rail(
 
 
 MODEL = CompiledModel(
-    name='loop', parameter='s', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='loop', parameter='s', parameters=PARAMETERS, positive=(), source=__file__,
     units={'R': 'm', 'a': 'm', 'c': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 14, input 2c8bf584b06a, body 5501076dd56b
+# interface 14, input 2c8bf584b06a, body f79804d1b01e
 """Bead in a parabolic bowl
 
 x              = x
@@ -341,8 +341,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='parabola', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__, load_map=load_map,
+    name='parabola', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -352,7 +351,7 @@ MODEL = CompiledModel(
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

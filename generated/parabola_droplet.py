@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 14, input 016fa3c6503a, body cb9fc0b1b40f
+# interface 14, input 016fa3c6503a, body 674632f9cb83
 """Droplet in a parabolic channel
 
 x              = x
@@ -252,8 +252,7 @@ def equilibria(*, between: Any = None, a: Any = '0.5', gamma: Any = '0.5', ell_c
 
 
 MODEL = CompiledModel(
-    name='parabola_droplet', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='parabola_droplet', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': '1/m', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'x': 'm'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
     functions=CompiledFunctions(

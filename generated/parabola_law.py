@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 14, input 6669068dcbd5, body 4780c6254e18
+# interface 14, input 6669068dcbd5, body cb6f6ef34587
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -253,8 +253,7 @@ def equilibria(*, between: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any =
 
 
 MODEL = CompiledModel(
-    name='parabola_law', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='parabola_law', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'r': 'm/s**2', 'w1': 'm**2/s**2', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force,

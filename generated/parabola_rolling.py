@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 14, input 6fc25406b912, body fd92ea234627
+# interface 14, input 6fc25406b912, body 990cde34f126
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -430,8 +430,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__, load_map=load_map,
+    name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': '1/m', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'rho': 'm', 'x': 'm'},
     at_least=(('beta', '0'),),
     rolling_radius='rho',
@@ -444,7 +443,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
         integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=4, integrand_rows=3,
     ),
-    domain_of=exact_domain, axes_of=exact_axes,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

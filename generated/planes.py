@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 14, input 1c6e3a707056, body 56379fcf7f33
+# interface 14, input 1c6e3a707056, body 84194e7dc6d6
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -299,8 +299,7 @@ CHART = Sampled(POINTS, kind='linear', closed=False)
 
 
 MODEL = CompiledModel(
-    name='planes', parameter='s', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='planes', parameter='s', parameters=PARAMETERS, positive=(), source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

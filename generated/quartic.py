@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 14, input 79764b04feb4, body ec9621cd97fe
+# interface 14, input 79764b04feb4, body 5bb7f05549e0
 """Bead in a quartic bowl
 
 x              = x
@@ -337,8 +337,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='quartic', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__, load_map=load_map,
+    name='quartic', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -348,7 +347,7 @@ MODEL = CompiledModel(
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 14, input 2a76ceb4277a, body 798c9ac72462
+# interface 14, input 2a76ceb4277a, body a723b348a935
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -350,8 +350,7 @@ def exact_agm_arguments(op, half, p):
 
 
 MODEL = CompiledModel(
-    name='rolling_circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
-    source=__file__, load_map=load_map,
+    name='rolling_circle', parameter='theta', parameters=PARAMETERS, positive=('L',), source=__file__,
     units={'L': 'm', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('beta', '0'),),
     functions=CompiledFunctions(
@@ -363,7 +362,7 @@ MODEL = CompiledModel(
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=2,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, agm_arguments=exact_agm_arguments,

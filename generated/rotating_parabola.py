@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 14, input 33421e752297, body 0f6f3e46c554
+# interface 14, input 33421e752297, body dad46855048d
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -349,8 +349,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='rotating_parabola', parameter='x', parameters=PARAMETERS, positive=(),
-    source=__file__, load_map=load_map,
+    name='rotating_parabola', parameter='x', parameters=PARAMETERS, positive=(), source=__file__,
     units={'Omega': '1/s', 'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -360,7 +359,7 @@ MODEL = CompiledModel(
         time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
         turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, time_integrand=exact_time_integrand,

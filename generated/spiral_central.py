@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 14, input cd2a37956d84, body 7391f5950a23
+# interface 14, input cd2a37956d84, body 6edd7440558d
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -333,8 +333,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 
 MODEL = CompiledModel(
-    name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
-    source=__file__, load_map=load_map,
+    name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',), source=__file__,
     units={'b': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -343,7 +342,7 @@ MODEL = CompiledModel(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,
     ),
-    domain_of=exact_domain,
+    domain_of=exact_domain, load_map=load_map,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope,

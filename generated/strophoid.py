@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 14, input 761b603021f8, body 9d56b0e8b1ed
+# interface 14, input 761b603021f8, body 11372a93446c
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -280,8 +280,7 @@ CHART = Traced(field=field.address, start=exact_start, tangent=-1, level=exact_l
 
 
 MODEL = CompiledModel(
-    name='strophoid', parameter='s', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='strophoid', parameter='s', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 14, input fe6d2f95d843, body 996597e9a4de
+# interface 14, input fe6d2f95d843, body ac518f29056e
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -273,8 +273,7 @@ CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_le
 
 
 MODEL = CompiledModel(
-    name='superellipse', parameter='s', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='superellipse', parameter='s', parameters=PARAMETERS, positive=(), source=__file__,
     units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

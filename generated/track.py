@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 14, input e49691f04fda, body 130d81626146
+# interface 14, input e49691f04fda, body 727594474f97
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -299,8 +299,7 @@ CHART = Sampled(POINTS, kind='spline', closed=False)
 
 
 MODEL = CompiledModel(
-    name='track', parameter='s', parameters=PARAMETERS, positive=(),
-    source=__file__,
+    name='track', parameter='s', parameters=PARAMETERS, positive=(), source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

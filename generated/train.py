@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 14, input b87305fcd75e, body 6c863c0fdce4
+# interface 14, input b87305fcd75e, body 77a2ffb95566
 """A train of five cars on hills
 
 x              = x(s)
@@ -301,8 +301,7 @@ CHART = TrackOfTrain(Sampled(POINTS, kind='spline', closed=False), cars=5, numbe
 
 
 MODEL = CompiledModel(
-    name='train', parameter='s', parameters=PARAMETERS, positive=('length',),
-    source=__file__,
+    name='train', parameter='s', parameters=PARAMETERS, positive=('length',), source=__file__,
     units={'g': 'm/s**2', 'length': 'm', 'm': 'kg', 's': 'm'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 14, input c93b8a64a5a5, body 87aaa011cdab
+# interface 14, input c93b8a64a5a5, body 85a247af44ea
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -443,8 +443,7 @@ def exact_time_integrand(op, half, sine2, cosine2, p):
 
 
 MODEL = CompiledModel(
-    name='viviani', parameter='theta', parameters=PARAMETERS, positive=('a',),
-    source=__file__, load_map=load_map,
+    name='viviani', parameter='theta', parameters=PARAMETERS, positive=('a',), source=__file__,
     units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
@@ -456,7 +455,7 @@ MODEL = CompiledModel(
         integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
         orbit_rows=4, integrand_rows=4,
     ),
-    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
         exact_effective_potential_slope, exact_y, exact_load_along_curvature, time_integrand=exact_time_integrand,
