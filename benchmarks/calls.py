@@ -25,7 +25,7 @@ from gqm_sym.runtime.legs.leg_segments import Run, read_panels
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature import time_panels, trapezoid
 from gqm_sym.runtime.sweep import quantities
-from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points
+from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points, wells
 
 
 def conservative() -> list[tuple[str, float]]:
@@ -92,8 +92,8 @@ def sweeping() -> list[tuple[str, float]]:
     each, n = pendulum.MODEL.batch, rows.BATCH
     assert each is not None
     fns, held = each.addresses(), (each.orbit_rows, each.integrand_rows)
-    start_search, search_zeros, start_search_behind, prove = (
-        getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "prove")
+    start_search, search_zeros, start_search_behind, set_ends, prove = (
+        getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "set_ends", "prove")
     )
     by_trapezoid, by_agm = times.times_by_trapezoid, times.half_periods_by_agm
     start = np.zeros((rows.ROWS, n))
@@ -109,12 +109,16 @@ def sweeping() -> list[tuple[str, float]]:
     scratch = rows.Scratch(count, held, chosen, chosen.copy(), work)
     answers = quantities.Answers(np.zeros((n, 1)), status, status.copy())
 
+    unknown = wells.Wells(np.zeros(0, dtype=np.int64), nan, np.empty((count, rows.LANES)), np.empty((6, rows.LANES)))
+
     @njit
     def search(s: Any, start: Any, p: Any, known: Any, monotone: bool, work: Any) -> None:
         s[:] = start
-        start_search(fns, n, s, p, known, monotone, work)
+        start_search(fns, n, s, p, known, monotone, unknown, work)
         search_zeros(fns, n, s, p, work)
-        start_search_behind(n, s)
+        start_search_behind(fns, n, s, p, monotone, work)
+        search_zeros(fns, n, s, p, work)
+        set_ends(n, s)
 
     @njit
     def proof(s: Any, found: Any, p: Any, work: Any) -> None:
@@ -134,10 +138,7 @@ def sweeping() -> list[tuple[str, float]]:
     s, flat = start.copy(), given.copy()
     orbits = rows.Orbits(n, s, flat)
     search(s, start, p, known, True, work)
-    found, other = s.copy(), s[rows.END_LOW]
-    found[rows.OFFSET_LOW], found[rows.OFFSET_HIGH] = np.minimum(other, 0.0), np.maximum(other, 0.0)
-    found[rows.END_LOW] = found[rows.LAUNCH_PLACE] + found[rows.OFFSET_LOW]
-    found[rows.END_HIGH] = found[rows.LAUNCH_PLACE] + found[rows.OFFSET_HIGH]
+    found = s.copy()
     return [
         (
             "turning points of an orbit in a sweep: in closed form",
