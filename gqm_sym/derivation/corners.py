@@ -81,9 +81,10 @@ def check_cusps(curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> None:
             except (ArithmeticError, TypeError, ValueError):
                 continue
             if beside <= MAX_DERIVATIVE * max(abs(other(low)), abs(other(high))):
+                place = f"{lam.name} = {round(at, 9) + 0.0:.6g}"
                 raise DeclarationError(
-                    f"rolling: the {curve.kind} curve has a cusp at {lam.name} = {round(at, 9):.6g}, where the centre "
-                    "of a body with a radius has no path beside it; end the domain there, or leave the radius out"
+                    f"rolling: the {curve.kind} curve has a cusp at {place}, where the centre of a body with "
+                    "a radius has no path beside it; end the domain there, or leave the radius out"
                 )
 
 

@@ -54,7 +54,7 @@ def test_a_cusp_inside_is_refused_with_a_radius(axis):
     forms = {"x": "k*(u - sin(u))", "z": "-cos(u)"} if axis == "x" else {"x": "1 - cos(u)", "z": "k*(sin(u) - u)"}
     curve = gqm.Curve.parametric(**forms, parameter="u", parameters={"k": 1})
     gqm.derive(curve, gqm.Gravity())
-    with pytest.raises(DeclarationError, match=r"a cusp at u = -?0, where the centre"):
+    with pytest.raises(DeclarationError, match="a cusp at u = 0, where the centre"):
         gqm.derive(curve, rolling)
     inside = gqm.Curve.parametric(**forms, parameter="u", parameters={"k": 1}, domain=(0, "2*pi"))
     gqm.derive(inside, rolling)
