@@ -49,7 +49,7 @@ def exact_axis_orbits(lowering: Lowering) -> tuple[ExactIR, ...]:
             ),
         )
     sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
-    here = at_place(dict(zip(dict(orbits.invariants), dict(orbits.invariants), strict=True)), sine2, cosine2)
+    here = at_place({}, sine2, cosine2)
     ends = {symbol: end.xreplace({HALF: half}) for symbol, end in orbits.invariants}
     forms = tuple(form.xreplace(here).xreplace(ends) for form in (orbits.time_integrand, orbits.divisor))
     return (lowering.exact_function("time_integrand", INTEGRAND_DOC, forms, (half, sine2, cosine2)),)

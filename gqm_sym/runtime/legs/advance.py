@@ -63,7 +63,7 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_START,
 )
 from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, clearance
-from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.equation import forces_on
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, sign_of_load, slope_of_v2
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
@@ -213,7 +213,7 @@ def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-u
     Next to an equilibrium the body turns, or moves on, over a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
-    forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v, 0)
+    forces = forces_on(dissipation, p, v)
     contact_sign = sign_of_load(forces, place, 0.0, point)
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):

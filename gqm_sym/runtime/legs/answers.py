@@ -69,7 +69,7 @@ from gqm_sym.runtime.legs.leg_record import (
     USED,
     pack,
 )
-from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.equation import forces_on
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
@@ -212,7 +212,7 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
         point[0] = body[LAM0]
         call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
         return sqrt(point[2]), FOUND
-    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1, 0), body[LAM0], 0.0, 0, point)
+    slope_of_v2(forces_on(dissipation, p, 1), body[LAM0], 0.0, 0, point)
     return point[5], FOUND
 
 
@@ -240,7 +240,7 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
 def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
     """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
     point = point_buffer()
-    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1, 0), body[PLACE], body[V2], 0, point)
+    slope_of_v2(forces_on(dissipation, p, 1), body[PLACE], body[V2], 0, point)
     return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
 
 

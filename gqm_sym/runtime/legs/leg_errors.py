@@ -57,13 +57,13 @@ from gqm_sym.runtime.legs.panels.equation import (
     TAILS,
     TIME_RATE,
     D,
-    Forces,
     March,
     P,
     Panel,
     Q,
     W,
     fill_rates,
+    forces_on,
     panel_buffer,
     set_nodes,
     slope_at,
@@ -287,15 +287,7 @@ def carry(dissipation, p, turns, before, share, terms, charts, record):  # type:
     """
     p, record, forward = borrowed(p), borrowed(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
-    forces = Forces(
-        dissipation.speed_equation,
-        p,
-        dissipation.friction,
-        dissipation.kinked,
-        dissipation.linear,
-        v,
-        dissipation.squared_contact,
-    )
+    forces = forces_on(dissipation, p, v)
     errors, sizes = (before.place, before.v2, share), (terms, borrowed(charts))
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, sizes, record)
     rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))

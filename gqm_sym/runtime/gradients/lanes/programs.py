@@ -114,9 +114,13 @@ class Orbits(NamedTuple):
         axis = op.number(place) if step is None else place + number * step
         changes = []
         for move, k in zip(moves, self.wanted, strict=True):
-            moved = sum((by * part for by, part in zip(gradient(op, axis, p), move, strict=True)), op.number(0))
-            changes.append(sign * (int(k == n) - moved))
+            changes.append(sign * (int(k == n) - total_change(op, gradient(op, axis, p), move)))
         return sign * (lam0 - axis), [[c, *m] for c, m in zip(changes, moves, strict=True)]
+
+
+def total_change(op: Recorder, by_inputs: Sequence[TapeNumber], move: Sequence[TapeNumber]) -> TapeNumber:
+    """Record the change of a number with those of its inputs, given its partial derivatives."""
+    return sum((by * part for by, part in zip(by_inputs, move, strict=True)), op.number(0))
 
 
 @lru_cache(maxsize=64)
@@ -150,9 +154,7 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
     share, tilt = op.place, 1 - 2 * op.place
     rate = op.sqrt(formula(op, half, tilt * tilt, 4 * (share * (1 - share)), p)[0])
     by_inputs = gradient(op, rate, [half, *p])
-    return in_double_double(
-        op, [sum((by * part for by, part in zip(by_inputs, move, strict=True)), op.number(0)) for move in moves]
-    )
+    return in_double_double(op, [total_change(op, by_inputs, move) for move in moves])
 
 
 @lru_cache(maxsize=64)
@@ -188,8 +190,7 @@ def mean_program(orbits: Orbits) -> Program | None:
     found = [op.number(0)] * len(moves)
     for j, move in enumerate(moves):
         for weight, parts in zip(weights, partials_of, strict=True):
-            change = sum((by * part for by, part in zip(parts, move, strict=True)), op.number(0))
-            found[j] = found[j] - weight * change
+            found[j] = found[j] - weight * total_change(op, parts, move)
     return in_double_double(op, [difference / a, *found])
 
 
@@ -213,7 +214,7 @@ def changes(
     for leaf, adjoint in leaf_adjoints(op, formula).items():
         by_inputs = gradient(op, leaf, inputs)
         for j, move in enumerate(moves):
-            change = sum((by * part for by, part in zip(by_inputs, move, strict=True)), op.number(0))
+            change = total_change(op, by_inputs, move)
             found[j] = found[j] + adjoint * change
             if change.known is None:
                 op.uncertain.add(change.register)

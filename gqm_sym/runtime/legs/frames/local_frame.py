@@ -32,7 +32,7 @@ from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LEAST_SIZE, LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
-from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.equation import forces_on
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 
@@ -163,7 +163,7 @@ def may_be_small(dissipation, p, corners, body):  # type: ignore[no-untyped-def]
     for known in corners:
         reach = min(reach, fabs(known - place))
     around = min(SMALL_SHARE * size, RANGE_SHARE * reach)
-    forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, 1, 0)
+    forces = forces_on(dissipation, p, 1)
     behind = slope_of_v2(forces, place - around, LEAST_V2, 0, point)
     ahead = slope_of_v2(forces, place + around, LEAST_V2, 0, point)
     return ahead * behind < 0.0 and body[V2] < around * fabs(behind - ahead)
@@ -182,7 +182,7 @@ def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
     """
     out, point = np.empty((2, places.size)), point_buffer()
     for row, v in enumerate((1, -1)):
-        forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, v, 0)
+        forces = forces_on(dissipation, p, v)
         for i in range(places.size):
             out[row, i] = v * slope_of_v2(forces, places[i], LEAST_V2, 0, point)
     return out

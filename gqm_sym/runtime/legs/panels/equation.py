@@ -126,7 +126,7 @@ class Forces(NamedTuple):
     direction : int
         The sign of dlam/dt.
     squared_contact : int
-        As in `interface.Dissipation`; it may be 0 for single places.
+        As in `interface.Dissipation`.
     """
 
     speed_equation: int
@@ -136,6 +136,20 @@ class Forces(NamedTuple):
     linear: bool
     direction: int
     squared_contact: int
+
+
+@Inner
+def forces_on(dissipation, p, direction):  # type: ignore[no-untyped-def]
+    """Return the forces on a body that moves in a direction, given an `interface.Dissipation` and the parameters."""
+    return Forces(
+        dissipation.speed_equation,
+        p,
+        dissipation.friction,
+        dissipation.kinked,
+        dissipation.linear,
+        direction,
+        dissipation.squared_contact,
+    )
 
 
 class March(NamedTuple):

@@ -23,12 +23,10 @@ from gqm_sym.runtime.legs.panels.equation import (
     March,
     Panel,
     W,
-    copy_row,
     damped_row,
-    difference_row,
 )
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
-from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of_block
+from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
@@ -42,6 +40,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     has_no_kink,
     is_load_resolved,
     keeps_sign,
+    replace_v2,
     sample_leg,
     size_of_row,
     whole_buffer,
@@ -59,15 +58,11 @@ grown_row = over_rows(lambda factor, y, h: factor * (h * y), WIDE)
 def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
     """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
     to_means(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
-    change = 0.0
     for at in range(0, blocks * WIDE, WIDE):
-        factor, w, new = blocks * W_FACTOR + at, blocks * W + at, blocks * SPEED + at
+        factor = blocks * W_FACTOR + at
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        grown_row(work, new, factor, blocks * NODES + at, h)
-        difference_row(work, w, new, w)
-        change = max(change, size_of_block(work, w))
-        copy_row(work, w, new)
-    return change, extent_of_row(blocks, work, W)[1]
+        grown_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h)
+    return replace_v2(blocks, work)
 
 
 @Inner

@@ -40,11 +40,11 @@ from gqm_sym.runtime.legs.panels.equation import (
     OFFSET,
     SERIES,
     W_FACTOR,
-    Forces,
     March,
     Panel,
     W,
     fill_length,
+    forces_on,
     panel_buffer,
     set_nodes,
 )
@@ -287,10 +287,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     Followed
     """
     breaks = route.breaks
-    forces = Forces(
-        *(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear),
-        *(start.direction, dissipation.squared_contact),
-    )
+    forces = forces_on(dissipation, p, start.direction)
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     record[WHOLE] = 0.0
     end, blocks = run_forwards(forces, start, route, off, record)

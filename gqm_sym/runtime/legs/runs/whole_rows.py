@@ -168,18 +168,26 @@ def sample_leg(forces, march, panel, blocks, h, work):  # type: ignore[no-untype
 
 
 @Inner
-def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
-    to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+def replace_v2(blocks, work):  # type: ignore[no-untyped-def]
+    """Replace the row W by the row SPEED; return the largest change of W, and the largest W."""
     change = 0.0
     for at in range(0, blocks * WIDE, WIDE):
-        factor, w, new = blocks * W_FACTOR + at, blocks * W + at, blocks * SPEED + at
-        damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        v2_row(work, new, factor, blocks * NODES + at, h)
+        w, new = blocks * W + at, blocks * SPEED + at
         difference_row(work, w, new, w)
         change = max(change, size_of_block(work, w))
         copy_row(work, w, new)
     return change, extent_of_row(blocks, work, W)[1]
+
+
+@Inner
+def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
+    to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+    for at in range(0, blocks * WIDE, WIDE):
+        factor = blocks * W_FACTOR + at
+        damped_row(work, factor, factor, blocks * EXPM1_Q + at)
+        v2_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h)
+    return replace_v2(blocks, work)
 
 
 @Inner
