@@ -242,12 +242,6 @@ def _array(address: Any, shape: Any) -> Any:
     return np.frombuffer(line, dtype=np.dtype(kind)).reshape(shape)
 
 
-def _parts_of(x: Any) -> tuple[Any, int]:
-    """Return what `math.frexp` returns in compiled code."""
-    share, exponent = math.frexp(x)
-    return np.float64(share), exponent
-
-
 @cache
 def _operations() -> dict[Any, Callable[..., Any]]:
     """Return, for each operation of compiled code, the Python function that gives the same result."""
@@ -258,7 +252,6 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         math.fabs: abs,
         math.floor: lambda x: int(np.floor(x)),
         math.ceil: lambda x: int(np.ceil(x)),
-        math.frexp: _parts_of,
         math.isfinite: np.isfinite,
         numba.carray: _array,
         intrinsics.fma: fma,

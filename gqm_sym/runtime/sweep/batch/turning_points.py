@@ -9,7 +9,7 @@ from math import fabs, inf, nan
 from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch, call_turning_point_batch
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of, fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS, distance_to_axis
+from gqm_sym.runtime.launch.ends import distance_to_axis
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 from gqm_sym.runtime.sweep.batch.rows import (
@@ -37,7 +37,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ZERO_BEHIND,
     contains,
 )
-from gqm_sym.runtime.sweep.batch.wells import find_proved
+from gqm_sym.runtime.sweep.batch.wells import find_proved, is_clear_of_axes
 
 # The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
@@ -100,7 +100,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
         well = (out[1, j] > 0.0) & (alone | (size < step)) & (monotone | (offset == axis[j]))
-        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < MAX_AXIS_STEP_SHARE * step))
+        clear = is_clear_of_axes(size, start[j], places[j], step)
         inside = choose(size > half, half, size)  # many periods away the offset has the larger rounding error
         ascent = choose(sense * offset < 0.0, -inside, inside)
         known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
@@ -127,9 +127,7 @@ def by_symmetry(fns, n, rows, domain, wells, work):  # type: ignore[no-untyped-d
     for j in range(n):
         offset, step = (start[j] - places[j]) - places_low[j], steps[j]
         size = fabs(offset)
-        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
-            (step == 0.0) | (size < MAX_AXIS_STEP_SHARE * step)
-        )
+        clear = is_clear_of_axes(size, start[j], places[j], step)
         offsets[j], distances[j] = offset, choose(clear & (w0[j] == 0.0), size, nan)
     find_proved(fns, wells, distances, proved)
     for j in range(n):
@@ -216,9 +214,7 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         # A body released at rest moves towards the axis and turns on the other side of it.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < length[j], mirrored, length[j])
-        away = (first > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
-            (step == 0.0) | (first < MAX_AXIS_STEP_SHARE * step)
-        )
+        away = is_clear_of_axes(first, start[j], places[j], step)
         known = behind[j] == behind[j]
         decided = known | (known_well & (w0[j] == 0.0) & away)
         zero[j] = choose(known, zero[j], mirrored)

@@ -124,6 +124,14 @@ def find_proved(fns, wells, distances, state):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def is_clear_of_axes(distance, start, place, step):  # type: ignore[no-untyped-def]
+    """Return whether a body at rest is neither next to an axis at a place nor next to another one, a step away."""
+    return (distance > NEAR_AXIS * (fabs(start) + fabs(place))) & (
+        (step == 0.0) | (distance < MAX_AXIS_STEP_SHARE * step)
+    )
+
+
+@Inner
 def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ignore[no-untyped-def]
     """Set both ends of all orbits if each body is released at rest in a well that is proved to rise on both sides of
     its axis; return whether this is so.
@@ -138,11 +146,9 @@ def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ig
     firsts, lasts, periods = domain[0, :n], domain[1, :n], domain[2, :n]
     places, places_low, steps, distances = domain[3, :n], domain[4, :n], domain[5, :n], work[0, :n]
     for j in range(n):
-        offset, alone = (start[j] - places[j]) - places_low[j], steps[j] == 0.0
+        offset = (start[j] - places[j]) - places_low[j]
         size, image, closed = fabs(offset), -2.0 * offset, periods[j] > 0.0
-        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
-            alone | (size < MAX_AXIS_STEP_SHARE * steps[j])
-        )
+        clear = is_clear_of_axes(size, start[j], places[j], steps[j])
         length = choose(closed, periods[j], choose(image > 0.0, lasts[j] - start[j], start[j] - firsts[j]))
         inside = (firsts[j] <= start[j]) & (start[j] <= lasts[j]) & (fabs(image) <= length)
         good = (w0[j] == 0.0) & (direction[j] != 0.0) & clear & inside
