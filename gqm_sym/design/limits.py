@@ -22,7 +22,7 @@ from gqm_sym.runtime.gradients.formula_orbit import source_of, variables_of
 from gqm_sym.runtime.gradients.orbit import pairs
 from gqm_sym.runtime.gradients.programs import extreme_program
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
-from gqm_sym.runtime.launch.formulas import ParameterValues
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.variations.answers import forces_at_places
@@ -190,7 +190,7 @@ def along_formulas(
     return Limited(values, slopes)
 
 
-def end_slopes(model: CompiledModel, p: ParameterValues, names: Sequence[str]) -> Array:
+def end_slopes(model: Formulas, p: ParameterValues, names: Sequence[str]) -> Array:
     """Return the derivatives of both ends of a curve with formulas by some of its parameters; 0 for ends that do not
     exist.
     """
@@ -200,7 +200,7 @@ def end_slopes(model: CompiledModel, p: ParameterValues, names: Sequence[str]) -
     return slopes
 
 
-def _columns(model: CompiledModel, names: Sequence[str]) -> list[int]:
+def _columns(model: Formulas, names: Sequence[str]) -> list[int]:
     """Return the numbers of some parameters among all of them."""
     return [list(model.parameters).index(name) for name in names]
 
