@@ -52,13 +52,14 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
-from gqm_sym.runtime.legs.leg_reading import LENGTH, LOAD, SPEED, passage, peak_of_leg
+from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
     BEGIN,
     BEGIN_LOW,
     END,
+    HEADING,
     LAPS_BEFORE,
     PANELS,
     PASSAGE,
@@ -80,6 +81,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TURN,
 )
 from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
 from gqm_sym.runtime.legs.runs.route import Reading
 
 # The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
@@ -179,7 +181,7 @@ def sought_extreme(question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def after_leg(body, question, findings, record):  # type: ignore[no-untyped-def]
+def after_leg(dissipation, p, body, question, findings, record):  # type: ignore[no-untyped-def]
     """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
     if question == ARRIVAL and body[ENDING] != END_LIFTOFF_AT_ONCE:
@@ -190,7 +192,8 @@ def after_leg(body, question, findings, record):  # type: ignore[no-untyped-def]
         return Findings(findings.arrival, max(findings.peak, v if question == MOST_SPEED else -v))
     if question >= LEAST_SPEED:
         until = 0.0 if body[ENDING] == END_LIFTOFF_AT_ONCE else (body[HORIZON] - begin) - low
-        return Findings(findings.arrival, peak_of_leg(record, until, sought_extreme(question), findings.peak))
+        forces = forces_on(dissipation, p, int(record[HEADING]))
+        return Findings(findings.arrival, peak_of_leg(forces, record, until, sought_extreme(question), findings.peak))
     return findings
 
 
@@ -259,7 +262,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        findings = after_leg(body, question, findings, record)
+        findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         if not goes_on(body, question, findings.arrival):

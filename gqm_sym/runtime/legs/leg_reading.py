@@ -1,13 +1,11 @@
-"""Quantities that are read from the record of a leg: the time at a place, the place at a time, and the largest speed or
-contact force.
-"""
+"""Quantities that are read from the record of a leg: the time at a place, and the place at a time."""
 
-from math import asin, cos, fabs, inf, nan, pi, sin, sqrt
+from math import asin, cos, fabs, inf, pi, sin, sqrt
 
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum, legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -26,8 +24,6 @@ from gqm_sym.runtime.legs.leg_record import (
     HEADING,
     MIDDLE,
     MIDDLE_LOW,
-    NO_VALUES,
-    NORMAL_LOAD,
     RIGHT,
     RISING,
     START,
@@ -38,14 +34,13 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_START,
     WHOLE,
     WHOLE_WIDTH,
-    Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
-from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, whole_time_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
+from gqm_sym.runtime.legs.runs.whole_rows import whole_time_row
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -72,24 +67,14 @@ def _to_legendre() -> tuple[Array, Array]:
 PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
 to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 
-# Buffers for two series of a panel; and for values at nodes of a panel or leg, their series and the nodes.
-terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(3 * MAX_BLOCKS * WIDE)
+# Buffers for two series of a panel, and for rows of a leg.
+terms_buffer, rows_buffer = on_stack(2 * WIDE), on_stack(3 * MAX_BLOCKS * WIDE)
 
 # The largest number of steps of a search within a panel, and the share of the panel at which the search stops.
 MAX_STEPS, LAST_STEP = 60, 4e-16
 
-# The functions whose extremes are read: the speed, and the contact force per mass, which has a sign or a length.
-SPEED, LOAD, LENGTH = range(3)
-
-# The largest share of the last two coefficients of a function that a panel resolves.
-MAX_TAIL = 1e-13
-
-# The smallest square of a length as a share of the largest on the panel that has enough digits; and a length as a share
-# of the largest that cannot be told from zero.
-LEAST_SQUARE, ROUNDING = 1e-3, 4e-16
-
-# An extreme is located to this share of a panel, which suffices because the function is flat there.
-FLAT_PART = 1e-9
+# A phase angle is found to the square of this.
+LAST_PHASE = 1e-9
 
 
 @Inner
@@ -189,132 +174,6 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
-    """Return the largest value of ``sign`` times a Chebyshev series that has at most one extreme between two places."""
-    left, rise = sum_and_slope(terms, lo)
-    right, fall = sum_and_slope(terms, hi)
-    best, rise, fall = max(sign * left, sign * right), sign * rise, sign * fall
-    if not rise > 0.0 > fall:
-        return best
-    # The zero of the slope by the method of false position; if an end of the bracket stays, its slope is halved
-    # (Illinois method).
-    moved = 0
-    for _ in range(MAX_STEPS):
-        x = min(max(lo + (hi - lo) * (rise / (rise - fall)), lo), hi)
-        value, slope = sum_and_slope(terms, x)
-        best, slope = max(best, sign * value), sign * slope
-        if slope > 0.0:
-            done, lo, rise, fall, moved = x - lo, x, slope, 0.5 * fall if moved == 1 else fall, 1
-        else:
-            done, hi, fall, rise, moved = hi - x, x, slope, 0.5 * rise if moved == -1 else rise, -1
-        if done <= FLAT_PART or slope == 0.0:
-            break
-    return best
-
-
-@Inner
-def peak_of_values(blocks, values, first, last, sign, best):  # type: ignore[no-untyped-def]
-    """Return the larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel or leg.
-
-    Parameters
-    ----------
-    blocks : int
-        The number of blocks of a row (`runs.whole_tables`).
-    values : array
-        The function at the nodes, and room for its series and for the nodes.
-    first, last : float
-        The ends of the part, within [-1, 1].
-    """
-    top, bottom, count, wide = -inf, inf, blocks * WIDE - 1, blocks * WIDE
-    for j in range(count):
-        top, bottom = max(top, sign * values[j]), min(bottom, sign * values[j])
-    # Between the nodes a polynomial exceeds the values there by less than a multiple of their spread.
-    spread = 0.5 * (LEBESGUE - 1.0) * (top - bottom)
-    if top + spread <= best:
-        return best
-    # Nodes are equally spaced in an angle, and the series is even at both ends. Next to a node it exceeds the value
-    # there by an eighth of the second difference, or little more.
-    may_exceed = False
-    for j in range(count):
-        bend = (values[max(j - 1, 0)] - values[j]) + (values[min(j + 1, count - 1)] - values[j])
-        may_exceed = may_exceed or sign * values[j] + fabs(bend) > best
-    if not may_exceed:
-        return best
-    values[wide] = 1.0
-    to_nodes(blocks, values, wide, values, 2 * wide)
-    to_coefficients(blocks, values, 0, values, wide)
-    terms, shares = values[wide : wide + count], values[2 * wide : 2 * wide + count]
-    best = max(best, max(sign * chebyshev_sum(terms, first), sign * chebyshev_sum(terms, last)))
-    for j in range(count):
-        before, after = sign * values[max(j - 1, 0)], sign * values[min(j + 1, count - 1)]
-        here, x = sign * values[j], 2.0 * shares[j] - 1.0
-        if first < x < last:
-            best = max(best, here)
-            if here >= before and here >= after and here + spread > best:
-                lo = 2.0 * shares[j - 1] - 1.0 if j > 0 else -1.0
-                hi = 2.0 * shares[j + 1] - 1.0 if j < count - 1 else 1.0
-                best = max(best, peak(terms, max(lo, first), min(hi, last), sign))
-    return best
-
-
-@Inner
-def peak_of_function(blocks, values, part, asked, best):  # type: ignore[no-untyped-def]
-    """Return `peak_of_values` for a function on a part of a panel; NaN for a length whose square is not resolved, or so
-    small that it has too few digits.
-
-    The square of a length is smooth also where the length almost vanishes. The panels of a leg resolve its law, of
-    which the contact force is a small part if friction is small.
-    """
-    (function, sign), (first, last), wide = asked, part, blocks * WIDE
-    if function != LENGTH:
-        return peak_of_values(blocks, values, first, last, sign, best)
-    largest = 0.0
-    for j in range(wide - 1):
-        values[j] *= values[j]
-        largest = max(largest, values[j])
-    to_coefficients(blocks, values, 0, values, wide)
-    if not fabs(values[2 * wide - 2]) + fabs(values[2 * wide - 3]) <= MAX_TAIL * largest:
-        return nan
-    square = peak_of_values(blocks, values, first, last, sign, best * fabs(best))
-    if sign < 0.0 and square > best * fabs(best) and -square < LEAST_SQUARE * largest:
-        return best if -best <= ROUNDING * sqrt(largest) else nan
-    return sqrt(square) if square >= 0.0 else -sqrt(-square)
-
-
-@Inner
-def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[no-untyped-def]
-    """Return the larger of ``best`` and the peak of some panels between two values of the march variable.
-
-    Parameters
-    ----------
-    panels : (int, int)
-        The position of the first of the panels in the record, and their number.
-    half_c : float
-        c/2 of their march variable; infinite if that is the distance.
-    between : (float, float)
-    asked : (int, float)
-        SPEED, LOAD or LENGTH; 1 for the largest, -1 for the smallest.
-    """
-    (begin, count), (low, high), (function, sign) = panels, between, asked
-    values = sample_buffer()
-    if half_c == 0.0 and low == 0.0 and sign < 0.0 and function == SPEED:
-        return max(best, 0.0)  # the body is slowest where it turns
-    for k in range(count):
-        at, left = begin + k * COLUMNS, edge(record, begin, k)
-        width = record[at + RIGHT] - left
-        first, last = 2.0 * (low - left) / width - 1.0, 2.0 * (high - left) / width - 1.0
-        if first > 1.0 or last < -1.0 or record[at + TIME_ERROR] == NO_VALUES:
-            continue
-        for j in range(COUNT):
-            growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
-            values[j] = growth * record[at + Y_ROW + j] if function == SPEED else record[at + NORMAL_LOAD + j]
-        best = peak_of_function(1, values, (max(first, -1.0), min(last, 1.0)), (function, sign), best)
-        if best != best:
-            break
-    return best
-
-
-@Inner
 def time_to_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-def]
     """Return the time from the start, or ``backwards`` from the end, of a leg to a phase angle of at most pi/2, and its
     derivative.
@@ -367,22 +226,15 @@ def phase_of_rows(record, terms, time):  # type: ignore[no-untyped-def]
         there, rate = time_to_phase(terms, count, phase, backwards)
         step = (there - wanted) / rate
         phase = min(max(phase - step, 0.0), 0.5 * pi)
-        if fabs(step) <= FLAT_PART:
+        if fabs(step) <= LAST_PHASE:
             break
     return phase, backwards
 
 
 @Inner
-def place_in_rows(record, time):  # type: ignore[no-untyped-def]
-    """Return the place in [-1, 1] at a time from the start of a leg whose record has rows, to some ten digits."""
-    phase, backwards = phase_of_rows(record, record[HEAD:], time)
-    return cos(phase) if backwards else -cos(phase)
-
-
-@Inner
 def place_of_rows(record, time):  # type: ignore[no-untyped-def]
     """Return the result of `place_at` for a record with the rows of a solved motion (`runs.whole_panels`)."""
-    rows, blocks, h, v = sample_buffer(), int(record[WHOLE]), record[WHOLE_WIDTH], record[HEADING]
+    rows, blocks, h, v = rows_buffer(), int(record[WHOLE]), record[WHOLE_WIDTH], record[HEADING]
     wide = blocks * WIDE
     if not time <= record[TIME_FROM_START] + record[TIME_FROM_END]:
         return np.nan
@@ -398,39 +250,3 @@ def place_of_rows(record, time):  # type: ignore[no-untyped-def]
         variable = reversed_variable(variable)
     covered = v * distance_at(variable, root * root)
     return record[END] + (record[END_LOW] - covered) if backwards else record[START] + (record[START_LOW] + covered)
-
-
-@Inner
-def peak_of_rows(record, until, asked, best):  # type: ignore[no-untyped-def]
-    """Return `peak_of_leg` for a leg from turn to turn whose record has rows."""
-    values, (function, sign), blocks = sample_buffer(), asked, int(record[WHOLE])
-    if sign < 0.0 and function == SPEED:
-        return max(best, 0.0)  # the body is slowest where it turns
-    for at in range(0, blocks * WIDE, WIDE):
-        copy(values, at, record, HEAD + (1 if function == SPEED else 2) * blocks * WIDE + at)
-    last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
-    if function != SPEED:
-        return peak_of_function(blocks, values, (-1.0, last), asked, best)
-    return max(best, sqrt(peak_of_values(blocks, values, -1.0, last, sign, max(best, 0.0) ** 2)))
-
-
-@Inner
-def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
-    """Return the larger of ``best`` and the peak of a leg up to a time from its start; ``asked`` is as in
-    `peak_between`.
-
-    With the sign -1, the peak is minus the smallest value.
-    """
-    if record[WHOLE] > 0.0:
-        return peak_of_rows(record, until, asked, best)
-    ahead, back = int(record[AHEAD]), int(record[BACK])
-    if ahead > 0:
-        whole = until >= record[TIME_FROM_START]
-        last = edge(record, HEAD, ahead) if whole else marched_in(record, HEAD, ahead, max(until, 0.0))
-        best = peak_between(record, (HEAD, ahead), record[HALF_C], (0.0, last), asked, best)
-    remaining = record[TIME_FROM_START] + record[TIME_FROM_END] - until
-    if back > 0 and remaining <= record[TIME_FROM_END] and best == best:
-        begin = HEAD + ahead * COLUMNS
-        first = marched_in(record, begin, back, remaining) if remaining > 0.0 else 0.0
-        best = peak_between(record, (begin, back), 0.0, (first, edge(record, begin, back)), asked, best)
-    return best

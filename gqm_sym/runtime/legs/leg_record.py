@@ -18,7 +18,7 @@ WHOLE                0; or, if the record has no panels but rows of the whole le
                      of a row (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of the
                      time per phase angle, V**2, and N per mass. Where panels are read, they are those of
                      `runs.whole_panels`
-WHOLE_WIDTH          the width of a leg with rows from which panels can be made; 0 if they cannot
+WHOLE_WIDTH          the width of a leg with rows from which panels can be made, or with a stretched variable; else 0
 RISING, FALLING,     of the variable of a leg with rows (`runs.leg_variable.LegVariable`)
 EXTENT
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end; if

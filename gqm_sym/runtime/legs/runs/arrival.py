@@ -8,7 +8,7 @@ long as V**2 at the place is not small. The width is given, which takes fewer va
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
-from gqm_sym.runtime.legs.leg_record import PASSAGE, ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
+from gqm_sym.runtime.legs.leg_record import ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
@@ -81,19 +81,20 @@ def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-un
 
 
 @Inner
-def is_resolved(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
+def is_resolved(forces, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
     """Fill the time rate; return whether all rows are resolved and V**2 and N each have one sign up to the place, and
     the number of blocks to try next, or 0.
     """
+    h, is_stretched = variable.width, variable.extent > 0.0
     fine, ratio = are_rows_resolved(blocks, h, work)
-    load_fine, is_kept, load_ratio = load_sign(blocks, panel.contact_sign, work)
+    load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if not (fine and load_fine):
-        return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
+        return False, blocks_for(max(ratio, load_ratio), blocks)
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0
     if forces.kinked:
-        curve_fine, is_kept, ratio = curvature_sign(blocks, work)
+        curve_fine, is_kept, ratio = curvature_sign(is_stretched, blocks, work)
         if not (curve_fine and is_kept):
             return False, blocks_for(ratio, blocks)
     fine, ratio = fill_times(blocks, h, work)
@@ -112,7 +113,7 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
     room = offset(route.limit if upcoming == breaks.size else breaks[upcoming], origin, v)
     h, nu, what, blocks = offset(route.target, origin, v), start.contact_sign, END_NONE, 0
     march, span, place, v2 = March(origin, v, 0.0, 1.0), span_before(breaks, upcoming, v, off), (route.target, 0.0), 0.0
-    if route.reading.what == PASSAGE and 0.0 < h < room:
+    if 0.0 < h < room:
         if nu == 0:
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
@@ -122,7 +123,7 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             if not reaches(forces, march, panel, blocks, attempt.variable, work):
                 blocks = 0
                 break
-            fine, onwards = is_resolved(forces, panel, blocks, h, work)
+            fine, onwards = is_resolved(forces, panel, blocks, attempt.variable, work)
             if fine:
                 what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
                 to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)

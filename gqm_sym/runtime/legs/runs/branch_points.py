@@ -16,8 +16,8 @@ from gqm_sym.runtime.legs.runs.whole_rows import examine_row, size_of_row
 # need not be that of the exact place.
 MAX_STEPS, LAST_STEP = 12, 0.02
 
-# The largest height from which that begins, and the one from which it begins where ds has no minimum, in half widths.
-MAX_HEIGHT, SOME_HEIGHT = 2.0, 0.5
+# The largest height of a branch point beside a leg, in half widths.
+MAX_HEIGHT = 2.0
 
 # The number of blocks of a leg that has not been tried without a map.
 NOT_TRIED = -1
@@ -49,21 +49,19 @@ class Attempt(NamedTuple):
 @Inner
 def first_guess(squares):  # type: ignore[no-untyped-def]
     """Return where a parabola through the smallest of some values at the nodes, and those beside it, vanishes, as real
-    and imaginary part of a place in [-1, 1].
+    and imaginary part of a place in [-1, 1]; NaN if there is no minimum between the ends.
     """
-    j = 1
-    for k in range(2, COUNT - 1):
+    j = 0
+    for k in range(1, COUNT):
         j = k if squares[k] < squares[j] else j
+    if j == 0 or j == COUNT - 1:
+        return np.nan, np.nan
     before, here, after = 2.0 * SHARES[j - 1] - 1.0, 2.0 * SHARES[j] - 1.0, 2.0 * SHARES[j + 1] - 1.0
     slope = (squares[j] - squares[j - 1]) / (here - before)
     bend = ((squares[j + 1] - squares[j]) / (after - here) - slope) / (after - before)
-    if not bend > 0.0:
-        return here, SOME_HEIGHT
     middle = 0.5 * (before + here - slope / bend)
     least = squares[j] / bend - (here - middle) * (here - middle)
-    if not (fabs(middle) <= 1.0 and least > 0.0):
-        return here, SOME_HEIGHT
-    return middle, min(sqrt(least), MAX_HEIGHT)
+    return middle, min(sqrt(max(least, 0.0)), MAX_HEIGHT)
 
 
 @Inner
@@ -101,25 +99,27 @@ def branch_beside(march, width, work):  # type: ignore[no-untyped-def]
         return none
     product(work, SERIES, DS, DS)
     x, y = first_guess(work[SERIES : SERIES + COUNT])
+    if not y > 0.0:
+        return none
     to_coefficients(work, SERIES, terms, 0)
     x, y = zero_of_series(terms, x, y)
-    if not (fabs(x) <= 1.0 + y and 0.0 < y <= MAX_HEIGHT):
+    if not (fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT):
         return none
     distance = 0.5 * width * (1.0 + x)
     return BranchPoint(march.origin[0] + (march.direction * distance + march.origin[1]), 0.5 * width * y)
 
 
 @Inlined
-def is_fewer(blocks, others):  # type: ignore[no-untyped-def]
-    """Return whether one expected number of blocks is less than another, where 0 means that there is none."""
-    return blocks > 0 and (others == 0 or blocks < others)
+def is_better(blocks, others):  # type: ignore[no-untyped-def]
+    """Return whether one expected number of blocks is at most another, where 0 means that there is none."""
+    return blocks > 0 and (others == 0 or blocks <= others)
 
 
 @Inner
 def next_attempt(attempt, onwards, march, work):  # type: ignore[no-untyped-def]
     """Return the attempt after one that has not resolved a leg.
 
-    A leg is stretched if its own rows with 23 nodes show a branch point, and the map saves blocks.
+    A leg is stretched if its own rows with 23 nodes show a branch point, and do not decrease more slowly with the map.
 
     Parameters
     ----------
@@ -136,6 +136,6 @@ def next_attempt(attempt, onwards, march, work):  # type: ignore[no-untyped-def]
         stretched = variable_for(branch, march.origin, march.direction, variable.width)
         if stretched.extent > 0.0:
             return Attempt(1, stretched, branch, onwards)
-    elif unstretched_blocks != NOT_TRIED and not is_fewer(onwards, unstretched_blocks):
+    elif unstretched_blocks != NOT_TRIED and not is_better(onwards, unstretched_blocks):
         return Attempt(unstretched_blocks, unstretched(variable.width), BranchPoint(0.0, inf), NOT_TRIED)
     return Attempt(onwards, variable, branch, NOT_TRIED)

@@ -7,7 +7,7 @@ back from there as a field of polynomials (`leg_record`). Before all this, a leg
 polynomial (`whole_leg`).
 """
 
-from math import fabs, sqrt
+from math import fabs, inf, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     MIDDLE,
     MIDDLE_LOW,
+    PASSAGE,
     ROWS_COUNT_AS,
     TIME_FROM_END,
     TIME_FROM_START,
@@ -232,11 +233,13 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     `run_to_end`; return the end, the number of blocks of the polynomial (`whole_tables`) or 0, and the branch point of
     ds that it passes by.
     """
-    branch = start.branch
+    # Beside joints, curves are not evaluated at the ends of legs, as they are for legs that pass by a branch point.
+    branch = start.branch if route.breaks.size == 0 else BranchPoint(0.0, inf)
     if start.v2 == 0.0 and start.blocks > 0:
-        end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
-        if end.what == END_PAUSE:
-            return end, blocks, branch
+        if route.reading.what == PASSAGE:
+            end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
+            if end.what == END_PAUSE:
+                return end, blocks, branch
         end, blocks, branch = run_whole(forces, start, branch, route, off, record)
         if end.what == END_TURN:
             return end, blocks, branch

@@ -22,11 +22,11 @@ from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import fused, over_rows
 from gqm_sym.runtime.legs.panels.breaks import offset
-from gqm_sym.runtime.legs.panels.equation import ARC_RATE, DS, EXPM1_Q, NODES, D, P, Q, product
+from gqm_sym.runtime.legs.panels.equation import ARC_RATE, DS, EXPM1_Q, NODES, OFFSET, D, P, Q, linear_row, product
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 
 # A leg that is shorter than this many times the height of the branch point is resolved without a map.
-LEAST_SHARE = 1.0
+LEAST_SHARE = 0.75
 
 
 class BranchPoint(NamedTuple):
@@ -153,7 +153,7 @@ def reversed_variable(variable):  # type: ignore[no-untyped-def]
 def variable_for(branch, origin, direction, width):  # type: ignore[no-untyped-def]
     """Return the variable for a leg of about this width: stretched if it passes by a known branch point closely."""
     d, b = offset(branch.place, origin, float(direction)), branch.height
-    if not (0.0 < LEAST_SHARE * b < width and -b < d < width + b):
+    if not (0.0 < LEAST_SHARE * b < width and 0.0 < d < width):
         return unstretched(width)
     root = sqrt(d * d + b * b)
     falling = 0.5 * (root + d) if d > 0.0 else 0.5 * b * b / (root - d)
@@ -161,14 +161,18 @@ def variable_for(branch, origin, direction, width):  # type: ignore[no-untyped-d
 
 
 @Inner
-def lay_places(variable, blocks, work):  # type: ignore[no-untyped-def]
-    """Fill the row ARC_RATE with the distances of the nodes, and the row D with J, for a stretched variable."""
-    _, rising, falling, extent = variable
-    rate = extent / variable.width
+def lay_places(variable, march, blocks, work):  # type: ignore[no-untyped-def]
+    """Fill the row ARC_RATE with the places of the nodes, the row D with J, and the row OFFSET with y times the width,
+    for a stretched variable.
+    """
+    width, rising, falling, extent = variable
+    rate, begin, v = extent / width, march.origin[0] + march.origin[1], float(march.direction)
     for at in range(0, blocks * WIDE, WIDE):
         grown_row(work, blocks * EXPM1_Q + at, blocks * NODES + at, extent)
         stretching_row(work, blocks * D + at, blocks * EXPM1_Q + at, rate * rising, rate * falling)
         stretched_row(work, blocks * ARC_RATE + at, blocks * EXPM1_Q + at, rising, falling)
+        linear_row(work, blocks * ARC_RATE + at, blocks * ARC_RATE + at, begin, v)
+        product(work, blocks * OFFSET + at, blocks * NODES + at, width)
 
 
 @Inner

@@ -181,23 +181,23 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work
 
 
 @Inner
-def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untyped-def]
+def is_whole(forces, panel, blocks, variable, reading, work):  # type: ignore[no-untyped-def]
     """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg, and the number
     of blocks to try next, or 0.
     """
-    curve_fine, curve_ratio = True, 0.0
+    h, is_stretched, curve_fine, curve_ratio = variable.width, variable.extent > 0.0, True, 0.0
     if forces.kinked:
-        curve_fine, is_kept, curve_ratio = curvature_sign(blocks, work)
+        curve_fine, is_kept, curve_ratio = curvature_sign(is_stretched, blocks, work)
         if curve_fine and not is_kept:
             return False, 0
     fill_v2(blocks, h, work)
     fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
-    load_fine, is_kept, load_ratio = load_sign(blocks, panel.contact_sign, work)
+    load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if load_fine and reading.what == PEAKS and reading.force:
-        load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, blocks, work)
+        load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, is_stretched, blocks, work)
     if not (fine and load_fine and curve_fine):
-        return False, blocks_for(max(ratio, curve_ratio, 0.0 if load_fine else load_ratio), blocks)
+        return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks)
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0
@@ -219,7 +219,7 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
         variable = variable_of_leg(forces, march, panel, blocks, room, variable, False, work)
         if not variable.width > 0.0:
             break
-        fine, onwards = is_whole(forces, panel, blocks, variable.width, reading, work)
+        fine, onwards = is_whole(forces, panel, blocks, variable, reading, work)
         attempt = Attempt(blocks, variable, attempt.branch, attempt.unstretched_blocks)
         if fine:
             return attempt
@@ -261,7 +261,8 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
     to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
-    record[WHOLE_WIDTH] = h if route.reading.what == PANELS else 0.0
+    is_wanted = route.reading.what == PANELS or (route.reading.what == PEAKS and variable.extent > 0.0)
+    record[WHOLE_WIDTH] = h if is_wanted else 0.0
     record[RISING], record[FALLING], record[EXTENT] = variable.rising, variable.falling, variable.extent
     record[TIME_FROM_START], record[TIME_FROM_END] = first, second
 

@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     TAILS,
     TIME_RATE,
     W_FACTOR,
+    D,
     P,
     Q,
     W,
@@ -64,6 +65,11 @@ from gqm_sym.runtime.legs.runs.whole_tables import (
     to_tails,
 )
 
+# The largest ratio of the last coefficients of a contact force to its size by which one can tell where it is largest.
+# The value there then has an error of about its square, and the number by which ratios are raised is about
+# log(TAIL_RATIO)/log(LOCATED_RATIO).
+LOCATED_RATIO = 1e-10
+
 # The rows of a panel and of the leg, one after the other.
 ROWS = 22
 whole_buffer = on_stack(ROWS * MAX_BLOCKS * WIDE)
@@ -74,6 +80,7 @@ square_buffer = on_stack(4 * MAX_BLOCKS * WIDE)
 # A bound on the Lebesgue constant for all numbers of nodes (`polynomials.LEBESGUE`).
 LEBESGUE = 4.0
 
+quotient_row = over_rows(lambda one, other: one / other, WIDE)
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 
@@ -150,11 +157,11 @@ def sample_leg(forces, march, panel, blocks, variable, work):  # type: ignore[no
     wide, origin, v, nu = blocks * WIDE, march.origin, float(march.direction), float(panel.contact_sign)
     is_stretched = variable.extent > 0.0
     if is_stretched:
-        lay_places(variable, blocks, work)
-    for at in range(0, wide, WIDE):
-        product(work, blocks * OFFSET + at, blocks * NODES + at, variable.width)
-        distances = blocks * (ARC_RATE if is_stretched else OFFSET) + at
-        linear_row(work, blocks * ARC_RATE + at, distances, origin[0] + origin[1], v)
+        lay_places(variable, march, blocks, work)
+    else:
+        for at in range(0, wide, WIDE):
+            product(work, blocks * OFFSET + at, blocks * NODES + at, variable.width)
+            linear_row(work, blocks * ARC_RATE + at, blocks * OFFSET + at, origin[0] + origin[1], v)
     if panel.span[0] > -inf or panel.span[1] < inf:
         for j in range(blocks * ARC_RATE, blocks * ARC_RATE + wide):
             work[j] = within(work[j], panel.span)
@@ -173,11 +180,11 @@ def sample_leg(forces, march, panel, blocks, variable, work):  # type: ignore[no
             return False
         for at in range(0, wide, WIDE):
             fill_expm1(work, blocks * SPEED + at, blocks * EXPM1_Q + at)
+            force_row(work, blocks * FORCE + at, blocks * P + at, blocks * EXPM1_Q + at, v)
     else:
         for at in range(0, wide, WIDE):
             copy_row(work, blocks * EXPM1_Q + at, 0.0)
-    for at in range(0, wide, WIDE):
-        force_row(work, blocks * FORCE + at, blocks * P + at, blocks * EXPM1_Q + at, v)
+            product(work, blocks * FORCE + at, blocks * P + at, v)
     return True
 
 
@@ -220,6 +227,8 @@ def are_rows_resolved(blocks, h, work):  # type: ignore[no-untyped-def]
     """
     resolved, worst, resistance = True, 0.0, size_of_row(blocks, work, Q_RATE)
     for row in (W_FACTOR, FORCE, Q_RATE, DS):
+        if row == Q_RATE and resistance == 0.0:
+            continue
         size = size_of_row(blocks, work, row)
         if row == FORCE:
             size = max(size, resistance * extent_of_row(blocks, work, W)[1])
@@ -253,18 +262,25 @@ def sign_of_row(blocks, work, row, sign, limits):  # type: ignore[no-untyped-def
 
 
 @Inner
-def load_sign(blocks, contact_sign, work):  # type: ignore[no-untyped-def]
-    """Return `sign_of_row` for N."""
+def load_sign(is_stretched, blocks, contact_sign, work):  # type: ignore[no-untyped-def]
+    """Return `sign_of_row` for N; the ratio is 0 if it is resolved.
+
+    With a map, N has stronger singularities than all that must be resolved to the last digit, so that its ratio is
+    squared (as in `curvature_sign`).
+    """
     size = extent_of_row(blocks, work, MEAN)[1]
-    return sign_of_row(blocks, work, LOAD, contact_sign, (size, ZERO_TOLERANCE * size))
+    fine, kept, ratio = sign_of_row(blocks, work, LOAD, contact_sign, (size, ZERO_TOLERANCE * size))
+    if is_stretched:
+        ratio *= ratio
+    return fine, kept, 0.0 if fine else ratio
 
 
 @Inner
-def is_contact_force_resolved(forces, is_length, blocks, work):  # type: ignore[no-untyped-def]
+def is_contact_force_resolved(forces, is_length, is_stretched, blocks, work):  # type: ignore[no-untyped-def]
     """Return whether N itself is resolved, as its extremes require, and the ratio of its middle coefficients.
 
     If it is a length, that is its square, which is smooth also where it almost vanishes; the rows N0 and KAPPA become
-    the length and 0.
+    the length and 0. On a leg whose variable is stretched its extremes need only be located (`peaks`).
     """
     if is_length:
         fill_lengths(forces, blocks, work)
@@ -274,7 +290,9 @@ def is_contact_force_resolved(forces, is_length, blocks, work):  # type: ignore[
         if is_length:
             product(work, blocks * SERIES + at, n0, n0)
     size = size_of_row(blocks, work, SERIES)
-    _tail, middle, fine = examine_row(blocks, work, SERIES, size)
+    tail, middle, fine = examine_row(blocks, work, SERIES, size)
+    if is_stretched and not is_length:
+        fine, middle = tail <= LOCATED_RATIO * size, middle * sqrt(middle / size)
     return fine, middle / size
 
 
@@ -291,7 +309,7 @@ def fill_lengths(forces, blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def curvature_sign(blocks, work):  # type: ignore[no-untyped-def]
+def curvature_sign(is_stretched, blocks, work):  # type: ignore[no-untyped-def]
     """Return `sign_of_row` for the curvature, with a ratio that is compared with TAIL_RATIO; 0 if it is resolved.
 
     The law at the nodes has the curvature itself, and only its sign matters here. Along a graph its coefficients
@@ -299,6 +317,8 @@ def curvature_sign(blocks, work):  # type: ignore[no-untyped-def]
     """
     for at in range(0, blocks * WIDE, WIDE):
         product(work, blocks * LOAD + at, blocks * DS + at, blocks * KAPPA + at)
+        if is_stretched:  # without the factor J, the bound of the sign is closer
+            quotient_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * D + at)
     size = size_of_row(blocks, work, LOAD)
     sign = 1 if work[blocks * LOAD] > 0.0 else -1
     fine, kept, ratio = sign_of_row(blocks, work, LOAD, sign, (size, CANCELLATION_NOISE * size))

@@ -29,7 +29,7 @@ def _exact(variable: LegVariable, y: float) -> Any:
     return up * mp.expm1(t) - down * mp.expm1(-t), slope
 
 
-@pytest.mark.parametrize(("place", "height"), [*pairs([-1.2, -0.6, 0.0, 0.7], [0.125, 0.5, 0.9])])
+@pytest.mark.parametrize(("place", "height"), [*pairs([-1.1, -0.6, 0.0, 0.6], [0.125, 0.5, 0.9])])
 def test_map(place: float, height: float) -> None:
     """Distances, their inverse and the width are those of ``c + b sinh(u)``, to a few roundings."""
     origin, width = (-1.125, 3e-17), 1.75
@@ -54,6 +54,6 @@ def test_map(place: float, height: float) -> None:
 
 
 def test_other_legs_are_not_stretched() -> None:
-    """A leg is not stretched without a known branch point, beside one that is high above it, or far from one."""
-    for branch in (BranchPoint(0.5, 0.0), BranchPoint(0.5, np.inf), BranchPoint(0.5, 1.5), BranchPoint(1.75, 0.5)):
+    """A leg is stretched beside a known branch point only that is neither high above it nor elsewhere on the curve."""
+    for branch in (BranchPoint(0.5, 0.0), BranchPoint(0.5, np.inf), BranchPoint(0.5, 2.0), BranchPoint(1.75, 0.5)):
         assert variable_for(branch, (0.0, 0.0), 1, 1.25) == LegVariable(1.25, 0.0, 0.0, 0.0)

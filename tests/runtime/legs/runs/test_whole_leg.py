@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.optimize import minimize_scalar
 
 import generated.circle_coulomb
 import gqm_sym as gqm
@@ -149,6 +150,20 @@ class Slope:
         """Return V**2 at x after a launch from rest at a."""
         return self.gain(a, x, v, 8) * mp.exp(-v * self.exponent(x))
 
+    def largest_load(self, a: mpf, b: mpf) -> float:
+        """Return the largest contact force per mass from a turn at a back to b."""
+
+        def minus_load(x: float) -> float:
+            ds = mp.sqrt(1 + self.slope(mpf(x)) ** 2)
+            return -float(self.g / ds + mp.diff(self.slope, x) / ds**3 * self.v2(a, mpf(x), -1))
+
+        places = np.linspace(float(b), float(a), 20)
+        values = [minus_load(x) for x in places.tolist()]
+        k = int(np.argmin(values))
+        beside = places[max(k - 1, 0)], places[min(k + 1, 19)]
+        inside = minimize_scalar(minus_load, bounds=beside, method="bounded", options={"xatol": 1e-9})
+        return -min(values[k], float(inside.fun))
+
     def turn(self, a: mpf, v: int) -> Any:
         """Return where a body launched from rest at a turns, by Newton's method."""
         b = -a
@@ -232,6 +247,7 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
         a, b = places[:2]
         lightest = min(body.g / mp.sqrt(1 + slope(x) ** 2) for x in places)  # where the body rests for a moment
         assert swept("normal_force_min") == pytest.approx(float(lightest), rel=2e-15)
+        assert swept("normal_force_max") == pytest.approx(body.largest_load(a, b), rel=2e-15)
         fastest = mp.findroot(lambda x: mp.diff(lambda y: body.v2(a, y, -1), x), 0.0)
         assert swept("v_max") == pytest.approx(float(mp.sqrt(body.v2(a, fastest, -1))), rel=1e-15)
         motion = module.solve(start, 0.0, **given)
@@ -242,6 +258,7 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
             for found in (motion.lam(time), module.solve(start, 0.0, **(given | {"t_max": time})).legs[0].lam_end):
                 assert abs(found - place) <= min(motion.error_bound(time), 2e-15)
             assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
+            assert swept("normal_force_max", t_max=time) == pytest.approx(body.largest_load(a, place), rel=4e-15)
             if (place - fastest) * (a - fastest) > 0:
                 v_there = float(mp.sqrt(body.v2(a, place, -1)))
                 assert swept("v_max", t_max=time) == pytest.approx(v_there, rel=2e-15)
