@@ -13,10 +13,12 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
-from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
+from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
+from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
@@ -88,7 +90,23 @@ class PeriodicMotion(PeriodicTimes):
 
     @locked
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
-        return gradient(self._derivatives, self, quantity, wrt)
+        found = self._period_gradient(quantity, wrt) if quantity in PERIODS else None
+        return gradient(self._derivatives, self, quantity, wrt) if found is None else found
+
+    def _period_gradient(self, quantity: str, wrt: Any) -> dict[str, float] | None:
+        """Return the derivatives of a period along a curve with formulas; None where they take more than one call of
+        compiled code.
+        """
+        swings, formulas, lam0 = self.kind == "libration", self.problem.formulas, self.problem.lam0
+        if not isinstance(formulas.exact, ExactFormulas) or not (swings or quantity == "period"):
+            return None
+        rows = selected(formulas.parameters, wrt)
+        span = lam0 - self._given_offsets[0], lam0 + self._given_offsets[1]
+        found = period_gradient(self.problem, 0 if swings else self.direction, span, tuple(rows.values()))
+        if found is None:
+            return None
+        shares = 2.0 * found if swings and quantity == "period" else found
+        return dict(zip(rows, shares.tolist(), strict=True))
 
     @locked
     def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
