@@ -59,6 +59,9 @@ class PeriodicMotion(PeriodicTimes):
 
     _sampler: Sampler | None = None
 
+    # The last sampler of sensitivities, and the phase angle of the launch by its times.
+    _sampled: tuple[Sampler, float] | None = None
+
     @computed_once
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
@@ -135,7 +138,7 @@ class PeriodicMotion(PeriodicTimes):
         if sampled is not None:
             sampler, times, phi, shape = sampled
             made = self._orbit_sensitivity.at_times(self, sampler.record, times, phi, tuple(rows.values()))
-            return Sensitivity(tuple(rows), *made.reshape(len(made), len(rows), *shape))
+            return Sensitivity(tuple(rows), *(made.reshape(len(made), len(rows), *shape) if shape else made[:, :, 0]))
         points, phi, shape = self._orbit_points(t)
         found = self._orbit_sensitivity.at(self, points, phi, list(rows.values()))
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
@@ -155,7 +158,9 @@ class PeriodicMotion(PeriodicTimes):
         """Return the sampler for times, these, the phase angle of the launch, and their shape; None if there is no
         sampler.
         """
-        time = plain_time(t)
+        time, known = plain_time(t), self._sampled
+        if time is not None and known is not None and self._sampler_for(time, time) is known[0]:
+            return known[0], np.array([time]), known[1], ()
         given = plain_times(t) if time is None else (np.array([time]), time, time)
         # The speeds of some segments can be computed from their panels only.
         from_panels = given is None or self._segment.from_multiprecision
@@ -163,7 +168,8 @@ class PeriodicMotion(PeriodicTimes):
         if given is None or sampler is None:
             return None
         trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
-        return sampler, given[0].reshape(-1), trajectory.segments[0].phi_start, shape
+        self._sampled = sampler, trajectory.segments[0].phi_start
+        return sampler, given[0].reshape(-1), self._sampled[1], shape
 
     def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
         """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""
