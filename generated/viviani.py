@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 14, input c93b8a64a5a5, body 85a247af44ea
+# interface 15, input c93b8a64a5a5, body 50a8a8c92863
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=14)
+compiled = compiler(__file__, interface=15)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -302,9 +302,10 @@ def equilibria(*, between: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '
 
 @compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
-    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms, y, N along x, y and z."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (11, n))
     a, g, m = p[0], p[1], p[2]
+    _t8 = 1/a
     _c0 = fabs(a)
     _c1 = fabs(g)
     for i in range(n):
@@ -317,17 +318,27 @@ def load_map(n, w0, level, places, p, out):
         _t5 = _t4**2
         _t6 = _t5 + 1
         _t7 = sqrt(_t6)
-        _t8 = 1/(a*sqrt(_t6)**3)
-        _t9 = _t8/2
-        _t10 = speed_squared_from_potential(w0, _t3*g, level)
-        _t11 = g/_t7
+        _t9 = _t8/sqrt(_t6)**3
+        _t10 = _t9/2
+        _t11 = speed_squared_from_potential(w0, _t3*g, level)
+        _t12 = sin(theta)
+        _t13 = 1/_t7
+        _t14 = _t13*g
+        _t15 = -_t11*_t4**3*_t9 + _t12*_t14
+        _t16 = _t0*_t14 + _t10*_t11*_t2*(_t0 + 2)
+        _t17 = _t11*_t8/_t6**2
+        _t18 = _t13*_t4
         out[0, i] = a*(_t0 + 1)
         out[1, i] = _t3
         out[2, i] = _t7*a
-        out[3, i] = _t9*sqrt(3*_t5 + 5)
-        out[4, i] = _t10
-        out[5, i] = m*sqrt(_t10**2/(_t6**3*a**2) + (_t0*_t11 + _t10*_t2*_t9*(_t0 + 2))**2 + (-_t10*_t4**3*_t8 + _t11*sin(theta))**2)
+        out[3, i] = _t10*sqrt(3*_t5 + 5)
+        out[4, i] = _t11
+        out[5, i] = m*sqrt(_t11**2/(_t6**3*a**2) + _t15**2 + _t16**2)
         out[6, i] = 2*_c0*_c1*fabs(_t2)
+        out[7, i] = _t12*a
+        out[8, i] = m*(-_t0*_t17 + _t15*_t18)
+        out[9, i] = m*(-_t12*_t17 - _t16*_t18)
+        out[10, i] = m*(_t0*_t13*_t16 + _t12*_t13*_t15)
 
 
 @compiled(POTENTIAL_DIVDIFF1_BATCH)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line, transition
     from gqm_sym.derivation import Model, derive
-    from gqm_sym.design.least_speed import least_speed
+    from gqm_sym.design.least_speed import least_speed, least_speed_gradient
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
     from gqm_sym.fitting.fit import fit
@@ -58,6 +58,7 @@ _HOMES = {
     "fit": "gqm_sym.fitting.fit",
     "jax": "gqm_sym.jax",
     "least_speed": "gqm_sym.design.least_speed",
+    "least_speed_gradient": "gqm_sym.design.least_speed",
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
@@ -92,6 +93,7 @@ __all__ = [
     "fit",
     "jax",
     "least_speed",
+    "least_speed_gradient",
     "line",
     "read_spec",
     "read_sweep",

@@ -14,24 +14,30 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
-from gqm_sym.design.shape import time_gradient
-from gqm_sym.design.tracks import read_constant
+from gqm_sym.design.limits import (
+    LIMITS,
+    Limit,
+    Limited,
+    along_chart,
+    along_formulas,
+    along_spline,
+    end_slopes,
+    margins_of,
+    read_limits,
+    slopes_of,
+)
+from gqm_sym.design.shape import SplineChanges, time_gradient
 from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
 from gqm_sym.runtime.charts.sampled import MIN_POINTS, Sampled
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.gradients.charts.programs import ChartSource
+from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
-
-# The quantities that may be limited, with their units.
-LIMITS = {"height": "m", "slope": "1", "curvature": "1/m", "normal_force": "N"}
-
-# The number of places along the track at which limits are imposed.
-PLACES = 201
 
 # The largest number of steps of the optimiser, and the share by which a limit may be exceeded.
 MAX_STEPS, MAX_EXCESS = 200, 1e-6
@@ -93,10 +99,10 @@ def minimise(
 
     Notes
     -----
-    The optimiser is SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` if there are such, and difference
-    quotients otherwise. The time to the end of a track through points has exact derivatives by all its points together,
-    if the body is launched from the first of them, which does not move, and loses no energy. The result is a local
-    minimum.
+    The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
+    curve with formulas they are those of ``motion.gradient`` and of all limits. For a track through points they are
+    those of all limits by all its points together, if the body loses no energy, and those of the time to its end, if
+    the body is also launched from the first point, which does not move. The result is a local minimum.
 
     Examples
     --------
@@ -114,7 +120,7 @@ def minimise(
     asked = one_of(quantity, tuple(QUANTITIES), where=f"{where}: quantity")
     if asked == "turning_points":
         raise DeclarationError(f"{where}: quantity: turning_points are two numbers; ask for one number")
-    wanted = _limits(mapping(limits, where=f"{where}: limits", example="{'slope': (-1, 1)}"), where)
+    held = read_limits(mapping(limits, where=f"{where}: limits", example="{'slope': (-1, 1)}"), where)
     kind = _Family if isinstance(track, Curve) else _Points
     with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
         tracks = kind(track, force, free, given, folder)
@@ -134,13 +140,14 @@ def minimise(
             exact = tracks.gradient(asked, x)
             return quotients(value, x) if exact is None else exact / first
 
-        held = [(name, low, high) for name, (low, high) in wanted.items()]
-
         def margins(x: Array) -> Array:
-            return np.concatenate([np.ones(1), *tracks.margins(x, held, between)])
+            return np.concatenate(margins_of(held, tracks.limited(x, between)))
 
         def steepness(x: Array) -> Array:
-            return quotients(margins, x)
+            def of_one(limit: Limit) -> Array:
+                return quotients(lambda y: margins_of([limit], tracks.limited(y, between))[0], x)
+
+            return np.concatenate(slopes_of(held, tracks.limited(x, between), of_one, x.size))
 
         found = minimize(
             value,
@@ -151,47 +158,24 @@ def minimise(
             constraints=[{"type": "ineq", "fun": margins, "jac": steepness}] if held else [],
             options={"maxiter": MAX_STEPS, "ftol": tracks.tolerance},
         )
-        _check(tracks, np.asarray(found.x), held, between, f"{where}: {found.message}" if found.status == 9 else where)
-        return tracks.track(np.asarray(found.x))
-
-
-def _limits(limits: Mapping[str, tuple[Any, Any]], where: str) -> dict[str, tuple[float, float]]:
-    """Read the limits on load and shape."""
-    found = {}
-    for name, pair in limits.items():
-        if name not in LIMITS:
-            raise DeclarationError(unknown_argument(f"{where}: limits", str(name), LIMITS, what="limit"))
-        if not isinstance(pair, tuple | list) or len(pair) != 2:
-            raise DeclarationError(
-                f"{where}: limits: {name}: must be (low, high), either of them None, got {short(pair)}"
+        best = np.asarray(found.x)
+        _check(held, tracks.limited(best, between) if held else None)
+        if found.status == 9:  # SLSQP's code for this
+            raise SolutionError(
+                f"{where}: {found.message} after {MAX_STEPS} steps; begin nearer to the minimum, or free less"
             )
-        low, high = (
-            side if end is None else float(read_constant(end, f"limits: {name}", where=where, unit=LIMITS[name]))
-            for end, side in zip(pair, (-inf, inf), strict=True)
-        )
-        if not low < high:
-            raise DeclarationError(
-                f"{where}: limits: {name}: the limits contradict each other, got ({low!r}, {high!r})"
-            )
-        found[name] = (low, high)
-    return found
+        return tracks.track(best)
 
 
-def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: str) -> None:
-    """Refuse a result that violates the limits, or is not a minimum."""
-    for (name, low, high), margins in zip(held, tracks.margins(x, held, between), strict=True):
+def _check(held: list[Limit], found: Limited | None) -> None:
+    """Refuse a result that violates the limits."""
+    for limit, margins in zip(held, margins_of(held, found), strict=True):
         if not margins.min() >= -MAX_EXCESS:
             raise SolutionError(
-                f"{where}: no track was found that meets all limits; at best {name} exceeds ({low:.6g}, {high:.6g}) by "
-                f"{-margins.min() * _scale(low, high):.3g} {LIMITS[name]}. Begin elsewhere, or allow more"
+                f"design.minimise: no track was found that meets all limits; at best {limit.name} exceeds "
+                f"({limit.low:.6g}, {limit.high:.6g}) by {-margins.min() * limit.scale:.3g} {LIMITS[limit.name]}. "
+                "Begin elsewhere, or allow more"
             )
-    if where.endswith("limit reached"):
-        raise SolutionError(f"{where} after {MAX_STEPS} steps; begin nearer to the minimum, or free less")
-
-
-def _scale(low: float, high: float) -> float:
-    """Return the size of a limit, by which its margin is measured."""
-    return max((abs(end) for end in (low, high) if isfinite(end)), default=1.0) or 1.0
 
 
 class _Tracks(ABC):
@@ -268,37 +252,21 @@ class _Tracks(ABC):
                 raise
             return nan
 
-    def margins(self, x: Array, held: list[Any], between: Any) -> list[Array]:
-        """Return the margin to each limit at places along one track, as a share of the limit."""
-        if not held:
-            return []
+    def limited(self, x: Array, between: Any) -> Limited | None:
+        """Return the quantities that may be limited at places along one track; None where there is no motion."""
         try:
-            rows = self._rows(x, between)
+            return self._limited(x, between)
+        except DeclarationError:
+            raise
         except GQMError:
             if x is self.start:
                 raise
-            return [np.full(2 * PLACES, -1.0) for _ in held]
-        found = []
-        for name, low, high in held:
-            scale = _scale(low, high)
-            both = np.concatenate([(rows[name] - low) / scale, (high - rows[name]) / scale])
-            found.append(np.where(np.isnan(both), -1.0, np.minimum(both, 1e6)))
-        return found
+            return None
 
-    def _rows(self, x: Array, between: Any) -> dict[str, Array]:
-        """Return heights, slopes, curvatures and contact forces at places along one track."""
-        from scipy.interpolate import CubicSpline
-
+    def _limited(self, x: Array, between: Any) -> Limited:
+        """Return what `limited` does; with derivatives where they are known."""
         model, request, parameters, ends = self._launch(x)
-        low, high = ends if between is None else sorted(float(end) for end in between)
-        if not (isfinite(low) and isfinite(high)):
-            raise DeclarationError("design.minimise: between: the curve is endless; say where the limits are held")
-        places = np.linspace(low, high, PLACES)
-        found = model.pass1(request, parameters, places)
-        rises = [CubicSpline(places, row)(places, 1) for row in (found.z, found.x)]
-        with np.errstate(divide="ignore"):
-            slope = rises[0] / rises[1]
-        return {"height": found.z, "slope": slope, "curvature": found.kappa, "normal_force": found.normal_force}
+        return along_chart(model, request, parameters, ends, between)
 
 
 def _arrival(motion: Any, low: float, high: float) -> float:
@@ -330,16 +298,33 @@ class _Family(_Tracks):
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
         return self._compiled, dict(zip(self._names, x.tolist(), strict=True))
 
+    @property
+    def _from_end(self) -> bool:
+        """Whether the launch is at the lower end of the curve, and moves with it."""
+        return "lam0" not in self._given
+
     def gradient(self, quantity: str, x: Array) -> Array | None:
         """Return the derivatives of a solved motion; the time to the end of the track is that at which it ends."""
         model, request, parameters, _ = self._launch(x)
         lam = self._given.get("lam") if quantity == "time_at" else None
         asked = "t_end" if quantity == "time_at" and lam is None else quantity
+        if self._from_end and model.domain_of is None:
+            return None
         try:
-            found = model.solve(request, parameters).gradient(asked, self._names, lam=lam)
+            found = model.solve(request, parameters).gradient(asked, (*self._names, "lam0"), lam=lam)
         except GQMError:
             return None
-        return np.array([found[name] for name in self._names])
+        slopes: Array = np.array([found[name] for name in self._names])
+        if self._from_end:
+            slopes += found["lam0"] * end_slopes(model, model.numbers(parameters), self._names)[0]
+        return slopes
+
+    def _limited(self, x: Array, between: Any) -> Limited:
+        """Return the quantities along a curve, with their derivatives if it has formulas."""
+        model, request, parameters, _ = self._launch(x)
+        if not isinstance(model.exact, ExactFormulas | ExactLaw):
+            return super()._limited(x, between)
+        return along_formulas(model, request, parameters, self._names, between, from_end=self._from_end)
 
     def track(self, x: Array) -> Curve:
         """Return the curve with other defaults."""
@@ -396,6 +381,19 @@ class _Points(_Tracks):
             return None
         p = tuple(number.value for number in numbers)
         return time_gradient(points, self._moved, model.exact.effective_potential, p, launch.v0.value)
+
+    def _limited(self, x: Array, between: Any) -> Limited:
+        """Return the quantities along a spline, with their derivatives if the body loses no energy."""
+        model, request, parameters, ends = self._launch(x)
+        points = self._heights(x)
+        if not isinstance(model.exact, ExactPotential) or points.shape[1] > 2 or model.rolling_radius:
+            return super()._limited(x, between)
+        numbers, names = model.numbers(parameters), list(model.parameters)
+        launch = read_launch(model, numbers, request)
+        source = ChartSource(model.exact.effective_potential, model.inertia, len(names), names.index("m"), ())
+        p = tuple(number.value for number in numbers)
+        changes = SplineChanges(points, self._moved)
+        return along_spline(changes, source, (p, launch.lam0.value, launch.v0.value), ends, between)
 
     def track(self, x: Array) -> Curve:
         """Return the track through the points with these heights. They are not measured, so they have no scatter."""

@@ -10,7 +10,8 @@ with the potential's derivative U_n along the normal. The time is an integral ov
 points takes one set of nodes.
 """
 
-from typing import Any, NamedTuple
+from math import factorial
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -24,79 +25,126 @@ from gqm_sym.runtime.compiled.types import Array
 NODES, ITERATIONS = 16, 8
 
 
-class _Nodes(NamedTuple):
-    """Nodes along a spline, with weights.
+class SplineChanges:
+    """How a spline through points changes when some of them move up.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        The points.
+    moved : list of int
+        The k points that move.
 
     Attributes
     ----------
-    place, weight : (n, NODES) arrays
-        The parameter at the nodes between two points, and the weights.
-    first, second : (2, n, NODES) arrays
-        The derivatives of the coordinates.
-    """
-
-    place: Array
-    weight: Array
-    first: Array
-    second: Array
-
-
-def displacements(points: Array, moved: list[int]) -> tuple[Any, _Nodes, Array]:
-    """Return the spline through points, its nodes, and its displacements there for each point that moves up.
-
-    Returns
-    -------
     spline : scipy.interpolate.BSpline
         The spline.
-    nodes : _Nodes
-        The nodes, and behind those between the last two points the end of the track with the weight 0.
-    change : (2, n, NODES + 1, k) array
-        The changes of both coordinates at fixed values of the spline's parameter.
+    knots : (n,) array
+        Its knots, which are its arc lengths at the points.
+    lengthening : (k,) array
+        The changes of its length.
+    place, weight : (n - 1, NODES + 1) arrays
+        Nodes between two points, as values of the spline's parameter, and weights. The last node is at the second of
+        the points and has the weight 0.
     """
-    from scipy.interpolate import make_interp_spline
 
-    knots = arc_length_knots(points, closed=False)
-    spline = make_interp_spline(knots, points, k=DEGREE)
-    nodes, weights = leggauss(NODES)
-    # The distance from the launch is the square of a variable, in which the time of a body from rest is smooth.
-    roots = np.sqrt(knots - knots[0])
-    middles, halves = 0.5 * (roots[1:] + roots[:-1])[:, None], 0.5 * np.diff(roots)[:, None]
-    root = middles + halves * nodes
-    place, weight = knots[0] + root * root, 2.0 * root * halves * weights
-    place, weight = np.hstack([place, knots[1:, None]]), np.hstack([weight, np.zeros((len(weight), 1))])
-    first, second = (np.moveaxis(spline(place, order), -1, 0) for order in (1, 2))
-    tangent = first / np.hypot(*first)
-    # The powers of the distance behind each knot, by which a spline changes when the knot moves: its fifth derivative
-    # jumps there.
-    pieces = spline(0.5 * (knots[1:] + knots[:-1]), DEGREE)
-    jumps = np.zeros_like(points)
-    jumps[1:-1] = np.diff(pieces, axis=0)
-    units, at_knots = np.eye(len(points))[:, moved], spline(knots, 1)
-    cardinal = make_interp_spline(knots, units, k=DEGREE)
-    straight, rate = cardinal(place), cardinal(place, 1)
+    def __init__(self, points: Array, moved: list[int]) -> None:
+        from scipy.interpolate import make_interp_spline
 
-    def behind(where: Array, power: int) -> Array:
-        """Return the powers of the distances behind all knots, divided by the factorial."""
-        found: Array = np.maximum(where[..., None] - knots, 0.0) ** power / (24.0 if power == 4 else 6.0)
+        self.knots = knots = arc_length_knots(points, closed=False)
+        self.spline = make_interp_spline(knots, points, k=DEGREE)
+        nodes, weights = leggauss(NODES)
+        # The distance from the launch is the square of a variable, in which the time of a body from rest is smooth.
+        roots = np.sqrt(knots - knots[0])
+        middles, halves = 0.5 * (roots[1:] + roots[:-1])[:, None], 0.5 * np.diff(roots)[:, None]
+        root = middles + halves * nodes
+        place, weight = knots[0] + root * root, 2.0 * root * halves * weights
+        self.place = np.hstack([place, knots[1:, None]])
+        self.weight = np.hstack([weight, np.zeros((len(weight), 1))])
+        self._cardinal = make_interp_spline(knots, np.eye(len(points))[:, moved], k=DEGREE)
+        # A spline changes by a power of the distance behind each knot that moves: its fifth derivative jumps there.
+        pieces = self.spline(0.5 * (knots[1:] + knots[:-1]), DEGREE)
+        jumps = np.zeros_like(points)
+        jumps[1:-1] = np.diff(pieces, axis=0)
+        at_knots, first = self.spline(knots, 1), self.spline(self.place, 1)
+        tangent = first / np.linalg.norm(first, axis=-1, keepdims=True)
+        speed = np.hypot(*at_knots.T)[:, None]
+        shifts = np.zeros((len(points), len(moved)))
+        for _ in range(1 + ITERATIONS):
+            self._kicks = [-jumps[:, axis, None] * shifts for axis in range(2)]
+            self._filled = [
+                make_interp_spline(knots, -at_knots[:, axis, None] * shifts - self._behind(knots, 0) @ kicks, k=DEGREE)
+                for axis, kicks in enumerate(self._kicks)
+            ]
+            moves = np.einsum("nia,anik,ni->nk", tangent, self.at(self.place, 1), self.weight)
+            # The length between two knots also changes because they move.
+            moves += np.diff(speed * shifts, axis=0)
+            shifts = np.vstack([np.zeros(len(moved)), np.cumsum(moves, axis=0)])
+        self.lengthening = shifts[-1]
+
+    def _behind(self, place: Array, order: int) -> Array:
+        """Return the powers of the distances behind all knots, divided by the factorial, or a derivative of them."""
+        power = DEGREE - 1 - order
+        found: Array = np.maximum(place[..., None] - self.knots, 0.0) ** power / factorial(power)
         return found
 
-    lengths = np.einsum("ni,nik->nk", weight * tangent[1], rate)
-    change, moves = np.zeros((2, *straight.shape)), lengths
-    for _ in range(ITERATIONS):
-        shifts = np.vstack([np.zeros(len(moved)), np.cumsum(moves, axis=0)])
-        moves = lengths.copy()
-        for axis in range(2):
-            kicks = -jumps[:, axis, None] * shifts
-            missing = -at_knots[:, axis, None] * shifts - behind(knots, 4) @ kicks
-            filled = make_interp_spline(knots, missing, k=DEGREE)
-            change[axis] = filled(place) + behind(place, 4) @ kicks
-            slope = filled(place, 1) + behind(place, 3) @ kicks
-            moves += np.einsum("ni,nik->nk", weight * tangent[axis], slope)
-        # The length between two knots also changes because they move.
-        speed = np.hypot(*at_knots.T)[:, None]
-        moves += np.diff(speed * shifts, axis=0)
-    change[1] += straight
-    return spline, _Nodes(place, weight, first, second), change
+    def at(self, place: Array, order: int) -> Array:
+        """Return the changes of both coordinates, or of their derivatives, at fixed values of the spline's parameter.
+
+        Returns
+        -------
+        (2, ..., k) array
+            A number for each coordinate, place, and point that moves.
+        """
+        behind = self._behind(place, order)
+        found = np.array(
+            [filled(place, order) + behind @ kicks for filled, kicks in zip(self._filled, self._kicks, strict=True)]
+        )
+        found[1] += self._cardinal(place, order)
+        return found
+
+    def at_lengths(self, lengths: Array, moved: Array) -> tuple[Array, Array]:
+        """Return the coordinates at arc lengths, and their changes if the arc lengths change by ``moved``.
+
+        Parameters
+        ----------
+        lengths : (m,) array
+            Arc lengths from the first point.
+        moved : (m, k) array
+            Their changes.
+
+        Returns
+        -------
+        (6, m) and (6, m, k) arrays
+            x, z, their first derivatives with respect to the spline's parameter, and their second ones.
+        """
+        nodes, weights = leggauss(NODES)
+        shares, weights = 0.5 + 0.5 * nodes, 0.5 * weights
+
+        def ahead(begin: Array, end: Array) -> Array:
+            """Return the lengths of parts of the spline."""
+            first = self.spline(begin[:, None] + (end - begin)[:, None] * shares, 1)
+            found: Array = (end - begin) * (np.linalg.norm(first, axis=-1) @ weights)
+            return found
+
+        # The knots are lengths to some digits only.
+        edges = np.append(0.0, np.cumsum(ahead(self.knots[:-1], self.knots[1:])))
+        number = np.clip(np.searchsorted(edges, lengths, side="right") - 1, 0, len(self.knots) - 2)
+        begin, place = self.knots[number], lengths.copy()
+        for _ in range(ITERATIONS):
+            missing = lengths - edges[number] - ahead(begin, place)
+            place = place + missing / np.hypot(*self.spline(place, 1).T)
+        starts, widths = np.append(self.knots[:-1], begin), np.append(np.diff(self.knots), place - begin)
+        inner = starts[:, None] + widths[:, None] * shares
+        first = self.spline(inner, 1)
+        tangent = first / np.linalg.norm(first, axis=-1, keepdims=True)
+        longer = np.einsum("nia,anik,i,n->nk", tangent, self.at(inner, 1), weights, widths)
+        count = len(self.knots) - 1
+        before = np.vstack([np.zeros(longer.shape[1]), np.cumsum(longer[:count], axis=0)])
+        orders = [np.moveaxis(self.spline(place, order), -1, 0) for order in range(4)]
+        shift = (moved - before[number] - longer[count:]) / np.hypot(*orders[1])[:, None]
+        changes = [self.at(place, order) + orders[order + 1][..., None] * shift for order in range(3)]
+        return np.concatenate(orders[:3]), np.concatenate(changes)
 
 
 def time_gradient(points: Array, moved: list[int], potential: Any, p: tuple[float, ...], v0: float) -> Array:
@@ -115,16 +163,17 @@ def time_gradient(points: Array, moved: list[int], potential: Any, p: tuple[floa
     v0 : float
         The speed at the first point.
     """
-    spline, nodes, change = displacements(points, moved)
-    x, z = np.moveaxis(spline(nodes.place), -1, 0)
+    changes = SplineChanges(points, moved)
+    (x, z), first, second = (np.moveaxis(changes.spline(changes.place, order), -1, 0) for order in range(3))
     u, by_x, by_z = (np.broadcast_to(part, x.shape) for part in potential(ARRAYS, x, z, p))
-    speed = np.hypot(*nodes.first)
-    tx, tz = nodes.first / speed
-    kappa = (tx * nodes.second[1] - tz * nodes.second[0]) / speed**2
+    speed = np.hypot(*first)
+    tx, tz = first / speed
+    kappa = (tx * second[1] - tz * second[0]) / speed**2
     start = potential(ARRAYS, *points[0], p)[0]
     v = np.sqrt(v0 * v0 + 2.0 * (start - u))
+    change = changes.at(changes.place, 0)
     normal = change[1] * tx[..., None] - change[0] * tz[..., None]
-    density = ((by_z * tx - by_x * tz) / v**3 - kappa / v) * speed * nodes.weight
+    density = ((by_z * tx - by_x * tz) / v**3 - kappa / v) * speed * changes.weight
     ends = np.array([float(number == len(points) - 1) for number in moved])
     found: Array = np.einsum("ni,nik->k", density, normal) + ends * tz[-1, -1] / v[-1, -1]
     return found

@@ -22,13 +22,15 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
     force = model.normal_force_at(v2).xreplace(FORWARDS)
-    grown, outputs = with_named_exponentials((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
+    in_space = () if not model.curve.in_space or model.coriolis else (model.y, *model.normal_force_vector_at(v2))
+    rows = (model.x, model.z, model.ds, model.kappa, v2, force, size, *in_space)
+    grown, outputs = with_named_exponentials(rows, names.symbol)
     return (
         lowering.function(
             "load_map",
             (w0, level, places),
             f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), "
-            "size of U's terms.",
+            f"size of U's terms{', y, N along x, y and z' if in_space else ''}.",
             inside=[(lowering.place, at(places)), *grown],
             outputs=outputs,
         ),

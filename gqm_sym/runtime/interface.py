@@ -19,7 +19,8 @@ rider_loads            n, lam, v2, v, nu, p, out      loads on a rider upwards, 
                                                       roll angle, times a positive number; x, y and z of the track [m];
                                                       (dx/ds)**2 + (dy/ds)**2 where the roll angle is from the level
 load_map               n, w0, level, lam, p, out      x, z, ds/dlam, kappa, V**2 [m2/s2], N, and the size of the terms
-                                                      of U [m2/s2], whose roundings are shares of it
+                                                      of U [m2/s2], whose roundings are shares of it; for a space curve
+                                                      that does not turn the rows of path_in_space as well
 effective_potential    n, lam, p, out                 U [m2/s2], dU/dlam [m2/s2/[lam]]
 potential_divdiff1     n, a, lam, d, p, out           U[a, lam] [m2/s2/[lam]], ds/dlam at lam
 potential_divdiff2     n, a, b, da, db, p, out        U[a, lam, b] [m2/s2/[lam]**2], ds/dlam at lam
@@ -96,7 +97,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 14
+INTERFACE = 15
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

@@ -22,6 +22,8 @@ from gqm_sym.runtime.launch.problem import bind, bind_all
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.rider import rider_loads
 from gqm_sym.runtime.launch.speed import (
+    MAP_ROWS,
+    MAP_ROWS_IN_SPACE,
     Pass1,
     Pass1InSpace,
     Pass1OfRider,
@@ -153,39 +155,42 @@ class CompiledModel(Formulas):
             v2 = launch_leg(self, p, launch, places)
             x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, places, v2)
             for array, values in zip(arrays, (x, z, ds, kappa, v2, force), strict=False):
-                array[...] = (values if beyond is None else np.where(beyond, nan, values)).reshape(shape)
-            self._fill_in_space(f.p, launch, places, arrays)
-            return arrays
+                array[...] = values.reshape(shape)
+            self._fill_in_space(f.p, launch, places, arrays, MAP_ROWS)
+            return _without(arrays, beyond)
         start = (launch.lam0.value, launch.lam0.low, launch.v0.value**2)
-        load_map = 0 if self.load_map is None else self.load_map.address
-        rows = tuple(array.reshape(-1) for array in arrays[: len(Pass1._fields)])
+        # In a rotating frame the rows in space depend on the direction of motion.
+        in_space = None if self.directed else self.path_in_space
+        filled = MAP_ROWS if in_space is None else MAP_ROWS_IN_SPACE
+        of_map = 0 if self.load_map is None else self.load_map.address, 0 if in_space is None else in_space.address
+        rows = tuple(array.reshape(-1) for array in arrays[:filled])
+        to_fill = (*rows, *(NO_LOW_PARTS,) * (MAP_ROWS_IN_SPACE - filled))
         past_cache = len(rows) * places.nbytes >= LARGE
 
         def fill(part: slice) -> None:
             ends = part.start, part.stop
-            fill_load_map(f.addresses, load_map, f.p, start, (places, low_parts), rows, ends, past_cache)
+            fill_load_map(f.addresses, of_map, f.p, start, (places, low_parts), to_fill, ends, past_cache)
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
-        if beyond is not None:
-            for row in rows:
-                row[beyond] = nan
-        self._fill_in_space(f.p, launch, places, arrays)
-        return arrays
+        self._fill_in_space(f.p, launch, places, arrays, filled)
+        return _without(arrays, beyond)
 
     def _fill_in_space(
-        self, p: Array, launch: Launch, places: Array, arrays: Pass1 | Pass1InSpace | Pass1OfRider
+        self, p: Array, launch: Launch, places: Array, arrays: Pass1 | Pass1InSpace | Pass1OfRider, filled: int
     ) -> None:
-        """Fill the rows that only the load map of a space curve has."""
-        if self.path_in_space is None:
+        """Fill the rows that only the load map of a space curve has, but for those that are filled already."""
+        if self.path_in_space is None or filled == len(arrays):
             return
         v2 = arrays.v2.reshape(-1)
-        rows, force = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]], arrays.normal_force.reshape(-1)
+        rows, force = [array.reshape(-1) for array in arrays[filled:]], arrays.normal_force.reshape(-1)
 
         def fill(part: slice) -> None:
             # From rest the body may move to either side of the launch.
             side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
             ahead = np.where(side != 0.0, side, float(launch.direction))
-            found = [*path_in_space(self, p, places[part], v2[part], ahead)]
+            found: list[Array] = []
+            if filled == MAP_ROWS:
+                found.extend(path_in_space(self, p, places[part], v2[part], ahead))
             if self.directed:
                 force[part] = length(np.array(found[1:]))
             if self.rider_loads is not None:
@@ -353,6 +358,16 @@ class CompiledModel(Formulas):
         if not self.text:
             raise SolutionError(f"{self.name}: is not imported from a file, so it cannot be pickled; build it first")
         return _model_of, (self.source, self.text, self.name)
+
+
+def _without(
+    arrays: Pass1 | Pass1InSpace | Pass1OfRider, beyond: NDArray[np.bool_] | None
+) -> Pass1 | Pass1InSpace | Pass1OfRider:
+    """Return the arrays of a load map with NaN at places beyond the ends of the curve."""
+    if beyond is not None:
+        for array in arrays:
+            array.reshape(-1)[beyond] = nan
+    return arrays
 
 
 def _model_of(source: str, text: str, name: str) -> Any:

@@ -1,6 +1,7 @@
 """The least launch speed is that with which contact holds everywhere."""
 
-from math import cosh, sqrt
+from math import acos, cos, cosh, sin, sinh, sqrt
+from pathlib import Path
 
 import pytest
 
@@ -12,7 +13,7 @@ import generated.ellipse
 import generated.parabola
 import generated.rolling_circle
 import gqm_sym as gqm
-from gqm_sym.errors import GQMError, LaunchError, ParameterError, SolutionError
+from gqm_sym.errors import GQMError, InputError, LaunchError, ParameterError, SolutionError
 
 # The tolerance is in roundings of the square of the speed.
 SHARE = 4e-16
@@ -67,6 +68,62 @@ def test_a_hump_asks_for_less_and_not_for_more() -> None:
     with pytest.raises(SolutionError, match=r"no speed.*at most|no speed.*low enough"):
         gqm.least_speed(generated.cycloid, 3, between=(1, 5))
     assert gqm.least_speed(generated.cycloid, "pi", between=(3, "2*pi - 3")) == 0.0
+
+
+def sizes(derivatives: dict[str, float], wanted: dict[str, float]) -> bool:
+    """Return whether derivatives are the expected ones to rounding."""
+    return derivatives == pytest.approx(wanted, rel=1e-14, abs=1e-15)
+
+
+def test_derivatives_of_loops() -> None:
+    """The derivatives are those of the closed forms above."""
+    circle, speed = generated.circle, sqrt(5 * 9.81 * 1.5)
+    found = gqm.least_speed_gradient(circle, 0, L=1.5, g=9.81)
+    assert sizes(found, {"m": 0.0, "g": speed / (2 * 9.81), "L": speed / 3, "lam0": 0.0})
+    speed = sqrt(9.81 * 0.9 * (3 + 2 * cos(1)))
+    found = gqm.least_speed_gradient(circle, 1, ("lam0", "g"), between=(-4, 4))
+    assert sizes(found, {"lam0": -9.81 * 0.9 * sin(1) / speed, "g": speed / (2 * 9.81)})
+    g, length, beta = 9.81, 2.0, 0.4
+    speed = sqrt(g * length * (1 + 4 / (1 + beta)))
+    found = gqm.least_speed_gradient(generated.rolling_circle, 0, "beta", L=length, beta=beta, g=g)
+    assert sizes(found, {"beta": -2 * g * length / (1 + beta) ** 2 / speed})
+    a, b = 1.0, 2.0
+    speed = sqrt(g * a**2 / b + 4 * g * b)
+    found = gqm.least_speed_gradient(generated.ellipse, "-pi/2", ("a", "b"), a=a, b=b, g=g)
+    assert sizes(found, {"a": g * a / b / speed, "b": (4 * g - g * a**2 / b**2) / (2 * speed)})
+
+
+def test_derivatives_where_the_ends_decide(tmp_path: Path) -> None:
+    """At a given end the place is fixed; at an end of the curve it moves; where any speed suffices they are 0."""
+    g, c, catenary = 9.81, 0.8, generated.catenary
+    speed = sqrt(2 * g * c * (cosh(1 / c) - 1))
+    found = gqm.least_speed_gradient(catenary, 0, "c", between=(-1, 0.5), c=c, g=g)
+    assert sizes(found, {"c": g * (cosh(1 / c) - 1 - sinh(1 / c) / c) / speed})
+    assert gqm.least_speed_gradient(catenary, 1, "c", between=(-1, 1), c=c, g=g) == {"c": 0.0}
+    curve = gqm.Curve.graph("k*x**2", domain=(-1, "1 + k"), parameters={"k": 1})
+    valley = gqm.build(gqm.derive(curve, gqm.Gravity()), name="valley_of_speeds", folder=str(tmp_path))
+    k = 0.7
+    speed = sqrt(2 * g * k) * (1 + k)
+    wanted = {"k": speed / (2 * k) + sqrt(2 * g * k), "lam0": 0.0}
+    assert sizes(gqm.least_speed_gradient(valley, 0, ("k", "lam0"), k=k, g=g), wanted)
+
+
+def test_derivatives_beyond_a_summit(tmp_path: Path) -> None:
+    """A bead has to get over the summit of z = a sin(x) + x/5, where a cos(x) = -1/5."""
+    curve = gqm.Curve.graph("a*sin(x) + x/5", domain=(-1, 3), parameters={"a": 1})
+    hill = gqm.build(gqm.derive(curve, gqm.Gravity()), name="hill_of_speeds", folder=str(tmp_path))
+    a, g, start = 0.8, 9.81, -0.3
+    top = acos(-0.2 / a)
+    speed = sqrt(2 * g * (a * (sin(top) - sin(start)) + (top - start) / 5))
+    found = gqm.least_speed_gradient(hill, start, ("a", "lam0"), contact="bilateral", a=a, g=g)
+    assert sizes(found, {"a": g * (sin(top) - sin(start)) / speed, "lam0": -g * (a * cos(start) + 0.2) / speed})
+
+
+def test_derivatives_that_do_not_exist() -> None:
+    """The speed itself is no variable, and neither are unknown names."""
+    for name in ("v0", "q"):
+        with pytest.raises(InputError, match="wrt"):
+            gqm.least_speed_gradient(generated.circle, 0, name)
 
 
 @pytest.mark.parametrize(

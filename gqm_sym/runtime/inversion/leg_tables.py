@@ -115,7 +115,9 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
 
 @Inner
 def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
-    """Fill the rows of ``out`` with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, as `find_places`."""
+    """Fill the rows of ``out`` with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, as `find_places`; a tenth
+    one with the place within the lap.
+    """
     intervals, slots, launch = (
         section(record, INTERVALS),
         section(record, SLOTS).view(np.int64),
@@ -146,6 +148,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             j, time_error, place_error = start + i, rows[7 * n + i], rows[8 * n + i]
             out[2, j], out[3, j], out[6, j], out[7, j] = frame[0, i], frame[1, i], frame[3, i], frame[4, i]
             out[8, j] = error_of_place(out[0, j], rows[i], out[4, j], frame[2, i], time_error, place_error)
+            if out.shape[0] > 9:
+                out[9, j] = rows[i]
 
 
 @entry(types.void(VECTOR, VECTOR, VECTOR, types.int64, types.int64), nogil=True)
@@ -169,14 +173,14 @@ def place_on_leg(record, t):  # type: ignore[no-untyped-def]
     return pair[1]
 
 
-@entry(types.UniTuple(types.float64, 10)(VECTOR, VECTOR, types.float64))
+@entry(types.UniTuple(types.float64, 11)(VECTOR, VECTOR, types.float64))
 def state_on_leg(record, p, t):  # type: ignore[no-untyped-def]
-    """Return the time, and the nine numbers of `find_states` at it."""
-    when, out = np.empty(1), np.empty((9, 1))
+    """Return the time, and the ten numbers of `find_states` at it."""
+    when, out = np.empty(1), np.empty((10, 1))
     when[0] = t
     find_states(record, p, when, out, 0, 1)
     r = out.reshape(-1)
-    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
+    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], r[9]
 
 
 @entry(types.void(VECTOR, VECTOR, MATRIX))

@@ -48,7 +48,7 @@ FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
 EDGES, LENGTHS, ARCS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
 SECTIONS = 19
-_STATE = types.UniTuple(types.float64, 10)
+_STATE = types.UniTuple(types.float64, 11)
 
 
 class Phases(NamedTuple):
@@ -226,8 +226,9 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         Run-time parameters.
     t : (n,) array
         Times from launch in s.
-    out : (9, n) array
-        Its rows are filled with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, in SI units.
+    out : (9, n) or (10, n) array
+        Its rows are filled with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, in SI units; a tenth one with
+        the place within the lap.
     """
     find_places(record, t, out[0], begin, end)
     shape, launch, address = (
@@ -272,6 +273,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
         for k in range(8):
             put(out[k + 1], start, found[k], 0, n, False)
+        if out.shape[0] > 9:
+            put(out[9], start, reduced, 0, n, False)
 
 
 @Inner
@@ -328,9 +331,9 @@ def place_at_time(record, t):  # type: ignore[no-untyped-def]
 
 @entry(_STATE(VECTOR, VECTOR, types.float64))
 def state_at_time(record, p, t):  # type: ignore[no-untyped-def]
-    """Return the time, and the nine numbers of `find_states` at it."""
-    when, out = np.empty(1), np.empty((9, 1))
+    """Return the time, and the ten numbers of `find_states` at it."""
+    when, out = np.empty(1), np.empty((10, 1))
     when[0] = t
     find_states(record, p, when, out, 0, 1)
     r = out.reshape(-1)
-    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]
+    return t, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], r[9]

@@ -81,14 +81,16 @@ def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction
     pushed = force < 0.0 if rubs else np.zeros(lam.size, dtype=np.bool_)
     for v, nu in product((1.0, -1.0, 0.0), (1.0, -1.0)):
         here = (direction == v) & (pushed == (nu < 0.0))
+        if not here.any():
+            continue
         if here.all():
             rows = rider_loads_at(formulas.rider_loads.address, p, lam, v2, v, nu)
             break
         if rows is None:
             rows = np.full((len(FIELDS) + 1, lam.size), np.nan)
-        if here.any():
-            rows[:, here] = rider_loads_at(formulas.rider_loads.address, p, lam[here], v2[here], v, nu)
-    assert rows is not None
+        rows[:, here] = rider_loads_at(formulas.rider_loads.address, p, lam[here], v2[here], v, nu)
+    if rows is None:
+        rows = np.empty((len(FIELDS) + 1, 0))
     if (vertical := rows[-1] < MIN_LEVEL).any():
         raise SolutionError(
             f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[vertical][0])!r}, where there is no "

@@ -7,7 +7,7 @@ subtraction of potentials loses.
 """
 
 from itertools import pairwise
-from math import fabs, nan
+from math import fabs, nan, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 # the next ones are computed.
 BLOCK = 256
 
-# The rows of a load map.
-MAP_ROWS = 6
+# The rows of a load map, and those of the load map of a space curve.
+MAP_ROWS, MAP_ROWS_IN_SPACE = 6, 10
 
 # The largest size of the potential's terms for which V**2 by subtraction keeps its digits, in units of V**2 at launch
 # or of its change: the divided difference is then no more accurate.
@@ -221,11 +221,12 @@ def keeps_digits(w0, v2, sizes):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignore[no-untyped-def]
+def fill_by_difference(fns, path_in_space, p, launch, places, low_parts, field):  # type: ignore[no-untyped-def]
     """Fill V**2 and the contact force by the divided difference of the potential wherever that has more digits.
 
     ``field`` holds the rows of a block of a load map. If the size of the potential's terms at launch is not known, it
-    is empty on entry and all of its rows are filled.
+    is empty on entry and all of its rows are filled. ``path_in_space`` is the address of the function that fills the
+    last four; 0 if there are none.
     """
     n, lam0, w0, size = places.size, launch.lam0, launch.w0, launch.size
     is_filled = size >= 0.0
@@ -241,6 +242,13 @@ def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignor
     call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, frame)
     if not is_filled:
         field[: 4 * n] = frame[: 4 * n]
+    if path_in_space:
+        first, rows = LOAD_MAP_ROWS * n, np.empty(SPACE_ROWS * n)
+        call_path_in_space(path_in_space, n, places, better, 1.0, p, rows)
+        for k in range(SPACE_ROWS):
+            for i in range(n):
+                keeps = is_filled and keeps_digits(w0, v2[i], size + sizes[i])
+                field[first + k * n + i] = field[first + k * n + i] if keeps else rows[k * n + i]
     for i in range(n):
         force[i] = force[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
     v2[:] = better
@@ -248,35 +256,36 @@ def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignor
 
 @entry(
     types.void(
-        *(ADDRESSES, INTEGER, VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
-        *(types.UniTuple(VECTOR, MAP_ROWS), types.UniTuple(INTEGER, 2), types.boolean),
+        *(ADDRESSES, types.UniTuple(INTEGER, 2), VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
+        *(types.UniTuple(VECTOR, MAP_ROWS_IN_SPACE), types.UniTuple(INTEGER, 2), types.boolean),
     ),
     nogil=True,
     checked=False,
 )
-def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
-    """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map.
+def fill_load_map(fns, of_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
+    """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map, and of y and the contact force
+    along x, y and z in space.
 
     The arguments are not checked, because examining the tuples would take two microseconds a call.
     `CompiledModel.pass1`, the only caller, ensures that arrays are aligned, contiguous and of doubles.
 
     Parameters
     ----------
-    load_map : int
-        The address of the module's function for load maps; 0 if there is none.
+    of_map : (load_map, path_in_space)
+        The addresses of the module's functions for load maps and for the last four rows; 0 if there are none.
     launch : (lam0, lam0_low, w0)
         The launch place as two doubles, and V**2 there.
     places : (lam, low_parts)
         The places as two doubles each; ``low_parts`` is empty if all of them are zero.
-    rows : tuple of six arrays
-        The rows to be filled.
+    rows : tuple of ten arrays
+        The rows to be filled. If ``path_in_space`` is 0, the last four are not read.
     part : (begin, end)
         The range of places to fill.
     past_cache : bool
         Whether the rows are written past the caches (`streaming.put`).
     """
-    (lam0, lam0_low, w0), (lam, low_parts), (begin, end) = launch, places, part
-    slopes, field = np.empty((2, 1)), np.empty(LOAD_MAP_ROWS * BLOCK)
+    (lam0, lam0_low, w0), (lam, low_parts), (begin, end), (load_map, path_in_space) = launch, places, part, of_map
+    slopes, field = np.empty((2, 1)), np.empty((LOAD_MAP_ROWS + SPACE_ROWS) * BLOCK)
     start = np.array([lam0])
     call_effective_potential(fns.effective_potential, 1, start, p, slopes)
     correction = 2.0 * lam0_low * slopes[1, 0]
@@ -286,7 +295,7 @@ def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # 
         level, size = 0.5 * (correction - field[4]), field[6]
     numbers = LaunchNumbers(lam0, w0, correction, size)
     by_subtraction = size >= 0.0
-    x, z, ds, kappa, v2, force = rows
+    x, z, ds, kappa, v2, force, y, along_x, along_y, along_z = rows
     for first in range(begin, end, BLOCK):
         n = min(BLOCK, end - first)
         inaccurate = n
@@ -296,13 +305,19 @@ def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # 
             for i in range(n):
                 inaccurate += 0 if keeps_digits(w0, field[4 * n + i], size + field[6 * n + i]) else 1
         if inaccurate:
-            fill_by_difference(fns, p, numbers, lam[first : first + n], low_parts[first : first + n], field)
+            part_low = low_parts[first : first + n]
+            fill_by_difference(fns, path_in_space, p, numbers, lam[first : first + n], part_low, field)
         put(x, first, field, 0, n, past_cache)
         put(z, first, field, n, n, past_cache)
         put(ds, first, field, 2 * n, n, past_cache)
         put(kappa, first, field, 3 * n, n, past_cache)
         put(v2, first, field, 4 * n, n, past_cache)
         put(force, first, field, 5 * n, n, past_cache)
+        if path_in_space:
+            put(y, first, field, 7 * n, n, past_cache)
+            put(along_x, first, field, 8 * n, n, past_cache)
+            put(along_y, first, field, 9 * n, n, past_cache)
+            put(along_z, first, field, 10 * n, n, past_cache)
     settle(x)
 
 
@@ -344,6 +359,16 @@ def path_in_space_at(address, p, lam, v2, v):  # type: ignore[no-untyped-def]
     out = np.empty((SPACE_ROWS, lam.size))
     call_path_in_space(address, lam.size, lam, v2, v, p, out)
     return out
+
+
+@entry(types.UniTuple(REAL, SPACE_ROWS + 1)(INTEGER, VECTOR, REAL, REAL, REAL))
+def path_in_space_once(address, p, lam, v2, v):  # type: ignore[no-untyped-def]
+    """Return y, the contact force along x, y and z, and its length at one place of a space curve, given V**2 and V."""
+    numbers = np.empty(2 + SPACE_ROWS)
+    numbers[0], numbers[1] = lam, v2
+    call_path_in_space(address, 1, numbers, numbers[1:], -1.0 if v < 0.0 else 1.0, p, numbers[2:])
+    y, along_x, along_y, along_z = numbers[2], numbers[3], numbers[4], numbers[5]
+    return y, along_x, along_y, along_z, sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
 
 
 def path_in_space(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction: Array) -> Array:

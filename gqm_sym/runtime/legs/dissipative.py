@@ -44,6 +44,7 @@ from gqm_sym.runtime.motion.sampler import (
     MIN_PLACES_PER_THREAD,
     MIN_STATES_PER_THREAD,
     STATE_ROWS,
+    STATE_ROWS_IN_SPACE,
     plain_time,
     plain_times,
 )
@@ -161,21 +162,18 @@ class DissipativeMotion(FollowedMotion):
 
     def state(self, t: Any) -> State:
         """Return the state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
-        in_space = self.problem.formulas.path_in_space is not None
-        if in_space and self.problem.period:
-            return super().state(t)
         one = self._one_time(t, errors=True)
         if one is not None:
-            found = state_on_leg(one[0], self.problem.functions.p, one[1])
-            return State(*found) if not in_space else self._state_of(one[1], np.array(found[1:]).reshape(-1, 1))
+            return self._state_at(state_on_leg(one[0], self.problem.functions.p, one[1]))
         times = _times_from_launch(t)
         if times is None:
             return super().state(t)
 
         def by_segments(later: Array) -> Array:
-            return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
+            return self._rows_of_states(*self._times(later)[:2])[:rows]
 
-        return self._state_of(times[0], self._read(*times, STATE_ROWS, self._read_states, by_segments))
+        rows = STATE_ROWS if self.problem.formulas.path_in_space is None else STATE_ROWS_IN_SPACE
+        return self._state_of(times[0], self._read(*times, rows, self._read_states, by_segments))
 
     def error_bound(self, t: Any) -> Any:
         """Return a bound of the error of ``lam(t)``; see `Motion.error_bound`."""

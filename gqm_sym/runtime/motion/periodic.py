@@ -182,15 +182,11 @@ class PeriodicMotion(PeriodicTimes):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        # The speeds of some segments can be computed only from their panels, and the additional fields in space only
-        # from places within a lap.
-        in_space = self.problem.formulas.path_in_space is not None
-        if self._segment.from_multiprecision or (in_space and self.kind == "circulation"):
+        # The speeds of some segments can be computed only from their panels.
+        if self._segment.from_multiprecision:
             return super().state(t)._replace(lam=self.lam(t))
-        if time is not None and not in_space:
-            return State(*sampler.state(time))
         if time is not None:
-            return self._state_of(time, np.array(sampler.state(time)[1:]).reshape(-1, 1))
+            return self._state_at(sampler.state(time))
         return self._state_of(times[0], sampler.states(times[0].reshape(-1)))
 
     def _sampler_for(self, least: float, greatest: float) -> Sampler | None:

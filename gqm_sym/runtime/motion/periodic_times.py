@@ -227,6 +227,8 @@ class PeriodicTimes(Motion):
         `Motion.period_to`.
         """
         if self.problem.functions.exact is None:
+            if self._orbit is not None:
+                return timing.period_from(self._orbit.duration, self.kind, digits)
             raise SolutionError(
                 "period_to: along this track no more digits are known than those of `period`; declare the curve by "
                 "formulas for more"

@@ -29,8 +29,8 @@ MAX_PERIODS = 2.0**50
 # The powers of -1, which is the variable of the table's polynomials at the start of an interval.
 ALTERNATING = (-1.0) ** np.arange(TERMS)
 
-# The number of fields of a state other than the time.
-STATE_ROWS = 9
+# The number of fields of a state other than the time, and with the place within the lap, which states in space need.
+STATE_ROWS, STATE_ROWS_IN_SPACE = 9, 10
 
 # The number of rows of `records.phases_along`.
 PHASE_ROWS = 6
@@ -159,15 +159,18 @@ class Sampler:
         return out
 
     def state(self, t: float) -> tuple[float, ...]:
-        """Return the time, and the items of a column of `states`."""
+        """Return the time, the items of a column of `states`, and the place within the lap."""
         row = list(records.state_at_time(self.record, self._problem.functions.p, t))
         if self._problem.formulas.chart is not None:
             row[2] = row[1]
         return tuple(row)
 
     def states(self, t: Array) -> Array:
-        """Return rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
-        record, p, out = self.record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
+        """Return rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times, and in space of the
+        place within the lap.
+        """
+        rows = STATE_ROWS if self._problem.formulas.path_in_space is None else STATE_ROWS_IN_SPACE
+        record, p, out = self.record, self._problem.functions.p, np.empty((rows, t.size))
         run_in_threads(
             lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, MIN_STATES_PER_THREAD
         )

@@ -10,6 +10,7 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, plus
 from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
+    SHARE,
     TRUE_CURVE,
     TrueCurve,
     TruePieces,
@@ -64,11 +65,15 @@ NO_PARTS = TrueParts(
 
 
 @Inner
-def fill_values(parts, number, n, u, values):  # type: ignore[no-untyped-def]
-    """Fill the values of the functions at n places on a piece, two doubles each."""
+def fill_values(parts, number, n, u, values, shares):  # type: ignore[no-untyped-def]
+    """Fill the values of the functions at n places on a piece, two doubles each, and the length of the body's path over
+    that of the curve.
+    """
     address, operations, ends, _ = parts.tape
     points = stacked_points()
     fill_path(parts.curve, number, n, u, points)
+    for i in range(n):
+        shares[i] = points[SHARE + i]
     fill_registers(parts.curve, parts.tape, parts.work, n, points, 0.0)
     call_interpreter(address, operations, ends[0], ends[1], parts.work, n)
     for row in range(parts.values.size):
@@ -78,7 +83,7 @@ def fill_values(parts, number, n, u, values):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_differences(parts, number, span, points, differences, ends):  # type: ignore[no-untyped-def]
+def fill_differences(parts, number, span, points, differences, ends, shares):  # type: ignore[no-untyped-def]
     """Fill divided differences of the functions over arc length on a part of a piece; return half the part's length.
 
     Parameters
@@ -97,6 +102,8 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     ends : (m, 2, 2) array
         Filled with the values of each function at the edges of the part. The second axis is that of the high and the
         low double, the third that of the left and the right edge.
+    shares : (RULE,) array
+        Filled with the length of the body's path over that of the curve at the places.
     """
     u, values = stacked_places(), np.empty((parts.values.size, 2, RULE))
     length, length_low, _ = parts.curve.lengths[number]
@@ -104,7 +111,7 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
         u[i], u[RULE + i] = 2.0 * span[i] - 1.0, 0.0
         if 0.0 < span[i] < 1.0:
             _, (u[i], u[RULE + i]) = place_at(parts.curve, number, multiply(length, length_low, span[i], 0.0))
-    fill_values(parts, number, 2, u, values)
+    fill_values(parts, number, 2, u, values, shares)
     for row in range(parts.values.size):
         for k in range(2):
             ends[row, k, 0], ends[row, k, 1] = values[row, k, 0], values[row, k, 1]
@@ -115,7 +122,7 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
         place, place_low = multiply(place, place_low, half, half_low)
         place, place_low = add(place, place_low, begin, begin_low)
         _, (u[i], u[RULE + i]) = place_at(parts.curve, number, (place, place_low))
-    fill_values(parts, number, RULE, u, values)
+    fill_values(parts, number, RULE, u, values, shares)
     for row in range(parts.values.size):
         for i in range(RULE):
             for side in range(2):

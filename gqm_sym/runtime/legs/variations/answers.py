@@ -311,6 +311,17 @@ def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Arr
     return stronger
 
 
+def forces_at_places(motion: Any, places: Array) -> Array:
+    """Return the derivatives of the contact force along the motion and at fixed places of its launch leg: a row for the
+    place, and one for each variable.
+    """
+    changes, times = motion._changes, np.array([motion.time_at(place) for place in places.tolist()])
+    law, changed = changes.law, states_at(changes, motion._march_points(times)[0])
+    by_place = law.parameters[0, law.mass] * law.loads(changed.states)[0]
+    found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.labels])
+    return found
+
+
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
     """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 

@@ -16,10 +16,11 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space, path_in_space_once
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.riding.loads import loads_on_rider
+from gqm_sym.runtime.motion.sampler import STATE_ROWS
 from gqm_sym.runtime.motion.segments import errors
 from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
@@ -152,6 +153,12 @@ class Positions(ChecksArguments, ABC):
             If the motion cannot be followed so far.
         """
         times, low, shape = self._times(t)
+        return self._state_of(_shaped(times, shape), self._rows_of_states(times, low))
+
+    def _rows_of_states(self, times: Array, low: Array) -> Array:
+        """Return rows of lam, s, x, z, v, v**2, kappa, normal force, the error of lam and the place within the lap at
+        times, each given as two doubles.
+        """
         points = self._phase_points(times, low)
         f, trajectory = self.problem.functions, points.trajectory
         reduced, s, v = self._places(points), points.arc_lengths(), self._velocities(points)
@@ -160,26 +167,22 @@ class Positions(ChecksArguments, ABC):
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
-        kind, more = self._in_space(times, reduced, v, v2, force)
-        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
-        return kind(*found, *(_shaped(array, shape) for array in more))
+        return np.array([lam, s, x, z, v, v2, kappa, force, error, reduced])
 
-    def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
-        """Return the class of states on the curve, and their fields in addition to those of `State`, as rows.
+    def _in_space(
+        self, times: Array, places: Array, v: Array, v2: Array, force: Array
+    ) -> tuple[type[State], tuple[Array, ...]]:
+        """Return the class of states on a space curve, and their fields in addition to those of `State`, as rows.
 
         In a rotating frame the contact ``force`` is filled, too.
         """
         formulas, p = self.problem.formulas, self.problem.functions.p
-        if formulas.path_in_space is None:
-            return State, np.empty((0, 0))
         rows = path_in_space(formulas, p, places, v2, v)
         if formulas.directed:
             force[:] = length(rows[1:])
         if formulas.rider_loads is None:
-            return StateInSpace, rows
-        return StateOfRider, np.concatenate(
-            [rows, loads_on_rider(self.problem, places, v, v2, force, self._resting(times))]
-        )
+            return StateInSpace, (*rows,)
+        return StateOfRider, (*rows, *loads_on_rider(self.problem, places, v, v2, force, self._resting(times)))
 
     def _resting(self, times: Array) -> NDArray[np.bool_]:
         """Return whether the body is at rest for good at times from launch."""
@@ -190,13 +193,26 @@ class Positions(ChecksArguments, ABC):
         return times >= (last if self.legs[-1].end == "rest" else inf)
 
     def _state_of(self, t: Any, rows: Array) -> State:
-        """Return the state at one time, or at an array of times, from the rows of `Sampler.states` at places within a
-        lap.
-        """
-        times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
-        kind, more = self._in_space(times, rows[0], rows[4], rows[5], rows[7])
-        rows = np.concatenate([rows, more]) if more.size else rows
-        return kind(t, *rows.reshape(-1, *t.shape)) if np.ndim(t) else kind(t, *rows[:, 0].tolist())
+        """Return the state at one time, or at an array of times, from the rows of `_rows_of_states`."""
+        kind, fields = State, (*rows[:STATE_ROWS],)
+        if self.problem.formulas.path_in_space is not None:
+            times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
+            kind, more = self._in_space(times, rows[STATE_ROWS], rows[4], rows[5], rows[7])
+            fields += more
+        shape = np.shape(t)
+        return kind(t, *(_shaped(field, shape) for field in fields))
+
+    def _state_at(self, found: tuple[float, ...]) -> State:
+        """Return the state at one time from the time and the items of a column of `_rows_of_states`."""
+        formulas = self.problem.formulas
+        if formulas.path_in_space is None:
+            return State(*found[:-1])
+        if formulas.rider_loads is not None:
+            return self._state_of(found[0], np.array(found[1:]).reshape(-1, 1))
+        t, lam, s, x, z, v, v2, kappa, force, error, place = found
+        address = formulas.path_in_space.address
+        *more, size = path_in_space_once(address, self.problem.functions.p, place, v2, v)
+        return StateInSpace(t, lam, s, x, z, v, v2, kappa, size if formulas.directed else force, error, *more)
 
     @locked
     def time_at(self, lam: Any) -> float:

@@ -52,7 +52,13 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
     start_search,
     start_search_behind,
 )
-from gqm_sym.runtime.sweep.batch.wells import Wells, find_proved, set_ends_from_rest, wells_of
+from gqm_sym.runtime.sweep.batch.wells import (
+    borrowed_wells,
+    prove_about_axis,
+    prove_in_well,
+    set_ends_from_rest,
+    wells_of,
+)
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -65,7 +71,7 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 
 # The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
-# pieces stand for the proof that all orbits about an axis share.
+# pieces stand for the proofs that all orbits of a well share.
 SHARED, FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 0, 3, 2, 12
 
 
@@ -80,13 +86,16 @@ class OrbitKind(NamedTuple):
         Whether each orbit is even about an axis of symmetry.
     proved : bool
         Whether the turning points need no further proof.
+    about_axis : bool
+        Whether each orbit is about the axis of symmetry of `Wells`.
     shared : bool
-        Whether each orbit is about the axis of `Wells`.
+        Whether a proof may serve all orbits of a well.
     """
 
     kind: int
     mirrored: bool
     proved: bool
+    about_axis: bool
     shared: bool
 
 
@@ -121,11 +130,10 @@ def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers): 
         n, rows = orbits.size, orbits.rows
         proved, unproved = n, 0
         if not kind.proved:
-            if pieces == SHARED:
-                distances = scratch.work[0, :n]
-                for j in range(n):
-                    distances[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
-                find_proved(fns, wells, distances, rows[STATE, :n])
+            if pieces == SHARED and kind.about_axis:
+                prove_about_axis(fns, wells, n, rows, scratch.work)
+            elif pieces == SHARED:
+                prove_in_well(fns, wells, n, rows, scratch.work)
             else:
                 p = orbits.params[: count * n].reshape(count, n)
                 prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
@@ -215,7 +223,8 @@ def kind_of_librations(fns, orbits, monotone, wells):  # type: ignore[no-untyped
     for j in range(n):
         known &= rows[ZERO_BEHIND, j] == rows[ZERO_BEHIND, j]
     kind = fastest_method(fns) if about_axis else LIBRATION
-    return OrbitKind(kind, mirrored, (monotone or known) and about_axis, about_axis and wells.proofs.size > 0)
+    side = wells.about_axis if about_axis else wells.above
+    return OrbitKind(kind, mirrored, (monotone or known) and about_axis, about_axis, side.proofs.size > 0)
 
 
 @Inner
@@ -231,13 +240,13 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
     chosen, others, work = borrowed(scratch.chosen), borrowed(scratch.others), borrowed(scratch.work)
     scratch = Scratch(scratch.param_count, scratch.invariant_counts, chosen, others, work)
-    wells = Wells(borrowed(wells.proofs), wells.place, borrowed(wells.params), borrowed(wells.work))
+    wells = borrowed_wells(wells)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
         orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
         load_launches(columns, begin, number, orbits, domain, scratch)
         if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
-            kind = OrbitKind(fastest_method(fns), True, True, True)
+            kind = OrbitKind(fastest_method(fns), True, True, True, True)
             answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
             continue
         orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
@@ -245,7 +254,8 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
             kind = kind_of_librations(fns, orbits, monotone, wells)
             answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
         if lap_count:
-            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False, False)
+            laps_found = Orbits(lap_count, laps.rows, laps.params)
+            kind = OrbitKind(CIRCULATION, False, False, False, False)
             answer_orbits(fns, kind, laps_found, spare, wells, scratch, quantity, answers)
 
 

@@ -129,7 +129,7 @@ def by_symmetry(fns, n, rows, domain, wells, work):  # type: ignore[no-untyped-d
         size = fabs(offset)
         clear = is_clear_of_axes(size, start[j], places[j], step)
         offsets[j], distances[j] = offset, choose(clear & (w0[j] == 0.0), size, nan)
-    find_proved(fns, wells, distances, proved)
+    find_proved(fns, wells.about_axis, distances, proved)
     for j in range(n):
         if proved[j] == FOUND:
             size = distances[j]
@@ -186,7 +186,7 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         by_closed_form(fns, n, rows, p, domain, monotone, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
-        if wells.proofs.size > 0 and not monotone:
+        if wells.about_axis.proofs.size > 0 and not monotone:
             by_symmetry(fns, n, rows, domain, wells, work)
     none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     axes = work[5, :n]

@@ -1,9 +1,9 @@
-"""Proofs that the potential rises on both sides of an axis of symmetry, which hold for all orbits of a sweep.
+"""Proofs that the potential rises on both sides of a place, which hold for all orbits of a sweep.
 
-An orbit about the axis is proved if the slope of the potential is positive from the axis, or from a place that is much
-nearer to it, up to the turning point: then V**2 vanishes at the ends of the orbit only. The distances at which proofs
-end are multiples of an eighth of a power of two, so that a proof serves all orbits that end just before, and the result
-for an orbit does not depend on the other orbits of the sweep.
+The place is an axis of symmetry, or the bottom of a well. An orbit about it is proved if the potential rises from the
+place, or from one that is much nearer to it, up to both turning points: then V**2 vanishes at the ends of the orbit
+only. The distances at which proofs end are multiples of an eighth of a power of two, so that a proof serves all orbits
+that end just before, and the result for an orbit does not depend on the other orbits of the sweep.
 """
 
 from math import fabs, nan
@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.runtime.compiled.calls import call_bounds_batch
+from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, from_bits
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import AXIS, PARAMETERS, PLACE_LOW, element
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS
@@ -42,85 +43,169 @@ FIRST_PART = (1023 + LEAST_EXPONENT) * PARTS
 UNTRIED, PROVED, FAILED = range(3)
 
 
-class Wells(NamedTuple):
-    """What is known of the wells about the axis of symmetry of a sweep.
+# The largest number of steps in which the bottom of a well is found, and the width, relative to the place, of the
+# interval in which it is known then. Ends of orbits may be rounded by END_ROUNDING of places.
+MAX_STEPS, BOTTOM_WIDTH, END_ROUNDING = 20, 2.0**-51, 4.0 * 2.0**-52
+
+
+class WellSide(NamedTuple):
+    """What is known of one side of a place, or of both sides of an axis of symmetry.
 
     Attributes
     ----------
     proofs : int array
         UNTRIED, PROVED or FAILED for each distance at which proofs end; empty if launches differ in their parameters,
-        or if there is no axis.
-    place : float
-        The axis.
+        or if there is no such place.
+    place : (1,) array
+        The place; NaN while it is not known.
+    sign : float
+        1 for the side above the place and for axes, -1 for the side below it.
     params : (count, LANES) array
         The parameters of all launches, once for each lane.
-    work : (6, LANES) array
+    work : (8, LANES) array
         Work space.
     """
 
-    proofs: NDArray[np.int64]
-    place: float
+    proofs: NDArray[np.int8]
+    place: Array
+    sign: float
     params: Array
     work: Array
+
+
+class Wells(NamedTuple):
+    """The wells of a sweep: the one about its axis of symmetry, and the sides of the well of its first orbit."""
+
+    about_axis: WellSide
+    above: WellSide
+    below: WellSide
 
 
 @Inner
 def wells_of(columns):  # type: ignore[no-untyped-def]
     """Return the wells of the launches in ``columns``, of which nothing is known yet."""
-    count, known, place = columns.shape[0] - PARAMETERS, columns[AXIS, 1] == 0 and columns[PLACE_LOW, 1] == 0, nan
-    params = np.empty((count, LANES))
+    count, known = columns.shape[0] - PARAMETERS, True
+    params, work = np.empty((count, LANES)), np.empty((8, LANES))
     for row in range(count):
         known = known and columns[PARAMETERS + row, 1] == 0
         params[row] = element(columns, PARAMETERS + row, 0) if known else nan
-    if known:
-        place, low = element(columns, AXIS, 0), element(columns, PLACE_LOW, 0)
-        known = place - place == 0.0 and low == low
-    size = PARTS * (LARGEST_EXPONENT - LEAST_EXPONENT) if known else 0
-    return Wells(np.zeros(size, dtype=np.int64), place, params, np.empty((6, LANES)))
+    axis, size, of_axis = np.full(1, nan), PARTS * (LARGEST_EXPONENT - LEAST_EXPONENT) if known else 0, 0
+    if known and columns[AXIS, 1] == 0 and columns[PLACE_LOW, 1] == 0:
+        axis[0], low = element(columns, AXIS, 0), element(columns, PLACE_LOW, 0)
+        of_axis = size if axis[0] - axis[0] == 0.0 and low == low else 0
+    bottom = np.full(1, nan)
+    return Wells(
+        WellSide(np.zeros(of_axis, dtype=np.int8), axis, 1.0, params, work),
+        WellSide(np.zeros(size, dtype=np.int8), bottom, 1.0, params, work),
+        WellSide(np.zeros(size, dtype=np.int8), bottom, -1.0, params, work),
+    )
 
 
 @Inner
-def rises_up_to(fns, wells, distance, inner):  # type: ignore[no-untyped-def]
-    """Return whether the slope of the potential and ds are positive up to a distance from the axis.
+def borrowed_side(side):  # type: ignore[no-untyped-def]
+    """Return a side with arrays whose references numba does not count."""
+    place, params, work = borrowed(side.place), borrowed(side.params), borrowed(side.work)
+    return WellSide(borrowed(side.proofs), place, side.sign, params, work)
+
+
+@Inner
+def borrowed_wells(wells):  # type: ignore[no-untyped-def]
+    """Return the wells with arrays whose references numba does not count."""
+    return Wells(borrowed_side(wells.about_axis), borrowed_side(wells.above), borrowed_side(wells.below))
+
+
+@Inner
+def rises_up_to(fns, side, distance, inner):  # type: ignore[no-untyped-def]
+    """Return whether the potential rises up to a distance from the place and ds is positive there.
 
     ``inner`` is a smaller distance. The first lane contains the range between both; each of the others, except the
-    last, contains the outer half of what remains. In the last one the slope may be negative from rounding of the axis,
-    by less than it is positive in the lane before.
+    last, contains the outer half of what remains. In the last one the potential may fall, from rounding of the place,
+    by less than it rises in the lane before.
     """
-    lo, hi, box = wells.work[0], wells.work[1], wells.work[2:6]
-    hi[0] = wells.place + distance
+    near, far, rises, box = side.work[0], side.work[1], side.work[2], side.work[4:8]
+    place, above = side.place[0], side.sign > 0.0
+    far[0] = place + side.sign * distance
     for i in range(1, LANES):
-        lo[i - 1] = hi[i] = wells.place + inner
+        near[i - 1] = far[i] = place + side.sign * inner
         inner *= 0.5
-    lo[LANES - 1] = wells.place
-    call_bounds_batch(fns.bounds, LANES, lo, hi, wells.params, box)
-    good = box[2, LANES - 1] > 0.0 and -box[0, LANES - 1] < box[0, LANES - 2]
+    near[LANES - 1] = place
+    call_bounds_batch(fns.bounds, LANES, near if above else far, far if above else near, side.params, box)
+    good = True
+    for i in range(LANES):
+        rises[i] = box[0, i] if above else -box[1, i]
+        good = good and box[2, i] > 0.0
     for i in range(LANES - 1):
-        good = good and box[0, i] > 0.0 and box[2, i] > 0.0
-    return good
+        good = good and rises[i] > 0.0
+    return good and -rises[LANES - 1] < rises[LANES - 2]
 
 
 @Inner
-def try_proof(fns, wells, k):  # type: ignore[no-untyped-def]
+def try_proof(fns, side, k):  # type: ignore[no-untyped-def]
     """Set what is known of the proof number k."""
     part = FIRST_PART + k
     inner = from_bits(part // PARTS * PARTS << PART_BITS)
-    good = rises_up_to(fns, wells, from_bits((part + 1) << PART_BITS), inner)
-    wells.proofs[k] = PROVED if good else FAILED
+    good = rises_up_to(fns, side, from_bits((part + 1) << PART_BITS), inner)
+    side.proofs[k] = PROVED if good else FAILED
 
 
 @Inner
-def find_proved(fns, wells, distances, state):  # type: ignore[no-untyped-def]
-    """Set ``state`` to FOUND for each orbit about the axis that is proved to end at its distance from it, and at its
-    mirror image, and to NOWHERE for others; distances may be NaN.
+def find_proved(fns, side, distances, state):  # type: ignore[no-untyped-def]
+    """Set ``state`` to FOUND for each orbit that is proved not to end before its distance from the place, and to
+    NOWHERE for others; distances may be NaN. About an axis the same is proved of its mirror image.
     """
-    proofs = wells.proofs
+    proofs = side.proofs
     for j in range(distances.size):  # numba counts references to arrays at each call, so there is none in this loop
         k, state[j] = (bits(distances[j]) >> PART_BITS) - FIRST_PART, NOWHERE
         if 0 <= k < proofs.size:
             if proofs[k] == UNTRIED:
-                try_proof(fns, wells, k)
+                try_proof(fns, side, k)
             state[j] = choose(proofs[k] == PROVED, FOUND, NOWHERE)
+
+
+@Inner
+def find_bottom(fns, side, low, high):  # type: ignore[no-untyped-def]
+    """Set the place of a side to a minimum of the potential between two turning points."""
+    places, none, out = side.work[0], side.work[1], side.work[2:5]
+    none[:] = 0.0
+    for _ in range(MAX_STEPS):
+        step = (high - low) / (LANES + 1)
+        for i in range(LANES):
+            places[i] = low + (i + 1) * step
+        call_potential_divdiff1_batch(fns.potential_divdiff1, LANES, places, places, none, side.params, out)
+        for i in range(LANES):  # up to the first place where the potential rises
+            if places[i] < high:
+                low, high = (places[i], high) if out[2, i] < 0.0 else (low, places[i])
+        if not high - low > BOTTOM_WIDTH * (fabs(low) + fabs(high)):
+            break
+    side.place[0] = low
+
+
+@Inner
+def prove_in_well(fns, wells, n, rows, work):  # type: ignore[no-untyped-def]
+    """Set STATE to FOUND for orbits that are proved to lie in the well of the first orbit of the sweep, else to
+    NOWHERE.
+    """
+    a, b, state = rows[END_LOW, :n], rows[END_HIGH, :n], rows[STATE, :n]
+    if wells.above.place[0] != wells.above.place[0]:
+        find_bottom(fns, wells.above, a[0], b[0])
+    place, distances, proved_below = wells.above.place[0], work[0, :n], work[1, :n]
+    for j in range(n):
+        distances[j] = (place - a[j]) + END_ROUNDING * (fabs(place) + fabs(a[j]))
+    find_proved(fns, wells.below, distances, proved_below)
+    for j in range(n):
+        distances[j] = (b[j] - place) + END_ROUNDING * (fabs(place) + fabs(b[j]))
+    find_proved(fns, wells.above, distances, state)
+    for j in range(n):
+        state[j] = choose(proved_below[j] == FOUND, state[j], NOWHERE)
+
+
+@Inner
+def prove_about_axis(fns, wells, n, rows, work):  # type: ignore[no-untyped-def]
+    """Set STATE to FOUND for orbits about the axis that are proved, else to NOWHERE."""
+    distances = work[0, :n]
+    for j in range(n):
+        distances[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
+    find_proved(fns, wells.about_axis, distances, rows[STATE, :n])
 
 
 @Inner
@@ -139,7 +224,7 @@ def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ig
     Such a body turns at its mirror image, so no zero is searched. ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of
     `strided`. If V**2 is ``monotone`` between axes, it is enough that the potential rises half way to the next axis.
     """
-    if wells.proofs.size == 0:
+    if wells.about_axis.proofs.size == 0:
         return False
     start, w0, direction = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[SEARCH_DIRECTION, :n]
     low, high, a, b = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[END_LOW, :n], rows[END_HIGH, :n]
@@ -156,5 +241,5 @@ def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ig
         distances[j] = choose(good, far, nan)
         low[j], high[j] = choose(image < 0.0, image, 0.0), choose(image < 0.0, 0.0, image)
         a[j], b[j] = start[j] + low[j], start[j] + high[j]
-    find_proved(fns, wells, distances, rows[STATE, :n])
+    find_proved(fns, wells.about_axis, distances, rows[STATE, :n])
     return not contains(rows[STATE, :n], NOWHERE)

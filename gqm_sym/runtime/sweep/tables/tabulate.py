@@ -2,7 +2,7 @@
 
 If a curve is known in double-double arithmetic (`charts.double_double.parts`), parts of the potential and lengths of
 panels are rounded from there, because the places of a chart of many short pieces are doubles, and their differences
-have few digits.
+have few digits. So is the length of the path of a rolling body, which depends on the curvature.
 """
 
 from math import fabs
@@ -222,6 +222,7 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
     left, right, piece, span = panel
     half, potentials = 0.5 * (right - left), source.potentials
     places, gaps, rests, work = np.empty(NODES), np.empty(NODES), np.empty(NODES), np.empty(NODES)
+    shares = np.empty(NODES)
     from_left, from_right = np.empty((scales.size + 2, NODES)), np.empty((scales.size + 2, NODES))
     differences, ends, is_exact = (
         np.empty((2, potentials, 2, NODES)),
@@ -233,7 +234,9 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
         places[j], rests[j] = left + gaps[j], -half * (1.0 - POINTS[j])
     fill_terms_at(source, p, NODES, left, places, gaps, from_left)
     if is_exact:
-        half = fill_differences(true, piece, span, POINTS, differences, ends)
+        half = fill_differences(true, piece, span, POINTS, differences, ends, shares)
+        if true.curve.offset[0] != 0.0:  # the curvature of a chart of many short pieces has few digits
+            from_left[potentials] = shares
     else:
         fill_terms_at(source, p, NODES, right, places, rests, from_right)
         for i in range(potentials):

@@ -1,5 +1,6 @@
 """Proofs that the orbits of a sweep share find each turning point, and none that is not there."""
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -81,22 +82,40 @@ def test_a_cycloid_is_a_tautochrone() -> None:
     assert got.values[swings] == pytest.approx(2 * np.pi / np.sqrt(9.81), rel=ULPS * 2.0**-52, abs=0.0)
 
 
-def _height(x: Any) -> Any:
-    """Return the height of the bowl with dents."""
-    return x**2 / 2 + np.cos(6 * x) / 6
+def test_bits_do_not_depend_on_the_well_of_the_first_orbit(tmp_path: Path) -> None:
+    """The proofs of one well serve its orbits alone; those of the other well have the same bits beside them."""
+    curve = gqm.Curve.graph("x**4 - x**2 + x/9", parameter="x")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="two_unlike_wells", folder=tmp_path)
+    lam0 = np.random.default_rng(2).uniform(-1.4, 1.4, 150)
+    for quantity in ("half_period", "turning_points"):
+        one, other = (module.sweep(quantity, np.append(first, lam0)).values[1:] for first in (-0.9, 0.75))
+        alone = [module.sweep(quantity, [place]).values[0] for place in lam0]
+        assert np.array_equal(one, other)
+        assert np.array_equal(one, alone)
+    times = module.sweep("half_period", lam0)
+    assert times.route_counts()["batch"] > 100
+    for place, value in zip(lam0[:20].tolist(), times.values, strict=False):
+        truth = module.solve(place).half_period
+        assert abs(value - truth) <= ULPS * np.spacing(truth)
 
 
-def test_orbits_stay_in_their_dents(tmp_path: Path) -> None:
+@pytest.mark.parametrize("tilt", [0, "1/3"])
+def test_orbits_stay_in_their_dents(tilt: int | str, tmp_path: Path) -> None:
     """In a bowl with dents, bodies released at rest turn at the next place of the same height, found by a search on a
     fine grid.
     """
-    curve = gqm.Curve.graph("x**2/2 + cos(6*x)/6", parameter="x")
+    curve = gqm.Curve.graph(f"x**2/2 + cos(6*x)/6 + {tilt}*x", parameter="x")
     module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="dented_bowl", folder=tmp_path)
+    lean = float(Fraction(tilt))
+
+    def height(x: Any) -> Any:
+        return x**2 / 2 + np.cos(6 * x) / 6 + lean * x
+
     lam0 = np.concatenate([np.random.default_rng(4).uniform(0.01, 3.0, 200), [0.5, 1.0, 2.0]])
     got = module.sweep("turning_points", lam0)
     for (low, high), start in zip(got.values.tolist(), lam0.tolist(), strict=True):
-        way = -np.sign(start - np.sin(6 * start))
+        way = -np.sign(start - np.sin(6 * start) + lean)
         places = start + way * np.linspace(1e-3, 7.0, 70_000)
-        turn = places[np.argmax(_height(places) > _height(start))]
+        turn = places[np.argmax(height(places) > height(start))]
         assert (low if way < 0 else high) == pytest.approx(turn, abs=2e-4)
         assert (high if way < 0 else low) == pytest.approx(start, rel=1e-15)

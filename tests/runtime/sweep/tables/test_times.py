@@ -69,6 +69,21 @@ def test_half_periods_on_a_ring(ring: ModuleType) -> None:
         assert float(value) == pytest.approx(float(4 * mp.ellipk(4 * G / mpf(v) ** 2) / mpf(v)), rel=ROUNDING)
 
 
+def test_half_periods_of_a_ball_on_a_track_of_short_pieces(tmp_path: Path) -> None:
+    """The path of a ball's centre depends on the curvature of the track, of which a chart of 200 pieces has few digits;
+    half periods are those that `solve` rounds correctly.
+    """
+    x = np.linspace(-2, 2, 201)
+    curve = gqm.Curve.sampled(np.column_stack([x, 0.5 * x * x + 0.01 * np.cos(3 * x)]))
+    module = gqm.build(
+        gqm.derive(curve, gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")), name="ball", folder=tmp_path
+    )
+    places = np.random.default_rng(8).uniform(3.3, 4.8, 60)
+    swept = module.sweep("half_period", places).values
+    truth = np.array([module.solve(place).half_period for place in places.tolist()])
+    assert (np.abs(swept - truth) <= 2.0 * np.spacing(truth)).all()
+
+
 def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
     """Panels begin where the curvature jumps; places on both inclines are passed at the times of uniform
     acceleration.
