@@ -66,6 +66,9 @@ from gqm_sym.runtime.legs.runs.route import RunStart
 from gqm_sym.runtime.legs.runs.run import run
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
+# The width of the first panel, as a share of a leg of known width.
+FIRST_PANEL_OF_LEG = 0.25
+
 # The reasons for which a leg was not followed back.
 NO_SPACE, LOST = -1, -2
 
@@ -216,14 +219,23 @@ def direction_from_rest(static_balance, p, behind, ahead, preferred):  # type: i
 
 @Inner
 def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel."""
+    """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel, or
+    with a narrower first panel if a body at rest turns within that.
+    """
+    step, no_turn_until = start.step, start.no_turn_until
     while True:
         end = run(forces, start, route, off, record)
-        if end.what != END_SLOW or end.panel_count > 0:
+        width = fabs((end.place[0] - start.place) + (end.place[1] - start.place_low))
+        turns_at_once = end.what == END_TURN and start.v2 == 0.0 and FIRST_PANEL_OF_LEG * width < step
+        if end.panel_count > 0 or not (end.what == END_SLOW or turns_at_once):
             return end
+        if turns_at_once:
+            step = FIRST_PANEL_OF_LEG * width
+        else:
+            no_turn_until = end.no_turn_until
         start = RunStart(
-            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
-            *(end.no_turn_until, start.width, 0, start.branch),
+            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, step),
+            *(no_turn_until, start.width, 0, start.branch),
         )
 
 
