@@ -27,9 +27,8 @@ from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
-from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, next_attempt
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
-from gqm_sym.runtime.legs.runs.leg_variable import variable_for
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
@@ -82,23 +81,23 @@ def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-un
 
 @Inner
 def is_resolved(forces, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
-    """Fill the time rate; return whether all rows are resolved and V**2 and N each have one sign up to the place, and
-    the number of blocks to try next, or 0.
+    """Fill the time rate; return whether all rows are resolved and V**2 and N each have one sign up to the place; the
+    number of blocks to try next, or 0; and the largest ratio of middle coefficients to sizes.
     """
     h, is_stretched = variable.width, variable.extent > 0.0
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if not (fine and load_fine):
-        return False, blocks_for(max(ratio, load_ratio), blocks)
+        return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
-        return False, 0
+        return False, 0, 1.0
     if forces.kinked:
         curve_fine, is_kept, ratio = curvature_sign(is_stretched, blocks, work)
         if not (curve_fine and is_kept):
-            return False, blocks_for(ratio, blocks)
+            return False, blocks_for(ratio, blocks, is_stretched), ratio
     fine, ratio = fill_times(blocks, h, work)
-    return fine, blocks_for(ratio, blocks)
+    return fine, blocks_for(ratio, blocks, is_stretched), ratio
 
 
 @Inner
@@ -117,22 +116,22 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
         if nu == 0:
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
-        attempt = Attempt(blocks, variable_for(branch, origin, v, h), branch, NOT_TRIED)
+        attempt = first_attempt(blocks, branch, march, h)
         while attempt.blocks > 0:
             blocks = attempt.blocks
             if not reaches(forces, march, panel, blocks, attempt.variable, work):
                 blocks = 0
                 break
-            fine, onwards = is_resolved(forces, panel, blocks, attempt.variable, work)
+            fine, onwards, ratio = is_resolved(forces, panel, blocks, attempt.variable, work)
             if fine:
                 what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
                 to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
                 record[TIME_FROM_START], record[TIME_FROM_END] = work[blocks * TAILS], 0.0
                 break
-            if onwards == 0 or attempt.unstretched_blocks != NOT_TRIED:
-                attempt = next_attempt(attempt, onwards, march, work)
+            if onwards == 0 or attempt.plain_blocks != NOT_TRIED:
+                attempt = next_attempt(attempt, onwards, ratio, march, work)
             else:  # for a single leg, a map would take as long as more nodes
-                attempt = Attempt(onwards, attempt.variable, branch, NOT_TRIED)
+                attempt = Attempt(onwards, attempt.variable, attempt.branch, NOT_TRIED, 1.0)
             blocks = attempt.blocks
         branch = attempt.branch
     return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks, branch

@@ -1,16 +1,17 @@
 """Branch points of ds beside a leg, and the order of attempts to resolve the leg as one polynomial."""
 
-from math import fabs, inf, sqrt
+from math import fabs, inf, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.legs.panels.equation import DS, SERIES, product
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, to_coefficients
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint, LegVariable, unstretched, variable_for
 from gqm_sym.runtime.legs.runs.whole_rows import examine_row, size_of_row
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 
 # The largest number of steps of Newton's method to a branch point, and the last step as a share of its height. The map
 # need not be that of the exact place.
@@ -21,6 +22,10 @@ MAX_HEIGHT = 2.0
 
 # The number of blocks of a leg that has not been tried without a map.
 NOT_TRIED = -1
+
+# A map must be expected to save this factor of nodes, because estimates are rough, and other branch points may be as
+# near.
+LEAST_GAIN = 1.05
 
 series_buffer = on_stack(WIDE)
 
@@ -35,15 +40,18 @@ class Attempt(NamedTuple):
     variable : LegVariable
     branch : BranchPoint
         The branch point of ds that is known.
-    unstretched_blocks : int
-        The number of blocks expected without a map, or 0 if there is none, after an attempt without one and before the
-        next; otherwise NOT_TRIED.
+    plain_blocks : int
+        The number of blocks expected without a map, or 0 if there is none, in the first attempt with a map; otherwise
+        NOT_TRIED.
+    plain_ratio : float
+        The ratio of middle coefficients to sizes without a map.
     """
 
     blocks: int
     variable: LegVariable
     branch: BranchPoint
-    unstretched_blocks: int
+    plain_blocks: int
+    plain_ratio: float
 
 
 @Inner
@@ -109,33 +117,50 @@ def branch_beside(march, width, work):  # type: ignore[no-untyped-def]
     return BranchPoint(march.origin[0] + (march.direction * distance + march.origin[1]), 0.5 * width * y)
 
 
-@Inlined
-def is_better(blocks, others):  # type: ignore[no-untyped-def]
-    """Return whether one expected number of blocks is at most another, where 0 means that there is none."""
-    return blocks > 0 and (others == 0 or blocks <= others)
+@Inner
+def first_attempt(blocks, branch, march, width):  # type: ignore[no-untyped-def]
+    """Return the first attempt to resolve a leg of about this width."""
+    variable = variable_for(branch, march.origin, march.direction, width)
+    return Attempt(blocks, variable, branch, NOT_TRIED, 1.0)
 
 
 @Inner
-def next_attempt(attempt, onwards, march, work):  # type: ignore[no-untyped-def]
+def is_better(attempt, onwards, ratio):  # type: ignore[no-untyped-def]
+    """Return whether the first attempt with a map shows that it saves nodes."""
+    if onwards == 0 or attempt.plain_blocks == 0:
+        return onwards > 0
+    return onwards <= attempt.plain_blocks and log(ratio) <= LEAST_GAIN * log(attempt.plain_ratio)
+
+
+@Inner
+def next_attempt(attempt, onwards, ratio, march, work):  # type: ignore[no-untyped-def]
     """Return the attempt after one that has not resolved a leg.
 
-    A leg is stretched if its own rows with 23 nodes show a branch point, and do not decrease more slowly with the map.
+    A leg is stretched if its own rows with 23 nodes show a branch point, and the map saves nodes or nothing else
+    resolves the leg.
 
     Parameters
     ----------
     attempt : Attempt
     onwards : int
         The number of blocks that are expected to resolve the leg with the variable of the attempt, or 0.
+    ratio : float
+        The largest ratio of middle coefficients to sizes of the rows of the law.
     march : March
     work : array
         The rows of the attempt.
     """
-    blocks, variable, branch, unstretched_blocks = attempt
-    if blocks == 1 and variable.extent == 0.0 and branch.height < inf:
+    blocks, variable, branch = attempt.blocks, attempt.variable, attempt.branch
+    unused = BranchPoint(branch.place, -branch.height)
+    if blocks == 1 and variable.extent == 0.0 and 0.0 <= branch.height < inf:
         branch = branch_beside(march, variable.width, work)
         stretched = variable_for(branch, march.origin, march.direction, variable.width)
         if stretched.extent > 0.0:
-            return Attempt(1, stretched, branch, onwards)
-    elif unstretched_blocks != NOT_TRIED and not is_better(onwards, unstretched_blocks):
-        return Attempt(unstretched_blocks, unstretched(variable.width), BranchPoint(0.0, inf), NOT_TRIED)
-    return Attempt(onwards, variable, branch, NOT_TRIED)
+            return Attempt(1, stretched, branch, onwards, ratio)
+    elif attempt.plain_blocks != NOT_TRIED and not is_better(attempt, onwards, ratio):
+        return Attempt(attempt.plain_blocks, unstretched(variable.width), unused, NOT_TRIED, 1.0)
+    elif onwards == 0 and branch.height < 0.0:
+        stretched = variable_for(unused, march.origin, march.direction, variable.width)
+        if stretched.extent > 0.0:
+            return Attempt(MAX_BLOCKS, stretched, unused, NOT_TRIED, 1.0)
+    return Attempt(onwards, variable, branch, NOT_TRIED, 1.0)

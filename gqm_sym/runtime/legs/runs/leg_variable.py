@@ -37,7 +37,8 @@ class BranchPoint(NamedTuple):
     place : float
         The real part.
     height : float
-        The imaginary part; 0 if none is known, infinite if legs are not to be stretched.
+        The imaginary part; 0 if none is known, infinite if there is none. It is negative if legs are not to be
+        stretched as long as they are resolved without a map.
     """
 
     place: float

@@ -54,9 +54,9 @@ from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.solving import is_settled
-from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, next_attempt
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
-from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched, variable_for
+from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
@@ -182,14 +182,14 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work
 
 @Inner
 def is_whole(forces, panel, blocks, variable, reading, work):  # type: ignore[no-untyped-def]
-    """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg, and the number
-    of blocks to try next, or 0.
+    """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg; the number of
+    blocks to try next, or 0; and the largest ratio of middle coefficients to sizes of the rows of the law.
     """
     h, is_stretched, curve_fine, curve_ratio = variable.width, variable.extent > 0.0, True, 0.0
     if forces.kinked:
         curve_fine, is_kept, curve_ratio = curvature_sign(is_stretched, blocks, work)
         if curve_fine and not is_kept:
-            return False, 0
+            return False, 0, 1.0
     fill_v2(blocks, h, work)
     fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
@@ -197,12 +197,12 @@ def is_whole(forces, panel, blocks, variable, reading, work):  # type: ignore[no
     if load_fine and reading.what == PEAKS and reading.force:
         load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, is_stretched, blocks, work)
     if not (fine and load_fine and curve_fine):
-        return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks)
+        return False, blocks_for(max(ratio, curve_ratio, load_ratio), blocks, is_stretched), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
-        return False, 0
+        return False, 0, 1.0
     fine, ratio = fill_times(blocks, h, work)
-    return fine, blocks_for(ratio, blocks)
+    return fine, blocks_for(ratio, blocks, is_stretched), ratio
 
 
 @Inner
@@ -210,8 +210,8 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
     """Return the attempt that resolves a leg; it has 0 blocks if there is none."""
     most = 2 if reading.what == PASSAGE else MAX_BLOCKS
     width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
-    variable = variable_for(branch, march.origin, march.direction, width)
-    attempt = Attempt(start.blocks, variable, branch, NOT_TRIED)
+    attempt = first_attempt(start.blocks, branch, march, width)
+    variable = attempt.variable
     if 1 < attempt.blocks <= most:
         variable = variable_of_leg(forces, march, panel, 1, room, variable, True, work)
     while 0 < attempt.blocks <= most and variable.width > 0.0:
@@ -219,13 +219,13 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
         variable = variable_of_leg(forces, march, panel, blocks, room, variable, False, work)
         if not variable.width > 0.0:
             break
-        fine, onwards = is_whole(forces, panel, blocks, variable, reading, work)
-        attempt = Attempt(blocks, variable, attempt.branch, attempt.unstretched_blocks)
+        fine, onwards, ratio = is_whole(forces, panel, blocks, variable, reading, work)
+        attempt = Attempt(blocks, variable, attempt.branch, attempt.plain_blocks, attempt.plain_ratio)
         if fine:
             return attempt
-        attempt = next_attempt(attempt, onwards, march, work)
+        attempt = next_attempt(attempt, onwards, ratio, march, work)
         variable = attempt.variable
-    return Attempt(0, variable, attempt.branch, NOT_TRIED)
+    return Attempt(0, variable, attempt.branch, NOT_TRIED, 1.0)
 
 
 @Inner
@@ -293,7 +293,8 @@ def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-unt
     if nu != 0 and nu != -route.only_sign and record.size >= HEAD + MAX_ROWS * MAX_BLOCKS * WIDE:
         work = whole_buffer()
         panel = Panel(0.0, 0.0, nu, span)
-        blocks, variable, branch, _ = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
+        found = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
+        blocks, variable, branch = found.blocks, found.variable, found.branch
         if blocks > 0:
             h = variable.width
             enter_leg(record, route, origin, v, blocks, variable, work)

@@ -337,12 +337,12 @@ def fill_times(blocks, h, work):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def blocks_for(ratio, blocks):  # type: ignore[no-untyped-def]
+def blocks_for(ratio, blocks, is_stretched):  # type: ignore[no-untyped-def]
     """Return the number of blocks that resolve a function whose middle coefficients have this ratio to its size with
-    fewer ``blocks``; 0 if there is no such number, as for the ratio 1.
+    fewer ``blocks``; 0 if there is no such number, as for the ratio 1. In a stretched variable there are no roots near.
     """
     if not 0.0 < ratio < 1.0:
         return 0
     nodes = MIDDLE_DEGREES[blocks - 1] * log(TAIL_RATIO) / log(ratio)
-    needed = max(int(nodes / (ENOUGH_NODES * WIDE)) + 1, blocks + 1)
+    needed = max(int(nodes / ((1.0 if is_stretched else ENOUGH_NODES) * WIDE)) + 1, blocks + 1)
     return needed if needed <= MAX_BLOCKS else 0
