@@ -20,9 +20,9 @@ from gqm_sym.runtime.gradients.formula_orbit import source_of, variables_of
 from gqm_sym.runtime.gradients.programs import Program, Source, assemble
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.launch.formulas import Formulas
-from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, check_contact, read_launch
+from gqm_sym.runtime.launch.rider import FIELDS, STANDARD_GRAVITY, rider_loads
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
 from gqm_sym.runtime.motion.extremes import grid_peaks
 
@@ -35,6 +35,9 @@ FINE_POINTS, FINE_GRIDS = 33, 12
 
 # The number of Newton steps to the place of a maximum, of which a grid gives half of the digits only.
 NEWTON_STEPS = 3
+
+# The V**2 at which loads on riders are read to find their increase with V**2, in m**2/s**2.
+LARGE_V2 = 2.0**20
 
 # Contact counts as kept if it is lost by less than this, relative to v0**2, because so small an amount is rounding.
 ROUNDING = 1e-13
@@ -60,7 +63,8 @@ def least_speed(
         Ends of the range, as values of the curve parameter. Without it the range is the whole curve.
     contact : {"above", "below", "bilateral"}
         The side of the track on which the body runs, as for ``module.solve``. A bilateral track holds the body on both
-        sides, so that only V**2 >= 0 is required.
+        sides, so that only V**2 >= 0 is required. On a space curve "above" is the side to which the upward direction
+        of its riders points, so that its roll must be declared.
     parameters
         Run-time parameters, as for ``module.solve``.
 
@@ -202,8 +206,11 @@ class _Found(NamedTuple):
     def slopes(self) -> Array:
         """Return the derivatives of the bound with respect to all variables."""
         problem, formulas = self.problem, self.problem.formulas
+        by_load = self.bounds.by_load(self.place)
+        if by_load and not formulas.signed:
+            raise SolutionError("gradients: there are none of the load on a rider, which decides the least speed here")
         source, inputs = source_of(formulas), variables_of(problem)
-        program = bound_program(source, has_load=self.bounds.by_load(self.place))
+        program = bound_program(source, has_load=by_load)
         place, moved = np.array([self.place]), np.zeros(source.variables)
         if self.is_end and self.is_end_of_curve:
             ends = end_slopes(formulas, problem.p, list(formulas.parameters))
@@ -226,11 +233,6 @@ def _found(
             f"least_speed: {formulas.name} loses energy, so that V**2 depends on the path taken; use module.solve"
         )
     check_contact(formulas, contact)
-    if contact != "bilateral" and not formulas.signed:
-        raise SolutionError(
-            f"least_speed: contact {contact!r} is for curves in a vertical plane; of a banked space curve ask "
-            "module.solve(..., contact=...) whether contact lasts"
-        )
     for name in parameters:
         if name not in formulas.parameters:
             known = ", ".join(formulas.parameters)
@@ -241,7 +243,7 @@ def _found(
     low, high = _range(formulas, p, start, between)
     mass = dict(zip(formulas.parameters, p, strict=True))["m"].value
     problem = Problem(formulas, launch, p, formulas.domain(p))
-    bounds = _SpeedBounds(problem.functions, mass, start, contact)
+    bounds = (_SpeedBounds if formulas.signed else _BankedSpeedBounds)(problem, mass, start, contact)
     slow_place, lower = _maximum(bounds.lower, low, high)
     least = max(lower, 0.0)
     fast_place, negative_upper = _maximum(lambda lam: -bounds.upper(lam), low, high)
@@ -279,17 +281,23 @@ def _range(formulas: Formulas, p: Any, start: float, between: tuple[Any, Any] | 
 class _SpeedBounds:
     """The lower and upper bounds on v0**2 that contact at each place imposes."""
 
-    def __init__(self, functions: BoundFunctions, mass: float, start: float, contact: str) -> None:
-        self._functions, self._start = functions, start
+    def __init__(self, problem: Problem, mass: float, start: float, contact: str) -> None:
+        self._problem, self._start = problem, start
         self._side = {"above": 1.0, "below": -1.0, "bilateral": 0.0}[contact]
         self._mass = mass
 
     def _terms(self, lam: Array) -> tuple[Array, Array, Array]:
         """Return the loss of V**2 since launch, and curvature and static load n0 with the sign of the contact side."""
-        f = self._functions
+        f = self._problem.functions
         loss = -speed_squared_at(f.addresses, f.p, self._start, 0.0, 0.0, lam, lam - self._start)
+        kappa, load = self._force(lam)
+        return loss, self._side * kappa, self._side * load
+
+    def _force(self, lam: Array) -> tuple[Array, Array]:
+        """Return the increase of N/m per V**2, and N/m at rest."""
+        f = self._problem.functions
         _, _, _, kappa, load = path_and_force_at(f.addresses, f.p, lam, np.zeros_like(lam))
-        return loss, self._side * kappa, self._side * load / self._mass
+        return kappa, load / self._mass
 
     def lower(self, lam: Array) -> Array:
         """Return the bound below which V**2 < 0, or N < 0 where the track curves towards the body."""
@@ -310,6 +318,26 @@ class _SpeedBounds:
         straight = np.where((kappa == 0.0) & (load < 0.0), -np.inf, np.inf)
         out: Array = np.where(away, bound, straight)
         return out
+
+
+class _BankedSpeedBounds(_SpeedBounds):
+    """The same for a space curve, where N is the component of the contact force along the upward direction of riders,
+    or any component on a track that holds the body from all sides.
+    """
+
+    def _force(self, lam: Array) -> tuple[Array, Array]:
+        if not self._side:
+            return np.zeros_like(lam), np.zeros_like(lam)
+        # At a large V**2 the difference of both loads has all digits.
+        slow, fast = (self._upward_load(lam, w) for w in (0.0, LARGE_V2))
+        return (fast - slow) / LARGE_V2, slow
+
+    def _upward_load(self, lam: Array, v2: float) -> Array:
+        """Return N/m along the upward direction of riders, given V**2."""
+        p, still = self._problem.functions.p, np.zeros_like(lam)
+        rows = rider_loads(self._problem.formulas, p, lam, np.full_like(lam, v2), still, still)
+        load: Array = STANDARD_GRAVITY * rows[FIELDS.index("n_vertical")]
+        return load
 
 
 def _maximum(function: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:

@@ -142,3 +142,22 @@ def test_questions_without_an_answer(module: object, arguments: dict, kind: type
     """Each question without an answer is refused, and the message says what would be right."""
     with pytest.raises(kind, match=message):
         gqm.least_speed(module, 0, **arguments)
+
+
+def test_corkscrew(tmp_path: Path) -> None:
+    """On a helix about a level axis the riders lean towards the axis, and v0**2 from the lowest point is
+    4 g R + g (R**2 + c**2)/R; a slightly faster body passes the top, and a slower one lifts off.
+    """
+    roll = "-u+atan(2*sin(u)*cos(u)/(5*cos(u)**2+3*sin(u)**2))"  # for R = 4 and c = 3
+    track = gqm.Curve.space(x="3*u", y="4*sin(u)", z="-4*cos(u)", parameter="u", roll=roll)
+    coil = gqm.build(gqm.derive(track, gqm.Gravity()), name="coil", folder=tmp_path)
+    speed = gqm.least_speed(coil, 0, between=(-1, 4))
+    assert near(speed, sqrt(9.81 * (16 + 25 / 4)))
+    assert near(gqm.least_speed(coil, 0, between=(-1, 4), contact="bilateral"), sqrt(9.81 * 16))
+    for factor, end in ((1.001, "transit"), (0.999, "liftoff")):
+        motion = coil.solve(0, factor * speed, contact="above")
+        assert (motion.kind if end == "transit" else motion.events[-1].kind) == end
+    with pytest.raises(SolutionError, match="none of the load on a rider, which decides the least speed"):
+        gqm.least_speed_gradient(coil, 0, between=(-1, 4))
+    slopes = gqm.least_speed_gradient(coil, 0, between=(-1, 4), contact="bilateral")
+    assert near(slopes["g"], sqrt(16 / 9.81) / 2)

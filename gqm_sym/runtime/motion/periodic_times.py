@@ -77,7 +77,7 @@ class PeriodicTimes(Motion):
         offsets: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__(problem, kind, direction)
-        self._given_segment, self._offsets = segment, offsets
+        self._given_segment, self._given_offsets, self._offsets = segment, offsets, offsets
 
     @computed_once
     def _segment_in_doubles(self) -> Segment:
@@ -227,6 +227,8 @@ class PeriodicTimes(Motion):
         `Motion.period_to`.
         """
         if self.problem.functions.exact is None:
+            if self._orbit is not None:
+                return timing.period_from(self._orbit.duration, self.kind, digits)
             raise SolutionError(
                 "period_to: along this track no more digits are known than those of `period`; declare the curve by "
                 "formulas for more"

@@ -236,12 +236,40 @@ def turning_points(problem: Problem, segment: Segment) -> tuple[float, float]:
 @budget("period_to", 600.0, "ask for fewer digits")
 def period_to(problem: Problem, kind: str, direction: int, segment: Segment, digits: int) -> str:
     """Return the period in s as a decimal string with that many correct digits; see `Motion.period_to`."""
-    if not isinstance(digits, int) or not 1 <= digits <= MAX_DIGITS:
-        raise InputError(f"period_to: digits must be a whole number from 1 to {MAX_DIGITS}, got {short(digits)}")
+    _check_digits(digits)
     a = _arithmetic(problem, segment, digits + 5)
     duration = sum(_durations(a, problem, kind, direction, segment, digits + 5)[0])
     value = 2 * duration if kind == "libration" else duration
     return str(a.context.nstr(value, digits, strip_zeros=False))
+
+
+def period_from(duration: BoundedNumber, kind: str, digits: int) -> str:
+    """Return the period as `period_to` does, from a half period or loop time in double-double arithmetic."""
+    _check_digits(digits)
+    from mpmath.ctx_mp import MPContext
+
+    context = MPContext()
+    context.dps = 2 * PERIOD_DIGITS
+    value, error = context.mpf(duration.high) + context.mpf(duration.low), context.mpf(duration.error)
+    bounds = [2 * bound if kind == "libration" else bound for bound in (value - error, value + error)]
+
+    def decided(count: int) -> str | None:
+        low, high = (context.nstr(bound, count, strip_zeros=False) for bound in bounds)
+        return str(low) if low == high else None
+
+    found = decided(digits) if digits <= PERIOD_DIGITS else None
+    if found is not None:
+        return found
+    known = next((count for count in range(PERIOD_DIGITS, 0, -1) if decided(count) is not None), 0)
+    raise SolutionError(
+        f"period_to: along this track the period is known to {known} digits; ask for no more, or declare the curve by "
+        "formulas"
+    )
+
+
+def _check_digits(digits: int) -> None:
+    if not isinstance(digits, int) or not 1 <= digits <= MAX_DIGITS:
+        raise InputError(f"period_to: digits must be a whole number from 1 to {MAX_DIGITS}, got {short(digits)}")
 
 
 def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:

@@ -9,9 +9,12 @@ from naive import ulps
 from railed import built
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 
 # Half periods in sweeps, in units in the last place.
 MAX_ULPS = 2.0
+# Digits of a period that double-double arithmetic decides.
+KNOWN = 17
 
 COIL = {"pitch": "R/(R**2 + c**2)", "roll": "c/(R**2 + c**2)"}
 COILED = {"start": (0, 0, "-R"), "heading": ("atan(R/c)", 0), "parameters": {"R": "2", "c": "3/4"}}
@@ -41,5 +44,9 @@ def test_half_periods_of_a_coil(tmp_path: Path, pieces: list[Any]) -> None:
             angle = mpf(launch) / rate - (4 if len(pieces) == 2 else 0)
             angle -= 2 * mp.pi * mp.nint(angle / (2 * mp.pi))
             truth = 2 * mp.ellipk(mp.sin(angle / 2) ** 2) * rate / mp.sqrt(2 * mpf("9.81"))
-            assert module.solve(launch).half_period == float(truth)
+            motion = module.solve(launch)
+            assert motion.half_period == float(truth)
+            assert motion.period_to(KNOWN) == mp.nstr(2 * truth, KNOWN, strip_zeros=False)
+            with pytest.raises(SolutionError, match=r"the period is known to \d+ digits; ask for no more"):
+                motion.period_to(40)
             assert ulps(value, truth) <= MAX_ULPS
