@@ -26,7 +26,7 @@ class RecorderOfMore(Recorder, ABC):
 
 
 def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> list[TapeNumber]:
-    """Return the derivatives of a formula with respect to parameters or the place of its tape.
+    """Return the derivatives of a formula with respect to numbers of its tape, each for fixed values of the others.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> lis
     formula : TapeNumber
         The formula.
     variables : sequence of TapeNumber
-        The variables of differentiation.
+        The variables of differentiation. One of them may be computed from others.
     """
-    result = op.number(formula)
+    result, ends = op.number(formula), {variable.register for variable in variables}
     adjoints: dict[int, TapeNumber] = {}
     if result.known is None:
         adjoints[result.register] = op.number(1)
     for k in range(result.register, -1, -1):
-        if k in adjoints:
+        if k in adjoints and k not in ends:
             for operand, partial in partials(op, k):
                 part = _times(adjoints[k], partial)
                 adjoints[operand] = adjoints[operand] + part if operand in adjoints else part

@@ -33,6 +33,9 @@ MAX_ROUNDING = 1e-17
 # values.
 MAX_PANEL_CHANGE = 1e-20
 
+# The number of Newton steps to the turning points, starting from doubles.
+NEWTON_STEPS = 2
+
 # The codes in place of the number of nodes: digits were lost, or the nodes are too few with any number of digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
 
@@ -70,6 +73,32 @@ def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
     address, operations, first, count, _ = program
     set_coordinate(work, count, high, low)
     call_interpreter(address, operations, first, operations.shape[0], work, high.size)
+
+
+@Inner
+def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyped-def]
+    """Fill the inputs of a libration: its variables, both turning points near ``span``, and of each the derivatives
+    that `programs.turning_point_program` has.
+    """
+    count, outputs = variables.shape[1], program[4]
+    rows = outputs.size - 1
+    places = np.zeros((2, 2))
+    places[0, 0], places[0, 1] = span[0], span[1]
+    begin(program, work, variables)
+    for step in range(NEWTON_STEPS + 1):
+        evaluate_block(program, work, places[0], places[1])
+        if step < NEWTON_STEPS:
+            for i in range(2):
+                at = outputs[0] + i
+                places[0, i], places[1, i] = add(places[0, i], places[1, i], work[at], work[at + LOW])
+    inputs[:, :count] = variables
+    for i in range(2):
+        at = outputs[0] + i
+        inputs[0, count + i], inputs[1, count + i] = places[0, i], places[1, i]
+        inputs[2, count + i] = fabs(work[at]) + work[at + ERROR] + UNIT * fabs(places[0, i])
+        for k in range(rows):
+            at, to = outputs[1 + k] + i, count + 2 + i * rows + k
+            inputs[0, to], inputs[1, to], inputs[2, to] = work[at], work[at + LOW], work[at + ERROR]
 
 
 @Inner

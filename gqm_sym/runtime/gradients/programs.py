@@ -205,13 +205,15 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 
 
 @lru_cache(maxsize=64)
-def turning_point_program(source: AnySource) -> Program:
+def turning_point_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
     """Return the program of the Newton step from the place to a turning point, and of the turning point's derivatives
-    with respect to all variables.
+    with respect to all variables, or to those that are ``wanted``.
     """
     op = Recorder(source.inputs, source.coordinates)
     here = source.local(op, op.place)
-    return assemble(op, [-(part / here.half_slope) for part in (here.half, *here.half_partials)])
+    rows = range(source.variables) if wanted is None else wanted
+    parts = here.half, *(here.half_partials[k] for k in rows)
+    return assemble(op, [-(part / here.half_slope) for part in parts])
 
 
 @lru_cache(maxsize=64)

@@ -1,8 +1,9 @@
 """Gradients of single numbers of a periodic motion: its period, its turning points, its extremes, its action."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from math import isfinite
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ PERIODS = ("half_period", "period")
 AT_TURN, MAX_STEP, NEWTON_STEPS = 1e-12, 1e-5, 3
 
 
-def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
+def selected(parameters: Iterable[str], wrt: Any) -> Mapping[str, int]:
     """Return the names of the variables of differentiation, each with its row among all variables.
 
     Raises
@@ -30,21 +31,24 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
     InputError
         If a name is neither a run-time parameter nor ``lam0`` or ``v0``.
     """
-    is_plain = wrt is None or type(wrt) is str or (type(wrt) is tuple and all(type(name) is str for name in wrt))
-    return dict((_known_rows if is_plain else _rows)(tuple(parameters), wrt))
+    is_plain = wrt is None or type(wrt) is str or type(wrt) is tuple
+    try:
+        return (_known_rows if is_plain else _rows)(tuple(parameters), wrt)
+    except TypeError:  # what is in the tuple cannot be looked up
+        return _rows(tuple(parameters), wrt)
 
 
-def _rows(parameters: tuple[str, ...], wrt: Any) -> dict[str, int]:
+def _rows(parameters: tuple[str, ...], wrt: Any) -> Mapping[str, int]:
     """Return what `selected` does."""
     rows = {name: row for row, name in enumerate((*parameters, "lam0", "v0"))}
     wanted = ("lam0", "v0", *parameters) if wrt is None else names(wrt, where="wrt")
     for name in wanted:
         if name not in rows:
             raise InputError(unknown_argument("wrt", name, rows, what="parameter"))
-    return {name: rows[name] for name in wanted}
+    return MappingProxyType({name: rows[name] for name in wanted})
 
 
-# Plain names occur again and again.
+# The same names occur again and again.
 _known_rows = lru_cache(maxsize=256)(_rows)
 
 

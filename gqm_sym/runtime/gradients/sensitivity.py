@@ -285,14 +285,15 @@ class OrbitSensitivity:
 
     def at_times(self, motion: Any, record: Array, t: Array, phi: float, rows: tuple[int, ...]) -> Array:
         """Return what `at` does, for times in a record of a motion along a curve with formulas."""
-        if (phi, rows) not in self._chosen:
-            self._chosen[phi, rows] = self._choose(motion, phi, rows)
-        (program, registers, *inputs), orbit = self._chosen[phi, rows]
+        chosen = self._chosen.get((phi, rows))
+        if chosen is None:
+            chosen = self._chosen[phi, rows] = self._choose(motion, phi, rows)
+        along, orbit = chosen
         found, p = np.empty((STATE_ROWS, len(rows), t.size)), motion.problem.functions.p
-
         if t.size < 2 * MIN_TIMES_PER_THREAD:
-            fill_sensitivities((record, p, t), (program, registers, *inputs), orbit, found)
+            fill_sensitivities((record, p, t), along, orbit, found)
             return found
+        program, registers, *inputs = along
 
         def work(part: slice) -> None:
             out = np.empty((STATE_ROWS, len(rows), part.stop - part.start))

@@ -9,9 +9,9 @@ from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
+from gqm_sym.runtime.double_double.arithmetic import add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
-from gqm_sym.runtime.gradients.evaluation import PROGRAM, begin, evaluate_block
+from gqm_sym.runtime.gradients.evaluation import PROGRAM, begin, evaluate_block, fill_turns
 from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.lanes.launches import Launches
 from gqm_sym.runtime.gradients.lanes.periods import period_gradients
@@ -27,9 +27,6 @@ MIN_LAUNCHES_PER_THREAD = 64
 PERIODS = {"half_period": 1.0, "period": 2.0}
 COMPILED = (*PERIODS, "turning_points", *EXTREMES)
 
-# The number of Newton steps to the turning points, starting from doubles.
-NEWTON_STEPS = 2
-
 # The grid on which an extreme is found, in shares of a lap and of a libration's width. At most so many steps of
 # Newton's method follow, until one is below the first share of the width.
 LAP_SHARES = np.arange(BLOCK) / BLOCK
@@ -39,29 +36,6 @@ MAX_STEPS, LAST_STEP = 8, 1e-12
 # The largest error of a derivative, as a share of it or of the extreme, and the largest difference between the extreme
 # found here and that of the sweep, as a share of the largest value on the grid.
 MAX_ERROR, MAX_DIFFERENCE = 1e-17, 1e-10
-
-
-@Inner
-def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyped-def]
-    """Fill the inputs of a libration: its variables, both turning points near ``span``, and their derivatives."""
-    count, outputs = variables.shape[1], program[4]
-    places = np.zeros((2, 2))
-    places[0, 0], places[0, 1] = span[0], span[1]
-    begin(program, work, variables)
-    for step in range(NEWTON_STEPS + 1):
-        evaluate_block(program, work, places[0], places[1])
-        if step < NEWTON_STEPS:
-            for i in range(2):
-                at = outputs[0] + i
-                places[0, i], places[1, i] = add(places[0, i], places[1, i], work[at], work[at + LOW])
-    inputs[:, :count] = variables
-    for i in range(2):
-        at = outputs[0] + i
-        inputs[0, count + i], inputs[1, count + i] = places[0, i], places[1, i]
-        inputs[2, count + i] = fabs(work[at]) + work[at + ERROR] + UNIT * fabs(places[0, i])
-        for k in range(count):
-            at, to = outputs[1 + k] + i, count + 2 + i * count + k
-            inputs[0, to], inputs[1, to], inputs[2, to] = work[at], work[at + LOW], work[at + ERROR]
 
 
 @Inner

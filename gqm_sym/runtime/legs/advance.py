@@ -14,6 +14,8 @@ from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import first_step
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER
 from gqm_sym.runtime.legs.body import (
+    BRANCH,
+    BRANCH_HEIGHT,
     CONTACT_SIGN,
     DIRECTION,
     ELAPSED,
@@ -77,6 +79,7 @@ from gqm_sym.runtime.legs.runs.ends import (
 )
 from gqm_sym.runtime.legs.runs.follow import direction_from_rest, follow
 from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 
@@ -317,12 +320,12 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     width = expected_width(body)
-    blocks = blocks_to_try(body, width)
+    blocks, branch = blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:
         start = RunStart(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
-            *(width, blocks),
+            *(width, blocks, branch),
         )
         route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
@@ -342,6 +345,7 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
     body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0
     note_blocks(body, body[LAST_WIDTH], found.blocks)
+    body[BRANCH], body[BRANCH_HEIGHT] = found.branch
     body[TURNS] += 1.0
     body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
     return rests

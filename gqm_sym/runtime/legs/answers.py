@@ -102,6 +102,10 @@ MAX_TURNS = 20000
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
 
+# With friction, a leg that is shorter than this share of its place loses digits of its time: those of the force, which
+# is a difference.
+SLIDING_SHARE = 2.0**-11
+
 # Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
 # without bound there, as at a cusp.
 UNBOUNDED_GROWTH = 1e6
@@ -259,6 +263,8 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
+        if dissipation.friction and slides_little(record, body[LEAST_SIZE]):
+            break
         findings = after_leg(body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
@@ -271,12 +277,26 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
 
 
 @Inner
+def is_short(record, share, least_size):  # type: ignore[no-untyped-def]
+    """Return whether a leg is shorter than a share of the place where it ends."""
+    return fabs(record[END] - record[START]) < share * max(fabs(record[END]), least_size)
+
+
+@Inner
+def slides_little(record, least_size):  # type: ignore[no-untyped-def]
+    """Return whether a leg from rest is so short that, with friction, it is followed by the distance from where
+    friction balances the other forces.
+    """
+    return record[START_V2] == 0.0 and is_short(record, SLIDING_SHARE, least_size)
+
+
+@Inner
 def is_tiny(record, least_size):  # type: ignore[no-untyped-def]
     """Return whether a leg is so short that the next one may have to be followed by the distance from an equilibrium,
     or cannot be followed at all.
     """
-    start, end = record[START], record[END]
-    return fabs(end - start) < SMALL_SHARE * max(fabs(end), least_size) or max(fabs(start), fabs(end)) < LEAST_SWING
+    largest = max(fabs(record[START]), fabs(record[END]))
+    return is_short(record, SMALL_SHARE, least_size) or largest < LEAST_SWING
 
 
 @Inner
@@ -367,7 +387,8 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
             joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
-            if question == FIRST_LEGS and may_be_small(dissipation, p, joints.corners, body):
+            is_swing = question == FIRST_LEGS and not dissipation.friction
+            if is_swing and may_be_small(dissipation, p, joints.corners, body):
                 return END_NEAR_EQUILIBRIUM
         if question <= LEGS:
             what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else END_REST

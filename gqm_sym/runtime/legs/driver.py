@@ -18,12 +18,15 @@ from gqm_sym.runtime.legs.answers import (
     MAX_PAUSES,
     MAX_TURNS,
     RUN_AGAIN,
+    SLIDING_SHARE,
     Track,
     drive_along,
 )
 from gqm_sym.runtime.legs.body import (
+    CONTACT_SIGN,
     DIRECTION,
     ELAPSED,
+    ELAPSED_LOW,
     ENDING,
     FIRST_STEP,
     HIGH,
@@ -32,8 +35,10 @@ from gqm_sym.runtime.legs.body import (
     LAST_AT,
     LEAST_SIZE,
     LEAST_SWING,
+    LEG_TIME,
     LOW,
     MAY_REST,
+    NO_TURN_UNTIL,
     PANEL_COUNT,
     PAUSES,
     PERIOD,
@@ -51,7 +56,20 @@ from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, F
 from gqm_sym.runtime.legs.endings import cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
-from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
+from gqm_sym.runtime.legs.leg_record import (
+    BEGIN,
+    BEGIN_LOW,
+    COLUMNS,
+    END,
+    END_LOW,
+    HEADING,
+    LAPS_BEFORE,
+    MIDDLE,
+    MIDDLE_LOW,
+    START,
+    START_LOW,
+    START_V2,
+)
 from gqm_sym.runtime.legs.leg_segments import Run, Runs, TurnedLegs, panelled
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
@@ -227,12 +245,17 @@ class Driver:
             frame.move(record, 1)
             self._place_in_frame = float(record[END])
         heading, at_limit = int(record[HEADING]), frame is not None and what == END_LIMIT
+        # A frame with friction serves one leg.
+        is_over = at_limit or (what == END_TURN and self.dissipation.friction and not self.number(ENDING))
         is_inside = abs(self.body[0, PLACE]) < self._reach_in_frame
         if frame is not None and frame.breaks.size and is_inside:
             self._limit_frame(frame)
             self.body[0, ENDING] = 0.0 if at_limit else self.body[0, ENDING]
-        elif at_limit:
+        elif frame is not None and is_over:
             self._leave_frame(record)
+        if self._slides_nearby(what, record):
+            self._store(*self._completed(*self._drive(1)))
+            return
         self._decide_at_equilibrium(what, float(record[START]), float(record[END]))
         if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
@@ -288,6 +311,25 @@ class Driver:
             creeps = what == END_PAUSE and self.number(STEP) <= CREEPING_SHARE * self.number(FIRST_STEP)
             if turns_nearby or creeps:
                 self._enter_frame()
+
+    def _slides_nearby(self, what: int, record: Array) -> bool:
+        """Return whether a leg from rest is so short that it loses digits, or cannot be followed, by places; from its
+        start, the body is then followed by the distance from where sliding friction balances the other forces.
+        """
+        if self._frame is not None or not self.dissipation.friction:
+            return False
+        share = SLIDING_SHARE * max(abs(float(record[END])), self.number(LEAST_SIZE))
+        is_short = what in (END_TOO_MANY_PANELS, END_TOO_NARROW) or abs(float(record[END] - record[START])) < share
+        if record[START_V2] or not is_short:
+            return False
+        line, after = self.body[0], self.body[0].copy()
+        line[[PLACE, PLACE_LOW, LAPS, DIRECTION]] = record[[START, START_LOW, LAPS_BEFORE, HEADING]]
+        line[[ELAPSED, ELAPSED_LOW]] = record[[BEGIN, BEGIN_LOW]]
+        line[[V2, CONTACT_SIGN, NO_TURN_UNTIL, LEG_TIME, ENDING]] = 0.0
+        self._enter_frame()
+        if self._frame is None:
+            line[:] = after
+        return self._frame is not None
 
     def _failure(self, record: Array) -> SolutionError:
         """Return the error that says why a leg could not be followed."""

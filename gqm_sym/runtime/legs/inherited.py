@@ -116,7 +116,8 @@ class InheritedErrors:
         after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, NO_CHARTS, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
-        return after._replace(place=after.place + of_place) if run.what == END_LIMIT else after
+        is_last = run.what == END_LIMIT or frame.dissipation.friction
+        return after._replace(place=after.place + of_place) if is_last else after
 
     def _errors_of(self, frame: Frame) -> tuple[float, float]:
         """Return the error of the place of a frame's equilibrium, and the relative error of the force there due to the

@@ -19,6 +19,8 @@ from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     END,
     END_LOW,
+    EXTENT,
+    FALLING,
     HALF_C,
     HEAD,
     HEADING,
@@ -27,6 +29,7 @@ from gqm_sym.runtime.legs.leg_record import (
     NO_VALUES,
     NORMAL_LOAD,
     RIGHT,
+    RISING,
     START,
     START_LOW,
     TIME,
@@ -40,6 +43,7 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope
+from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
 from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, whole_time_row
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
 
@@ -330,9 +334,20 @@ def time_to_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-de
 
 
 @Inner
+def variable_of_rows(record, width):  # type: ignore[no-untyped-def]
+    """Return the variable of a leg of this width whose record has rows."""
+    return LegVariable(width, record[RISING], record[FALLING], record[EXTENT])
+
+
+@Inner
 def passage_of_rows(record, covered, left):  # type: ignore[no-untyped-def]
     """Return the time from the start of a leg whose record has rows to a place, given its distances from both ends."""
     terms, count = record[HEAD:], int(record[WHOLE]) * WIDE - 1
+    if record[EXTENT] > 0.0:
+        # From here on these are the distances in the leg's variable.
+        variable = variable_of_rows(record, covered + left)
+        covered = share_at(variable, covered)[0]
+        left = share_at(reversed_variable(variable), left)[0]
     if covered <= left:
         return time_to_phase(terms, count, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
     total = record[TIME_FROM_START] + record[TIME_FROM_END]
@@ -378,7 +393,10 @@ def place_of_rows(record, time):  # type: ignore[no-untyped-def]
     to_coefficients(blocks, rows, wide, rows, 0)
     phase, backwards = phase_of_rows(record, rows, time)
     root = sin(0.5 * phase)
-    covered = v * (h * (root * root))
+    variable = variable_of_rows(record, h)
+    if backwards and variable.extent > 0.0:
+        variable = reversed_variable(variable)
+    covered = v * distance_at(variable, root * root)
     return record[END] + (record[END_LOW] - covered) if backwards else record[START] + (record[START_LOW] + covered)
 
 

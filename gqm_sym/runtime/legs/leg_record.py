@@ -19,6 +19,8 @@ WHOLE                0; or, if the record has no panels but rows of the whole le
                      time per phase angle, V**2, and N per mass. Where panels are read, they are those of
                      `runs.whole_panels`
 WHOLE_WIDTH          the width of a leg with rows from which panels can be made; 0 if they cannot
+RISING, FALLING,     of the variable of a leg with rows (`runs.leg_variable.LegVariable`)
+EXTENT
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end; if
                      there are rows, both are ROWS_COUNT_AS
 USED                 the number of elements of a record of a solved motion that other legs follow
@@ -56,7 +58,7 @@ from gqm_sym.runtime.legs.panels.resolution import tail_of
 
 START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
-WHOLE, WHOLE_WIDTH, AHEAD, BACK, USED, HEAD = range(15, 21)
+WHOLE, WHOLE_WIDTH, RISING, FALLING, EXTENT, AHEAD, BACK, USED, HEAD = range(15, 24)
 
 # The data that are read from a record (`runs.route.Reading`): the times and places between which the leg runs; also the
 # largest or smallest speed or contact force; the time at which the body passes a place; or everything that panels

@@ -13,10 +13,12 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
-from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
+from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
+from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
@@ -57,6 +59,9 @@ class PeriodicMotion(PeriodicTimes):
 
     _sampler: Sampler | None = None
 
+    # The last sampler of sensitivities, and the phase angle of the launch by its times.
+    _sampled: tuple[Sampler, float] | None = None
+
     @computed_once
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
@@ -88,7 +93,23 @@ class PeriodicMotion(PeriodicTimes):
 
     @locked
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
-        return gradient(self._derivatives, self, quantity, wrt)
+        found = self._period_gradient(quantity, wrt) if quantity in PERIODS else None
+        return gradient(self._derivatives, self, quantity, wrt) if found is None else found
+
+    def _period_gradient(self, quantity: str, wrt: Any) -> dict[str, float] | None:
+        """Return the derivatives of a period along a curve with formulas; None where they take more than one call of
+        compiled code.
+        """
+        swings, formulas, lam0 = self.kind == "libration", self.problem.formulas, self.problem.lam0
+        if not isinstance(formulas.exact, ExactFormulas) or not (swings or quantity == "period"):
+            return None
+        rows = selected(formulas.parameters, wrt)
+        span = lam0 - self._given_offsets[0], lam0 + self._given_offsets[1]
+        found = period_gradient(self.problem, 0 if swings else self.direction, span, tuple(rows.values()))
+        if found is None:
+            return None
+        shares = 2.0 * found if swings and quantity == "period" else found
+        return dict(zip(rows, shares.tolist(), strict=True))
 
     @locked
     def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
@@ -117,7 +138,7 @@ class PeriodicMotion(PeriodicTimes):
         if sampled is not None:
             sampler, times, phi, shape = sampled
             made = self._orbit_sensitivity.at_times(self, sampler.record, times, phi, tuple(rows.values()))
-            return Sensitivity(tuple(rows), *made.reshape(len(made), len(rows), *shape))
+            return Sensitivity(tuple(rows), *(made.reshape(len(made), len(rows), *shape) if shape else made[:, :, 0]))
         points, phi, shape = self._orbit_points(t)
         found = self._orbit_sensitivity.at(self, points, phi, list(rows.values()))
         return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
@@ -137,7 +158,9 @@ class PeriodicMotion(PeriodicTimes):
         """Return the sampler for times, these, the phase angle of the launch, and their shape; None if there is no
         sampler.
         """
-        time = plain_time(t)
+        time, known = plain_time(t), self._sampled
+        if time is not None and known is not None and self._sampler_for(time, time) is known[0]:
+            return known[0], np.array([time]), known[1], ()
         given = plain_times(t) if time is None else (np.array([time]), time, time)
         # The speeds of some segments can be computed from their panels only.
         from_panels = given is None or self._segment.from_multiprecision
@@ -145,7 +168,8 @@ class PeriodicMotion(PeriodicTimes):
         if given is None or sampler is None:
             return None
         trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
-        return sampler, given[0].reshape(-1), trajectory.segments[0].phi_start, shape
+        self._sampled = sampler, trajectory.segments[0].phi_start
+        return sampler, given[0].reshape(-1), self._sampled[1], shape
 
     def _orbit_points(self, t: Any) -> tuple[Array, float, tuple[int, ...]]:
         """Return points on the orbit at times, the phase angle of the launch, and the shape of the times."""

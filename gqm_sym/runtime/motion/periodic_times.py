@@ -77,7 +77,7 @@ class PeriodicTimes(Motion):
         offsets: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__(problem, kind, direction)
-        self._given_segment, self._offsets = segment, offsets
+        self._given_segment, self._given_offsets, self._offsets = segment, offsets, offsets
 
     @computed_once
     def _segment_in_doubles(self) -> Segment:

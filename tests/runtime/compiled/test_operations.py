@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic import matrices
+from gqm_sym.runtime.arithmetic import exponential_rows, matrices
 from gqm_sym.runtime.arithmetic.clenshaw import GROUP, sum_group
 from gqm_sym.runtime.charts.evaluate import LANES, TERMS, fill_lanes
 from gqm_sym.runtime.compiled import jit
@@ -33,6 +33,7 @@ WIDTH = 24
 
 combine = over_rows(lambda a, b, c: abs(a - 2.0 * b) / c + 1.0, WIDTH)
 root = over_rows(lambda a: np.sqrt(abs(a)) * a, WIDTH)
+grow = over_rows(lambda a: exponential_rows.expm1(abs(a)), WIDTH)
 times_square = matrices.multiply(RNG.normal(size=(WIDTH, WIDTH)))
 times_wide = matrices.multiply(RNG.normal(size=(7, 40)))
 ends = matrices.span(WIDTH - 3)
@@ -46,6 +47,7 @@ def everything(x, y, columns, out):  # type: ignore[no-untyped-def]
     line = borrowed(x)
     combine(line, 0, WIDTH, 2 * WIDTH, 0.7)
     root(line, WIDTH, 3 * WIDTH)
+    grow(line, 2 * WIDTH, 4 * WIDTH)
     times_square(line, 5, out[0], 3)
     times_wide(line, 2, out[1], 1)
     out[2, 0], out[2, 1] = ends(line, 4)

@@ -53,3 +53,15 @@ def test_derivatives(name: str, order: int) -> None:
                 error = abs(mpf(row[0, k]) + mpf(row[1, k]) - wanted)
                 assert error <= 1e-28 * max(1, abs(wanted))
                 assert error <= row[2, k] + mpf(10) ** -38
+
+
+def test_variables_that_depend_on_others() -> None:
+    """A derivative with respect to a variable is for fixed values of the others, also of one computed from it."""
+    op = Recorder(1)
+    p, u = op.values[0], op.place
+    product = p * u
+    program = assemble(op, gradient(op, op.sin(product) + p, [product, p, u]))
+    by_product, by_p, by_u = values(program, pairs((PARAMETER, 0.0, 0.0)), PLACES)[:, 0]
+    np.testing.assert_allclose(by_product, np.cos(PARAMETER * PLACES), rtol=0, atol=1e-15)
+    assert (by_p == 1.0).all()
+    assert (by_u == 0.0).all()

@@ -1,5 +1,6 @@
 """Gradients in sweeps agree with closed forms, and with those of single motions."""
 
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from mpmath import mp, mpf
 from paths import ROOT
 
+import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.loading import load
 
@@ -159,3 +161,15 @@ def test_a_cluster_is_refused() -> None:
     """A gradient on a cluster is refused, and the message says what to leave out."""
     with pytest.raises(InputError, match="leave one of them out"):
         generated("circle").sweep("period", lam0=1.0, gradient="L", client=object())
+
+
+def test_an_axis_that_parameters_move(generated_folder: Path) -> None:
+    """From rest in z = a x**2 + b x the distance from the axis of symmetry changes with a and b."""
+    curve = gqm.Curve.graph("a*x**2 + b*x", parameters={"a": "4/5", "b": "-1/2"})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="moving_axis", folder=generated_folder)
+    for launch in ({"lam0": 1.3}, {"lam0": -0.7}, {"lam0": 1.3, "v0": 0.25}):
+        swept = module.sweep("half_period", **launch, gradient=("a", "b", "lam0"))
+        found = module.solve(**launch).gradient("half_period", ("a", "b", "lam0"))
+        np.testing.assert_allclose(swept.gradient.reshape(-1), list(found.values()), rtol=1e-15)
+    # A shift of the well by -b/(2 a) shifts the launch: dT/db = dT/dlam0 / (2 a), where b changes its depth only.
+    assert found["b"] == pytest.approx(found["lam0"] / 1.6, rel=1e-14)

@@ -6,7 +6,7 @@ the registers of the processor. LLVM takes some tenths of a second for a program
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import binding, ir
@@ -25,9 +25,6 @@ from gqm_sym.runtime.gradients.programs import Program
 
 # The number of orbits in a vector, which every number of orbits that a program is called with is a multiple of.
 WIDTH = 8
-
-# All code that has been made: addresses of it may be kept anywhere.
-_KEPT: list[MachineCode] = []
 
 REAL, WHOLE = ir.DoubleType(), ir.IntType(64)
 VECTOR = ir.VectorType(REAL, WIDTH)
@@ -292,13 +289,27 @@ class _DoubleBody(_Body):
         return at_p, at_q, slope, by_p, by_q, slope_p, slope_q
 
 
-def operands(program: Program | LaneProgram) -> tuple[Any, ...]:
-    """Return the operands of a program, with the addresses of machine code for it in place of the interpreters'."""
+class CodedProgram(NamedTuple):
+    """A program with machine code for it.
+
+    Attributes
+    ----------
+    operands : tuple
+        The operands of the program, with the addresses of this code in place of the interpreters'.
+    codes : tuple of MachineCode
+        The code, which is removed from memory with this object, so that who runs it keeps the object.
+    """
+
+    operands: tuple[Any, ...]
+    codes: tuple[MachineCode, ...]
+
+
+def coded(program: Program | LaneProgram) -> CodedProgram:
+    """Return a program with machine code for it."""
     if isinstance(program, Program):
         results = {position: {0, LOW, ERROR} for position in program.outputs.tolist()}
         code = of_pairs(program.operations, program.first, results)
-        _KEPT.append(code)
-        return code.address, *program.operands[1:]
+        return CodedProgram((code.address, *program.operands[1:]), (code,))
     stored = defaultdict[int, set[int]](set)
     for kind, _, left, right in [*program.nodes.tolist(), *program.noise.tolist()]:
         if kind == ERROR_BOUND:
@@ -310,8 +321,7 @@ def operands(program: Program | LaneProgram) -> tuple[Any, ...]:
         of_doubles(program.nodes, program.outputs),
         of_doubles(program.noise, program.variances),
     )
-    _KEPT.extend(codes)
-    return tuple(code.address for code in codes), *program.operands[1:]
+    return CodedProgram((tuple(code.address for code in codes), *program.operands[1:]), codes)
 
 
 def of_pairs(codes: NDArray[np.int64], cut: int, stored: dict[int, set[int]]) -> MachineCode:

@@ -27,7 +27,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     fill_mean_gradients,
 )
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, UNEVEN, Launches
-from gqm_sym.runtime.gradients.lanes.machine_code import operands
+from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
 from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
@@ -44,6 +44,9 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 # The number of launches from which on a thread is worth starting, and that from which on machine code is worth making
 # for a program, which takes up to 0.2 s.
 MIN_LAUNCHES_PER_THREAD, MIN_LAUNCHES_FOR_CODE = 64, 2000
+
+# The number of programs whose machine code is kept, which is up to 1 MB each. A sweep needs three of them.
+MAX_CODED = 48
 
 # The ranges of phases of half periods and laps, as two doubles.
 PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.0)}
@@ -80,10 +83,10 @@ class Stage(NamedTuple):
     kind: int = LIBRATION
 
 
-@lru_cache(maxsize=128)
-def machine_code(make: Callable[..., Program | LaneProgram], *given: Any) -> tuple[Any, ...]:
-    """Return the operands of a program with machine code for it, which is made once."""
-    return operands(make(*given))
+@lru_cache(maxsize=MAX_CODED)
+def machine_code(make: Callable[..., Program | LaneProgram], *given: Any) -> CodedProgram:
+    """Return a program with machine code for it, which is made once and kept until many others have been used."""
+    return coded(make(*given))
 
 
 def end_program(end: int, source: Source, rows: tuple[int, ...]) -> Program:
@@ -171,7 +174,8 @@ def carried_out(
     makers = [*turns, (stage.make, *stage.given)]
     programs = [make(*given) for make, *given in makers]
     if chosen.size >= MIN_LAUNCHES_FOR_CODE:
-        addressed = [machine_code(*maker) for maker in makers]
+        programs_in_code = [machine_code(*maker) for maker in makers]  # the code lives as long as this list
+        addressed = [one.operands for one in programs_in_code]
     else:
         addressed = [one.operands for one in programs]
     ends = tuple(addressed[:-1]) or (NO_PROGRAM, NO_PROGRAM)

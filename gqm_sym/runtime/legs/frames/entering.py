@@ -11,7 +11,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation, ExactLaw
 from gqm_sym.runtime.launch.ends import starting_step
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import LEAST_SIZE, LEAST_SWING, PLACE_LOW, V2
+from gqm_sym.runtime.legs.body import LEAST_SWING, PLACE_LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
 from gqm_sym.runtime.legs.frames.fitting import Breaks, frame_near, refined, sharpened
 from gqm_sym.runtime.legs.frames.local_frame import PLACE, Frame, is_small
@@ -65,7 +65,7 @@ def entry_near(problem: Problem, loss: Dissipation, line: Array, lam0: Number | 
         return None
     place, low, v2 = line[[BODY_PLACE, PLACE_LOW, V2]].tolist()
     reach, breaks = _surroundings(problem, place)
-    frame = frame_near(loss, p, (place, low, v2), reach, float(line[LEAST_SIZE]), breaks)
+    frame = frame_near(loss, p, line, reach, breaks)
     if frame is None or not (frame.is_stable or lam0):
         return None
     law, exact = law_at_rest(problem, has_breaks=frame.breaks.size > 0), problem.formulas.exact
@@ -77,7 +77,7 @@ def entry_near(problem: Problem, loss: Dissipation, line: Array, lam0: Number | 
         known = refined(frame, exact, problem.p, lam0) if lam0 and isinstance(exact, ExactLaw) else None
         if known is not None:
             (frame, distance), low, unknown = known, 0.0, 0.0
-    if v2 == 0.0 and abs(distance) < unknown:
+    if v2 == 0.0 and abs(distance) < unknown and not loss.friction:
         distance = 0.0  # the body stays there
     _check_distance(problem, frame.size(distance, v2), frame)
     return Entry(frame, distance, low, reach)

@@ -17,6 +17,9 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, add, plus, two_sum
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation, ExactLaw
+from gqm_sym.runtime.legs.body import LEAST_SIZE, V2
+from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
+from gqm_sym.runtime.legs.body import PLACE_LOW as BODY_PLACE_LOW
 from gqm_sym.runtime.legs.frames.local_frame import (
     BEGIN,
     CENTRE,
@@ -37,6 +40,7 @@ from gqm_sym.runtime.legs.frames.local_frame import (
     Frame,
     force_at_rest,
     frame_functions,
+    sense_on,
     slope_at_origin,
 )
 from gqm_sym.runtime.legs.variations.law_at_rest import LawAtRest
@@ -47,6 +51,13 @@ from gqm_sym.runtime.multiprecision.exact_problem import GUARD_DIGITS, PRECISION
 # moved to the zero of the force.
 NODES, RESOLVED, MAX_HALVINGS, MAX_MOVES = 64, 1e-14, 12, 4
 SHARES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+
+# The matrices that take values at these nodes to coefficients of Chebyshev polynomials, by least squares, and these to
+# coefficients of powers.
+TO_SERIES = chebyshev.chebvander(SHARES, DEGREE).T * np.array([[1.0], *[[2.0]] * DEGREE]) / NODES
+TO_POWERS = np.zeros((DEGREE + 1, DEGREE + 1))
+for _k in range(DEGREE + 1):
+    TO_POWERS[: _k + 1, _k] = chebyshev.cheb2poly([0.0] * _k + [1.0])
 
 # The largest number of breaks in a range, which ends before the next one, and before one that lies within this share of
 # its end.
@@ -135,34 +146,36 @@ def _cut(breaks: Array, size: float) -> tuple[float, Array]:
     return size, np.array([-size, *breaks[np.abs(breaks) < size], size])
 
 
-def _fit(dissipation: Dissipation, p: Array, place: float, edges: Array) -> _Fit | None:
-    """Return the force about a place; None if it is not resolved, or depends on the direction of motion."""
+def _fit(dissipation: Dissipation, p: Array, sense: tuple[int, int], place: float, edges: Array) -> _Fit | None:
+    """Return the force about a place; None if it is not resolved, or, without sliding friction, depends on the
+    direction of motion.
+    """
     spans = [(0.5 * (low + high), 0.5 * (high - low)) for low, high in pairwise(edges.tolist())]
     places = place + np.concatenate([centre + half * SHARES for centre, half in spans])
-    forwards, backwards = force_at_rest(dissipation, p, places)
-    largest = float(np.max(np.abs(forwards)))
-    if not np.max(np.abs(forwards - backwards)) <= FRICTIONLESS_SHARE * largest:
-        return None
-    samples = forwards.reshape(len(spans), NODES).T
-    series = chebyshev.chebfit(SHARES, samples, DEGREE)
+    force = force_at_rest(dissipation, p, places, *sense)
+    largest = float(np.max(np.abs(force)))
+    if not dissipation.friction:
+        backwards = force_at_rest(dissipation, p, places, -1, 1)
+        if not np.max(np.abs(force - backwards)) <= FRICTIONLESS_SHARE * largest:
+            return None
+    samples = force.reshape(len(spans), NODES).T
+    series = TO_SERIES @ samples
     noise = float(np.max(np.abs(chebyshev.chebval(SHARES, series).T - samples)))
     if not noise <= RESOLVED * largest:
         return None
     powers = []
     for terms in series.T:
         kept = np.flatnonzero(np.abs(terms) > noise / np.sqrt(NODES))
-        found, padded = chebyshev.cheb2poly(terms[: kept[-1] + 1]) if kept.size else (), np.zeros(DEGREE + 1)
-        padded[: len(found)] = found
-        powers.append(padded)
+        count = kept[-1] + 1 if kept.size else 0
+        powers.append(TO_POWERS[:, :count] @ terms[:count])
     return _Fit(edges, powers, noise)
 
 
 def frame_near(
     dissipation: Dissipation,
     p: Array,
-    start: tuple[float, float, float],
+    line: Array,
     reach: float,
-    least_size: float,
     breaks: Breaks,
 ) -> Frame | None:
     """Return the frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
@@ -172,18 +185,18 @@ def frame_near(
     dissipation : Dissipation
     p : array
         Run-time parameters.
-    start : (float, float, float)
-        A place as two doubles, and V**2 there.
+    line : array
+        The body (`legs.body`).
     reach : float
         The distance from there over which functions are expected to be smooth between breaks.
-    least_size : float
-        A size of places below which their roundings do not decrease (`legs.body`).
     breaks : Breaks
     """
-    middle, (size, edges) = start[0], _cut(breaks.places - start[0], reach)
+    place, place_low, v2 = line[[BODY_PLACE, BODY_PLACE_LOW, V2]].tolist()
+    sense = sense_on(dissipation, p, line)
+    middle, (size, edges) = place, _cut(breaks.places - place, reach)
     fit = None
     for _ in range(MAX_HALVINGS):
-        fit = _fit(dissipation, p, middle, edges)
+        fit = _fit(dissipation, p, sense, middle, edges)
         if fit is not None:
             break
         size, edges = _cut(breaks.places - middle, 0.5 * size)
@@ -195,7 +208,7 @@ def frame_near(
             break
         middle += moved
         size, edges = _cut(breaks.places - middle, size)
-        fit = _fit(dissipation, p, middle, edges)
+        fit = _fit(dissipation, p, sense, middle, edges)
     if fit is None:
         return None
     own, low = fit.zero()
@@ -207,16 +220,16 @@ def frame_near(
         _begin(rows, own, k)
         row[TERMS:] = _divided(fit.powers[k], (row[ORIGIN] - row[CENTRE]) / half) / half
     speed_equation, static_balance = frame_functions()
-    functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear, 0)
-    head = [float(dissipation.speed_equation), middle, low, size, float(len(rows))]
-    frame = Frame(functions, np.array([*head, *rows.ravel(), *p]), 0.0)
+    friction = dissipation.friction
+    functions = Dissipation(speed_equation.address, static_balance.address, friction, False, dissipation.linear, 0)
+    addresses = float(dissipation.speed_equation), float(dissipation.static_balance) if friction else 0.0
+    head = [*addresses, middle, low, size, float(len(rows))]
+    frame = Frame(functions, np.array([*head, *rows.ravel(), *p]), 0.0, sense=sense)
     if not frame.slope:
         return None
     # The distance from an unstable equilibrium needs more digits than places of that size have.
-    of_places = max(abs(middle), least_size if frame.is_stable else 0.0)
-    if not frame.size((start[0] - middle) + (start[1] - low), start[2]) <= (
-        min(SMALL_SHARE * of_places, RANGE_SHARE * size)
-    ):
+    of_places = max(abs(middle), float(line[LEAST_SIZE]) if frame.is_stable else 0.0)
+    if not frame.size((place - middle) + (place_low - low), v2) <= (min(SMALL_SHARE * of_places, RANGE_SHARE * size)):
         return None
     return frame._replace(error=fit.noise / abs(frame.slope) + ULP * abs(middle))
 
@@ -264,7 +277,7 @@ def sharpened(frame: Frame, law: LawAtRest) -> Frame:
     """
     place, low, size = (float(frame.p[k]) for k in (PLACE, PLACE_LOW, RANGE))
     for _ in range(STEPS_AT_BREAK if frame.breaks.size else 1):
-        force, slope = law.at_rest(np.array([place]), np.array([low]))
+        force, slope = law.at_rest(np.array([place]), np.array([low]), frame.sense)
         place, low = add(place, low, -float(force[0] / slope[0]), 0.0)  # Newton's method doubles the digits
     doubles = float(frame.p[PLACE]) + (frame.breaks + float(frame.p[PLACE_LOW]))
     breaks, error = [law.nearest_break(double) for double in doubles.tolist()], ULP**2 * abs(place) + law.place_error
@@ -283,9 +296,9 @@ def sharpened(frame: Frame, law: LawAtRest) -> Frame:
         inside = row[ORIGIN] + INSIDE_SHARE * (row[CENTRE] - row[ORIGIN])
         distances = np.append(row[CENTRE] + row[HALF_WIDTH] * SHARES, inside)
         high, rounding = two_sum.py_func(np.full(NODES + 1, place), distances)
-        forces, slopes = law.at_rest(high, rounding + low)
+        forces, slopes = law.at_rest(high, rounding + low, frame.sense)
         quotients = (forces[:NODES] - row[FORCE]) / (distances[:NODES] - row[ORIGIN])
-        row[TERMS:] = chebyshev.cheb2poly(chebyshev.chebfit(SHARES, quotients, DEGREE - 1))
+        row[TERMS:] = TO_POWERS[:DEGREE, :DEGREE] @ (TO_SERIES[:DEGREE] @ quotients)
         row[TERMS] += slopes[NODES] - slope_at_origin(row)
     p = frame.p.copy()
     p[PLACE], p[PLACE_LOW], p[ROWS : ROWS + rows.size] = place, low, rows.ravel()

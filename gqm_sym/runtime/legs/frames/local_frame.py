@@ -8,6 +8,9 @@ So the force on a body at rest, P(lam), is known as a function C(d) with ``C(0) 
 Functions of the interface then serve the legs with distances for places: P becomes
 ``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
 
+With sliding friction e is the place at which it balances the other forces on a body that moves in one direction, with
+one sign of N, and the frame serves one leg, in that direction.
+
 Small swings about a stable equilibrium stay near it. A body launched near an unstable equilibrium departs from it,
 later if it was nearer, and leaves the frame; its distance at launch is computed in extended precision
 (`fitting.refined`).
@@ -22,18 +25,18 @@ from numba import carray, types
 
 from gqm_sym.runtime.arithmetic.doubledouble import add
 from gqm_sym.runtime.charts.chart import MAGNIFIED
-from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.calls import call_speed_equation, call_static_balance
 from gqm_sym.runtime.compiled.emitted import compiler
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import INTEGER, VECTOR, Array
 from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation
 from gqm_sym.runtime.legs.advance import DISSIPATION
-from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LEAST_SIZE, LOW, V2
+from gqm_sym.runtime.legs.body import DIRECTION, FIRST_STEP, HIGH, LEAST_SIZE, LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
 from gqm_sym.runtime.legs.panels.equation import forces_on
-from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, sign_of_load, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 
 # A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomials. A
@@ -46,9 +49,10 @@ SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 # The degree of C.
 DEGREE = 20
 
-# The numbers before the module's parameters: the address of its speed equation, e as two doubles, the range, and the
-# number of parts between places where the curve is not smooth, with a row for each.
-ADDRESS, PLACE, PLACE_LOW, RANGE, PARTS, ROWS = range(6)
+# The numbers before the module's parameters: the address of its speed equation, and with friction that of its static
+# balance, else 0; e as two doubles; the range; and the number of parts between places where the curve is not smooth,
+# with a row for each.
+ADDRESS, BALANCE, PLACE, PLACE_LOW, RANGE, PARTS, ROWS = range(7)
 
 # A row: the distance at which the part begins; the places between which the module's functions are evaluated on it; and
 # ``C(d) = FORCE + (d - ORIGIN) D(x)`` with ``x = (d - CENTRE)/HALF_WIDTH``, where TERMS are the coefficients of D in
@@ -72,12 +76,16 @@ class Frame(NamedTuple):
         The error of the place of the equilibrium.
     is_sharp : bool
         Whether the equilibrium and the force come from double-double arithmetic (`fitting.sharpened`).
+    sense : (int, int)
+        The direction of motion and the sign of N for which the force is known; both are 1 without friction, where they
+        make no difference.
     """
 
     dissipation: Dissipation
     p: Array
     error: float
     is_sharp: bool = False
+    sense: tuple[int, int] = (1, 1)
 
     @property
     def parts(self) -> Array:
@@ -151,21 +159,31 @@ def slope_at_origin(row: Array) -> float:
 
 
 @Inner
+def sense_of(dissipation, p, body):  # type: ignore[no-untyped-def]
+    """Return the direction of motion and the sign of N that the force on a body depends on (`Frame.sense`)."""
+    if not dissipation.friction:
+        return 1, 1
+    direction = int(body[DIRECTION])
+    return direction, sign_of_load(forces_on(dissipation, p, direction), body[BODY_PLACE], body[V2], point_buffer())
+
+
+@Inner
 def may_be_small(dissipation, p, corners, body):  # type: ignore[no-untyped-def]
     """Return whether `fitting.frame_near` may find a frame for a body, because the force on it at rest changes its sign
     nearby.
     """
     place, reach, point = body[BODY_PLACE], body[FIRST_STEP], point_buffer()
     size = max(fabs(place), body[LEAST_SIZE])
-    if dissipation.friction or dissipation.kinked or size == 0.0:
+    if dissipation.kinked or size == 0.0:
         return False
     reach = min(reach, fabs(body[LOW] - place), fabs(body[HIGH] - place))
     for known in corners:
         reach = min(reach, fabs(known - place))
     around = min(SMALL_SHARE * size, RANGE_SHARE * reach)
-    forces = forces_on(dissipation, p, 1)
-    behind = slope_of_v2(forces, place - around, LEAST_V2, 0, point)
-    ahead = slope_of_v2(forces, place + around, LEAST_V2, 0, point)
+    direction, contact_sign = sense_of(dissipation, p, body)
+    forces = forces_on(dissipation, p, direction)
+    behind = slope_of_v2(forces, place - around, LEAST_V2, contact_sign, point)
+    ahead = slope_of_v2(forces, place + around, LEAST_V2, contact_sign, point)
     return ahead * behind < 0.0 and body[V2] < around * fabs(behind - ahead)
 
 
@@ -175,16 +193,21 @@ def is_small(dissipation, p, corners, body):  # type: ignore[no-untyped-def]
     return may_be_small(dissipation, p, corners, body)
 
 
-@entry(MATRIX(DISSIPATION, VECTOR, VECTOR))
-def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
-    """Return the increase of V**2 per unit of the curve parameter for a body at rest, a row for each direction of
-    motion.
+@entry(types.UniTuple(INTEGER, 2)(DISSIPATION, VECTOR, VECTOR))
+def sense_on(dissipation, p, body):  # type: ignore[no-untyped-def]
+    """Call `sense_of` from Python."""
+    return sense_of(dissipation, p, body)
+
+
+@entry(VECTOR(DISSIPATION, VECTOR, VECTOR, INTEGER, INTEGER))
+def force_at_rest(dissipation, p, places, direction, contact_sign):  # type: ignore[no-untyped-def]
+    """Return the increase of V**2 per unit of the curve parameter for a body that is at rest and begins to move in a
+    direction, for a sign of N.
     """
-    out, point = np.empty((2, places.size)), point_buffer()
-    for row, v in enumerate((1, -1)):
-        forces = forces_on(dissipation, p, v)
-        for i in range(places.size):
-            out[row, i] = v * slope_of_v2(forces, places[i], LEAST_V2, 0, point)
+    out, point = np.empty(places.size), point_buffer()
+    forces = forces_on(dissipation, p, direction)
+    for i in range(places.size):
+        out[i] = direction * slope_of_v2(forces, places[i], LEAST_V2, contact_sign, point)
     return out
 
 
@@ -234,10 +257,16 @@ def frame_functions() -> tuple[Any, Any]:
 
     @compiled(STATIC_BALANCE)
     def static_balance(n, places, p, out):  # type: ignore[no-untyped-def]
-        frame = carray(p, ROWS + int(carray(p, ROWS)[PARTS]) * ROW_SIZE)
+        own = ROWS + int(carray(p, ROWS)[PARTS]) * ROW_SIZE
+        frame, work = carray(p, own + 1), rows_buffer()
         places, out = carray(places, n), carray(out, 2 * n)
         for i in range(n):
-            out[i] = out[n + i] = force_on(frame, part_at(frame, places[i]), places[i])
+            at, place = part_at(frame, places[i]), frame[PLACE] + (places[i] + frame[PLACE_LOW])
+            out[i] = out[n + i] = force_on(frame, at, places[i])
+            if frame[BALANCE] != 0.0:
+                work[0] = min(max(place, frame[at + FIRST_PLACE]), frame[at + LAST_PLACE])
+                call_static_balance(int(frame[BALANCE]), 1, work, frame[own:], work[1:])
+                out[i], out[n + i] = work[1], work[2]
 
     return speed_equation, static_balance
 
@@ -257,9 +286,10 @@ def error_of_chart(frame: Frame, dissipation: Dissipation, charts: Array) -> tup
     """
     reach, steepness = frame.reach, abs(frame.slope)
     places = float(frame.p[PLACE]) + reach * np.array([-1.0, 0.0, 1.0])
-    known, of_place, of_force = force_at_rest(dissipation, frame.own_parameters, places)[0], frame.error, 0.0
+    known = force_at_rest(dissipation, frame.own_parameters, places, *frame.sense)
+    of_place, of_force = frame.error, 0.0
     for p in charts:
-        changes = (force_at_rest(dissipation, p, places)[0] - known) / (MAGNIFIED * steepness)
+        changes = (force_at_rest(dissipation, p, places, *frame.sense) - known) / (MAGNIFIED * steepness)
         of_place += abs(float(changes[1]))
         of_force += float(np.abs(changes - changes[1]).max()) / reach
     return of_place, of_force

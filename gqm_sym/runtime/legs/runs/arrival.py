@@ -13,8 +13,6 @@ from gqm_sym.runtime.legs.panels.breaks import offset, span_before
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
     FORCE,
-    LOAD,
-    MEAN,
     NODES,
     SPEED,
     TAILS,
@@ -25,27 +23,28 @@ from gqm_sym.runtime.legs.panels.equation import (
     W,
     damped_row,
 )
-from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
+from gqm_sym.runtime.legs.runs.leg_variable import variable_for
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
     blocks_for,
-    extent_of_row,
+    curvature_sign,
     fill_load,
     fill_times,
-    has_no_kink,
-    is_load_resolved,
     keeps_sign,
+    load_sign,
     replace_v2,
     sample_leg,
     size_of_row,
     whole_buffer,
 )
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_arrival_time, to_means
+from gqm_sym.runtime.legs.runs.whole_tables import to_arrival_time, to_means
 
 # The largest number of times that V**2 is computed from forces that depend on it, and the change of V**2 as a share of
 # its largest value that is rounding only.
@@ -66,13 +65,13 @@ def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def reaches(forces, march, panel, blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows up to LOAD for a place at the distance ``h``; return whether the body is fast there."""
+def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
+    """Fill the rows up to LOAD for the place at the end of a variable; return whether the body is fast there."""
     begin_leg(blocks, work)
     for _ in range(MAX_TRIES):
-        if not sample_leg(forces, march, panel, blocks, h, work):
+        if not sample_leg(forces, march, panel, blocks, variable, work):
             return False
-        change, size = fill_v2_from_turn(blocks, h, work)
+        change, size = fill_v2_from_turn(blocks, variable.width, work)
         if not work[blocks * W + blocks * WIDE - 1] >= HIGH_V2_RATIO * size:
             return False
         if forces.linear or change <= SETTLED * size:
@@ -87,25 +86,22 @@ def is_resolved(forces, panel, blocks, h, work):  # type: ignore[no-untyped-def]
     the number of blocks to try next, or 0.
     """
     fine, ratio = are_rows_resolved(blocks, h, work)
-    load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
+    load_fine, is_kept, load_ratio = load_sign(blocks, panel.contact_sign, work)
     if not (fine and load_fine):
         return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
-    noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]
-    if not (
-        keeps_sign(blocks, work, W_FACTOR, 1, noise)
-        and keeps_sign(blocks, work, LOAD, panel.contact_sign, ZERO_TOLERANCE * load_noise)
-    ):
+    noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
+    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0
     if forces.kinked:
-        has_one_sign, ratio = has_no_kink(blocks, work)
-        if not has_one_sign:
+        curve_fine, is_kept, ratio = curvature_sign(blocks, work)
+        if not (curve_fine and is_kept):
             return False, blocks_for(ratio, blocks)
     fine, ratio = fill_times(blocks, h, work)
     return fine, blocks_for(ratio, blocks)
 
 
 @Inner
-def run_to_target(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from a turn to the place whose passage is to be found, if it passes it fast on one polynomial.
 
     Parameters and Returns are those of `whole_leg.run_whole`; the end, if there is one, has the code END_PAUSE.
@@ -120,8 +116,10 @@ def run_to_target(forces, start, route, off, record):  # type: ignore[no-untyped
         if nu == 0:
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
-        while blocks > 0:
-            if not reaches(forces, march, panel, blocks, h, work):
+        attempt = Attempt(blocks, variable_for(branch, origin, v, h), branch, NOT_TRIED)
+        while attempt.blocks > 0:
+            blocks = attempt.blocks
+            if not reaches(forces, march, panel, blocks, attempt.variable, work):
                 blocks = 0
                 break
             fine, onwards = is_resolved(forces, panel, blocks, h, work)
@@ -130,5 +128,10 @@ def run_to_target(forces, start, route, off, record):  # type: ignore[no-untyped
                 to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
                 record[TIME_FROM_START], record[TIME_FROM_END] = work[blocks * TAILS], 0.0
                 break
-            blocks = onwards if onwards <= MAX_BLOCKS else 0
-    return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks
+            if onwards == 0 or attempt.unstretched_blocks != NOT_TRIED:
+                attempt = next_attempt(attempt, onwards, march, work)
+            else:  # for a single leg, a map would take as long as more nodes
+                attempt = Attempt(onwards, attempt.variable, branch, NOT_TRIED)
+            blocks = attempt.blocks
+        branch = attempt.branch
+    return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks, branch

@@ -60,9 +60,13 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_MANY_PANELS,
     END_TURN,
 )
+from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 from gqm_sym.runtime.legs.runs.route import RunStart
 from gqm_sym.runtime.legs.runs.run import run
 from gqm_sym.runtime.legs.runs.whole_leg import run_whole
+
+# The width of the first panel, as a share of a leg of known width.
+FIRST_PANEL_OF_LEG = 0.25
 
 # The reasons for which a leg was not followed back.
 NO_SPACE, LOST = -1, -2
@@ -214,30 +218,41 @@ def direction_from_rest(static_balance, p, behind, ahead, preferred):  # type: i
 
 @Inner
 def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel."""
+    """Call `run`, and begin it again with a later expected turn if the body becomes slow before the first panel, or
+    with a narrower first panel if a body at rest turns within that.
+    """
+    step, no_turn_until = start.step, start.no_turn_until
     while True:
         end = run(forces, start, route, off, record)
-        if end.what != END_SLOW or end.panel_count > 0:
+        width = fabs((end.place[0] - start.place) + (end.place[1] - start.place_low))
+        turns_at_once = end.what == END_TURN and start.v2 == 0.0 and FIRST_PANEL_OF_LEG * width < step
+        if end.panel_count > 0 or not (end.what == END_SLOW or turns_at_once):
             return end
+        if turns_at_once:
+            step = FIRST_PANEL_OF_LEG * width
+        else:
+            no_turn_until = end.no_turn_until
         start = RunStart(
-            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
-            *(end.no_turn_until, start.width, 0),
+            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, step),
+            *(no_turn_until, start.width, 0, start.branch),
         )
 
 
 @Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """Run to the end, or to a place whose passage is to be found, as one polynomial if that suffices, else by
-    `run_to_end`; return the end, and the number of blocks of the polynomial (`whole_tables`), or 0.
+    `run_to_end`; return the end, the number of blocks of the polynomial (`whole_tables`) or 0, and the branch point of
+    ds that it passes by.
     """
+    branch = start.branch
     if start.v2 == 0.0 and start.blocks > 0:
-        end, blocks = run_to_target(forces, start, route, off, record)
+        end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
         if end.what == END_PAUSE:
-            return end, blocks
-        end, blocks = run_whole(forces, start, route, off, record)
+            return end, blocks, branch
+        end, blocks, branch = run_whole(forces, start, branch, route, off, record)
         if end.what == END_TURN:
-            return end, blocks
-    return run_to_end(forces, start, route, off, record), 0
+            return end, blocks, branch
+    return run_to_end(forces, start, route, off, record), 0, branch
 
 
 class Followed(NamedTuple):
@@ -253,6 +268,8 @@ class Followed(NamedTuple):
         At a turn, whether the body could stay there on some slope; otherwise True.
     blocks : int
         The number of blocks of the leg (`whole_tables`) if it was one polynomial, else 0.
+    branch : BranchPoint
+        The branch point of ds that it has passed by.
     step, no_turn_until, v2 : float
         As in `runs.ends.End`.
     """
@@ -262,6 +279,7 @@ class Followed(NamedTuple):
     direction: int
     could_stay: bool
     blocks: int
+    branch: BranchPoint
     step: float
     no_turn_until: float
     v2: float
@@ -290,7 +308,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     forces = forces_on(dissipation, p, start.direction)
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     record[WHOLE] = 0.0
-    end, blocks = run_forwards(forces, start, route, off, record)
+    end, blocks, branch = run_forwards(forces, start, route, off, record)
     is_whole = blocks > 0  # the record has rows and both times then
     what, used, back = end.what, HEAD + end.panel_count * COLUMNS, ROWS_COUNT_AS if is_whole else 0
     if not is_whole:
@@ -310,4 +328,5 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
         what = END_RECORD_FULL if back == NO_SPACE else END_TOO_MANY_PANELS
-    return Followed(what, end.contact_sign, direction, could_stay, blocks, end.step, end.no_turn_until, end.v2)
+    sign, step = end.contact_sign, end.step
+    return Followed(what, sign, direction, could_stay, blocks, branch, step, end.no_turn_until, end.v2)

@@ -8,6 +8,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before, within
 from gqm_sym.runtime.legs.panels.equation import March, marched
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, sign_of_load, slope_of_v2
+from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 
 # The largest width of the first panel of a leg, and of the first one after a break, as a share of the distance over
 # which the acceleration there would stop the body.
@@ -39,6 +40,8 @@ class RunStart(NamedTuple):
     blocks : int
         The number of blocks (`whole_tables`) with which the leg is first tried as one polynomial, if it begins at a
         turn; 0 if it is not.
+    branch : BranchPoint
+        The branch point of ds that the leg before has passed by.
     """
 
     place: float
@@ -50,6 +53,7 @@ class RunStart(NamedTuple):
     no_turn_until: float
     width: float
     blocks: int
+    branch: BranchPoint
 
 
 class Reading(NamedTuple):

@@ -4,7 +4,8 @@ V**2 is smooth along a leg; only its square root is not. With the width h of the
 behind the body, ``W = h y (1 - y) C`` with a smooth C > 0. With ``y = sin(phi/2)**2`` the time is the integral of ``f =
 ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. C is computed from running means of
 exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The width is that for which the mean
-over the whole leg vanishes; Newton's method finds it.
+over the whole leg vanishes; Newton's method finds it. Where branch points of ds are near, y is another variable, and
+ds, P and Q are those with respect to it (`leg_variable`).
 
 The polynomial has 23 nodes, or 47 or 71 where those resolve a leg that fewer do not (`whole_tables`). It has at most 47
 where the time at a place is read, because with more nodes that takes longer than panels that are laid one by one. For a
@@ -18,11 +19,14 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.leg_record import (
+    EXTENT,
+    FALLING,
     HEAD,
     MAX_ROWS,
     PANELS,
     PASSAGE,
     PEAKS,
+    RISING,
     ROWS_COUNT_AS,
     TIME_FROM_END,
     TIME_FROM_START,
@@ -34,7 +38,6 @@ from gqm_sym.runtime.legs.panels.equation import (
     DS,
     FORCE,
     KAPPA,
-    LOAD,
     MEAN,
     N0,
     NODES,
@@ -47,23 +50,24 @@ from gqm_sym.runtime.legs.panels.equation import (
     copy,
     load_per_mass_row,
 )
-from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.solving import is_settled
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
+from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched, variable_for
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
     blocks_for,
-    extent_of_row,
+    curvature_sign,
     fill_load,
     fill_times,
     fill_v2,
-    has_no_kink,
     is_contact_force_resolved,
-    is_load_resolved,
     keeps_sign,
+    load_sign,
     sample_leg,
     size_of_row,
     whole_buffer,
@@ -135,18 +139,20 @@ def factor_to_turn(blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # type: ignore[no-untyped-def]
-    """Return the width of a leg, which is about ``width`` and at most ``room``, and fill FORCE and EXPM1_Q; return 0 if
-    it is not found.
+def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work):  # type: ignore[no-untyped-def]
+    """Return the variable of a leg (`leg_variable`) whose width is about that of ``variable`` and at most ``room``, and
+    fill FORCE and EXPM1_Q; the width is 0 if no turn is found.
 
     A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width. If the
     forces are not linear in V**2, the same steps are those of Newton's method for V**2.
     """
-    h, last, at, change, settled = min(width, room), np.inf, blocks * TAILS, 0.0, forces.linear
+    variable, last, at = lengthened(variable, 1.0, room), np.inf, blocks * TAILS
+    change, settled = 0.0, forces.linear
     begin_leg(blocks, work)
     for _ in range(MAX_TRIES):
-        if not sample_leg(forces, march, panel, blocks, h, work):
-            return 0.0
+        h = variable.width
+        if not sample_leg(forces, march, panel, blocks, variable, work):
+            break
         if not forces.linear:
             before = change
             change, size = fill_v2(blocks, h, work)
@@ -161,17 +167,17 @@ def width_of_leg(forces, march, panel, blocks, room, width, is_rough, work):  # 
                 and last <= LAST_STEP
                 and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE)
             ):
-                return h
+                return variable
             last = fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
             if is_rough and fabs(step) <= ROUGH_STEP:
-                return min(h * factor, room)
+                return lengthened(variable, factor, room)
         if factor == 0.0:
             factor = factor_to_turn(blocks, work)
         if not factor > 0.0 or (h == room and factor > 1.0):
-            return 0.0
-        h = min(h * factor, room)
-    return 0.0
+            break
+        variable = lengthened(variable, factor, room)
+    return unstretched(0.0)
 
 
 @Inner
@@ -179,48 +185,47 @@ def is_whole(forces, panel, blocks, h, reading, work):  # type: ignore[no-untype
     """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg, and the number
     of blocks to try next, or 0.
     """
+    curve_fine, curve_ratio = True, 0.0
     if forces.kinked:
-        has_one_sign, ratio = has_no_kink(blocks, work)
-        if not has_one_sign:
-            return False, blocks_for(ratio, blocks)
+        curve_fine, is_kept, curve_ratio = curvature_sign(blocks, work)
+        if curve_fine and not is_kept:
+            return False, 0
     fill_v2(blocks, h, work)
     fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
-    load_fine, load_ratio = is_load_resolved(blocks, panel.contact_sign, work)
+    load_fine, is_kept, load_ratio = load_sign(blocks, panel.contact_sign, work)
     if load_fine and reading.what == PEAKS and reading.force:
         load_fine, load_ratio = is_contact_force_resolved(forces, reading.length, blocks, work)
-    if not (fine and load_fine):
-        return False, blocks_for(max(ratio, 0.0 if load_fine else load_ratio), blocks)
-    noise, load_noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE), extent_of_row(blocks, work, MEAN)[1]
-    if not (
-        keeps_sign(blocks, work, W_FACTOR, 1, noise)
-        and keeps_sign(blocks, work, LOAD, panel.contact_sign, ZERO_TOLERANCE * load_noise)
-    ):
+    if not (fine and load_fine and curve_fine):
+        return False, blocks_for(max(ratio, curve_ratio, 0.0 if load_fine else load_ratio), blocks)
+    noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
+    if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0
     fine, ratio = fill_times(blocks, h, work)
     return fine, blocks_for(ratio, blocks)
 
 
 @Inner
-def solve_leg(forces, march, panel, room, start, reading, work):  # type: ignore[no-untyped-def]
-    """Return the number of blocks that resolve a leg and its width; 0 blocks if there are none."""
-    blocks, most = start.blocks, 2 if reading.what == PASSAGE else MAX_BLOCKS
-    if blocks > most:
-        return 0, 0.0
+def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type: ignore[no-untyped-def]
+    """Return the attempt that resolves a leg; it has 0 blocks if there is none."""
+    most = 2 if reading.what == PASSAGE else MAX_BLOCKS
     width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
-    h = width_of_leg(forces, march, panel, 1, room, width, blocks > 1, work)
-    while h > 0.0:
-        if blocks > 1:
-            h = width_of_leg(forces, march, panel, blocks, room, h, False, work)
-        if not h > 0.0:
+    variable = variable_for(branch, march.origin, march.direction, width)
+    attempt = Attempt(start.blocks, variable, branch, NOT_TRIED)
+    if 1 < attempt.blocks <= most:
+        variable = variable_of_leg(forces, march, panel, 1, room, variable, True, work)
+    while 0 < attempt.blocks <= most and variable.width > 0.0:
+        blocks = attempt.blocks
+        variable = variable_of_leg(forces, march, panel, blocks, room, variable, False, work)
+        if not variable.width > 0.0:
             break
-        fine, onwards = is_whole(forces, panel, blocks, h, reading, work)
+        fine, onwards = is_whole(forces, panel, blocks, variable.width, reading, work)
+        attempt = Attempt(blocks, variable, attempt.branch, attempt.unstretched_blocks)
         if fine:
-            return blocks, h
-        if not 0 < onwards <= most:
-            break
-        blocks = onwards
-    return 0, h
+            return attempt
+        attempt = next_attempt(attempt, onwards, march, work)
+        variable = attempt.variable
+    return Attempt(0, variable, attempt.branch, NOT_TRIED)
 
 
 @Inner
@@ -250,20 +255,22 @@ def enter_rows(record, blocks, route, is_read, work):  # type: ignore[no-untyped
 
 
 @Inner
-def enter_leg(record, route, origin, v, blocks, h, work):  # type: ignore[no-untyped-def]
+def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore[no-untyped-def]
     """Write a leg into the record."""
+    h = variable.width
     to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
     record[WHOLE_WIDTH] = h if route.reading.what == PANELS else 0.0
+    record[RISING], record[FALLING], record[EXTENT] = variable.rising, variable.falling, variable.extent
     record[TIME_FROM_START], record[TIME_FROM_END] = first, second
 
 
 @Inner
-def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from one turn to the next, if that takes one polynomial only.
 
-    The parameters are those of `runs.run.run`.
+    The parameters are those of `runs.run.run`, and the branch point of ds that the leg may pass by.
 
     Returns
     -------
@@ -271,6 +278,8 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         Its code is END_NONE if the leg must be followed panel by panel.
     blocks : int
         The number of blocks (`whole_tables`) that resolve the leg; 0 if there is none.
+    branch : BranchPoint
+        The branch point that it passes by.
     """
     breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:
@@ -282,9 +291,11 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and record.size >= HEAD + MAX_ROWS * MAX_BLOCKS * WIDE:
         work = whole_buffer()
-        blocks, h = solve_leg(forces, march, Panel(0.0, 0.0, nu, span), room, start, route.reading, work)
+        panel = Panel(0.0, 0.0, nu, span)
+        blocks, variable, branch, _ = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
         if blocks > 0:
-            enter_leg(record, route, origin, v, blocks, h, work)
-            what, middle = END_TURN, located(origin, v, 0.5 * h, breaks, upcoming)
+            h = variable.width
+            enter_leg(record, route, origin, v, blocks, variable, work)
+            what, middle = END_TURN, located(origin, v, distance_at(variable, 0.5), breaks, upcoming)
     place = located(origin, v, h, breaks, upcoming)
-    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks
+    return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks, branch

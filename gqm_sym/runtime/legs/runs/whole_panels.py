@@ -3,7 +3,8 @@
 The record of such a leg (`leg_record`) has four rows instead of panels: C of `whole_leg` (W_FACTOR), FORCE, the contact
 force per mass, and ds. From each end to the middle, the march variable is the root of the distance. Parts of this range
 become panels if polynomials with 23 nodes resolve what their record contains. The values at their nodes come from the
-polynomials of the leg, so that panels and leg are the same motion up to rounding.
+polynomials of the leg, so that panels and leg are the same motion up to rounding. On a leg with a stretched variable
+(`leg_variable`), C, FORCE and ds are those with respect to it, and the middle is where it is 1/2.
 """
 
 from math import fabs, sqrt
@@ -17,9 +18,12 @@ from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
     COLUMNS,
+    EXTENT,
+    FALLING,
     HEAD,
     NORMAL_LOAD,
     RIGHT,
+    RISING,
     TIME,
     TIME_ERROR,
     TIME_FROM_END,
@@ -33,8 +37,10 @@ from gqm_sym.runtime.legs.panels.equation import (
     DS,
     FORCE,
     GRADED,
+    KAPPA,
     LOAD,
     MEAN,
+    N0,
     NODES,
     OFFSET,
     SPEED,
@@ -45,11 +51,14 @@ from gqm_sym.runtime.legs.panels.equation import (
     copy_row,
     linear_row,
     panel_buffer,
+    product,
+    root_row,
     set_nodes,
     time_rate_row,
 )
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of
 from gqm_sym.runtime.legs.panels.resolution import examine, growth, narrower
+from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
 
 # The functions of a leg in its record, in the order of their rows.
@@ -68,6 +77,8 @@ LAST_STRETCH = 1.25
 twice_place_row = over_rows(lambda s: 2.0 * (s * s) - 2.0, WIDE)
 next_sum_row = over_rows(lambda twice, after, before, term: fused(twice, after, term - before), WIDE)
 last_sum_row = over_rows(lambda twice, after, before, term: fused(0.5 * twice, after, term - before), WIDE)
+
+quotient_row = over_rows(lambda one, other: one / other, WIDE)
 
 # Y, and the rate of arc length.
 part_speed_row = over_rows(lambda factor, s: np.sqrt(factor - 0.5 * factor * (s * s)), WIDE)
@@ -106,18 +117,38 @@ def fill_row(series, begin, count, work, row):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_part(blocks, series, force_size, begin, end, work):  # type: ignore[no-untyped-def]
+def lay_part(variable, w, begin, end, work):  # type: ignore[no-untyped-def]
+    """Fill the rows of a part between two shares that depend on the leg's variable alone: OFFSET, GRADED, and if it is
+    stretched J (N0) and ``y (1 - y)`` times the width over the distance (KAPPA).
+    """
+    linear_row(work, OFFSET, NODES, begin, end - begin)
+    if variable.extent == 0.0:
+        twice_place_row(work, GRADED, OFFSET)
+    else:
+        for j in range(WIDE):
+            root = w * work[OFFSET + j]
+            y, work[N0 + j] = share_at(variable, root * root)
+            work[GRADED + j], work[KAPPA + j] = 4.0 * y - 2.0, y * (1.0 - y) * variable.width / (root * root)
+
+
+@Inner
+def fill_part(blocks, series, variable, w, force_size, begin, end, work):  # type: ignore[no-untyped-def]
     """Fill the rows of the part between two shares; return whether they are resolved, and the largest ratio of their
     middle coefficients to their sizes.
     """
     wide, resolved, worst = blocks * WIDE, True, 0.0
-    linear_row(work, OFFSET, NODES, begin, end - begin)
-    twice_place_row(work, GRADED, OFFSET)
+    lay_part(variable, w, begin, end, work)
     fill_row(series, 0, wide - 1, work, W_FACTOR)
     fill_row(series, wide, wide - 1, work, FORCE)
     fill_row(series, 2 * wide, wide - 1, work, MEAN)
     fill_row(series, 3 * wide, wide - 1, work, DS)
-    part_speed_row(work, SPEED, W_FACTOR, OFFSET)
+    if variable.extent == 0.0:
+        part_speed_row(work, SPEED, W_FACTOR, OFFSET)
+    else:
+        quotient_row(work, FORCE, FORCE, N0)
+        quotient_row(work, DS, DS, N0)
+        product(work, SPEED, W_FACTOR, KAPPA)
+        root_row(work, SPEED, SPEED)
     for row in (FORCE, DS):
         size = force_size if row == FORCE else size_of(work, row)
         _tail, middle, fine = examine(work, row, size)
@@ -144,7 +175,7 @@ def enter_part(record, at, begin, end, w, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def lay_half(record, to, blocks, series, force_size, w, time):  # type: ignore[no-untyped-def]
+def lay_half(record, to, blocks, series, variable, force_size, time):  # type: ignore[no-untyped-def]
     """Write panels from an end of a leg to its middle into the record; return their number.
 
     Parameters
@@ -156,17 +187,20 @@ def lay_half(record, to, blocks, series, force_size, w, time):  # type: ignore[n
         The number of blocks of a row.
     series : array
         As filled by `fill_series`, seen from the end at which the panels begin.
+    variable : LegVariable
+        Seen from there too.
     force_size : float
         The size of FORCE.
-    w, time : float
-        The march variable in the middle, and the time to there.
+    time : float
+        The time to the middle.
     """
+    w = sqrt(distance_at(variable, 0.5))  # the march variable in the middle
     work, count, begin, width, passed = panel_buffer(), 0, 0.0, FIRST_SHARE, 0.0
     stretch = LAST_STRETCH
     set_nodes(work)
     while begin < 1.0:
         end = 1.0 if 1.0 - begin <= stretch * width else begin + width
-        fine, ratio = fill_part(blocks, series, force_size, begin, end, work)
+        fine, ratio = fill_part(blocks, series, variable, w, force_size, begin, end, work)
         factor = growth(ratio)
         if not fine and width > LEAST_SHARE:
             width, stretch = max(narrower(end - begin, factor), LEAST_SHARE), 1.0
@@ -183,12 +217,15 @@ def lay_half(record, to, blocks, series, force_size, w, time):  # type: ignore[n
 def lay_panels(record):  # type: ignore[no-untyped-def]
     """Return the record with panels in place of rows of the whole leg."""
     record, out, series = borrowed(record), np.empty(HEAD + 2 * MAX_PARTS * COLUMNS), series_buffer()
-    blocks, w = int(record[WHOLE]), sqrt(0.5 * record[WHOLE_WIDTH])
+    blocks = int(record[WHOLE])
+    variable = LegVariable(record[WHOLE_WIDTH], record[RISING], record[FALLING], record[EXTENT])
     for k in range(HEAD):
         out[k] = record[k]
     size = fill_series(record, blocks, series)
-    ahead = lay_half(out, HEAD, blocks, series, size, w, record[TIME_FROM_START])
+    ahead = lay_half(out, HEAD, blocks, series, variable, size, record[TIME_FROM_START])
     reverse_series(blocks, series)
-    back = lay_half(out, HEAD + ahead * COLUMNS, blocks, series, size, w, record[TIME_FROM_END])
+    if variable.extent > 0.0:
+        variable = reversed_variable(variable)
+    back = lay_half(out, HEAD + ahead * COLUMNS, blocks, series, variable, size, record[TIME_FROM_END])
     out[WHOLE], out[AHEAD], out[BACK] = 0.0, ahead, back
     return out[: HEAD + (ahead + back) * COLUMNS].copy()

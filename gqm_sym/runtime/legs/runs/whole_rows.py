@@ -44,6 +44,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     load_size_row,
     product,
 )
+from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, extent, extent_of_block, size_of, size_of_block
 from gqm_sym.runtime.legs.panels.resolution import (
     CANCELLATION_NOISE,
@@ -52,6 +53,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     TAIL_RATIO,
     are_fine,
 )
+from gqm_sym.runtime.legs.runs.leg_variable import lay_places, stretch_law
 from gqm_sym.runtime.legs.runs.whole_tables import (
     MAX_BLOCKS,
     MIDDLE_DEGREES,
@@ -141,28 +143,40 @@ def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def sample_leg(forces, march, panel, blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows DS to KAPPA, EXPM1_Q and FORCE of a leg of the width ``h``, for V**2 in the row W; return whether
-    resistance is small enough for that.
+def sample_leg(forces, march, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
+    """Fill the rows DS to KAPPA, EXPM1_Q and FORCE of a leg with a variable (`leg_variable`), for V**2 in the row W;
+    return whether resistance is small enough for that.
     """
     wide, origin, v, nu = blocks * WIDE, march.origin, float(march.direction), float(panel.contact_sign)
+    is_stretched = variable.extent > 0.0
+    if is_stretched:
+        lay_places(variable, blocks, work)
     for at in range(0, wide, WIDE):
-        product(work, blocks * OFFSET + at, blocks * NODES + at, h)
-        linear_row(work, blocks * ARC_RATE + at, blocks * OFFSET + at, origin[0] + origin[1], v)
+        product(work, blocks * OFFSET + at, blocks * NODES + at, variable.width)
+        distances = blocks * (ARC_RATE if is_stretched else OFFSET) + at
+        linear_row(work, blocks * ARC_RATE + at, distances, origin[0] + origin[1], v)
     if panel.span[0] > -inf or panel.span[1] < inf:
         for j in range(blocks * ARC_RATE, blocks * ARC_RATE + wide):
             work[j] = within(work[j], panel.span)
     rows = (blocks * ARC_RATE, blocks * W, blocks * DS)
     call_speed_equation(forces.speed_equation, wide, work, rows, v, nu, forces.params)
+    if is_stretched:
+        stretch_law(blocks, work)
     for at in range(0, wide, WIDE):
         product(work, blocks * Q_RATE + at, blocks * Q + at, v)
-    to_means(blocks, work, blocks * Q_RATE, work, blocks * SPEED)
+    # The product with the larger matrices is saved where nothing resists in proportion to V**2.
+    if blocks == 1 or size_of_row(blocks, work, Q_RATE) != 0.0:
+        to_means(blocks, work, blocks * Q_RATE, work, blocks * SPEED)
+        for at in range(0, wide, WIDE):
+            product(work, blocks * SPEED + at, blocks * SPEED + at, blocks * OFFSET + at)
+        if not fabs(work[blocks * SPEED + wide - 1]) <= MAX_Q:
+            return False
+        for at in range(0, wide, WIDE):
+            fill_expm1(work, blocks * SPEED + at, blocks * EXPM1_Q + at)
+    else:
+        for at in range(0, wide, WIDE):
+            copy_row(work, blocks * EXPM1_Q + at, 0.0)
     for at in range(0, wide, WIDE):
-        product(work, blocks * SPEED + at, blocks * SPEED + at, blocks * OFFSET + at)
-    if not fabs(work[blocks * SPEED + wide - 1]) <= MAX_Q:
-        return False
-    for at in range(0, wide, WIDE):
-        fill_expm1(work, blocks * SPEED + at, blocks * EXPM1_Q + at)
         force_row(work, blocks * FORCE + at, blocks * P + at, blocks * EXPM1_Q + at, v)
     return True
 
@@ -220,18 +234,29 @@ def are_rows_resolved(blocks, h, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_load_resolved(blocks, contact_sign, work):  # type: ignore[no-untyped-def]
-    """Return whether N is resolved as far as its changes of sign require, and the ratio of its middle coefficients
-    (`resolution.is_load_resolved`).
+def sign_of_row(blocks, work, row, sign, limits):  # type: ignore[no-untyped-def]
+    """Return whether a function is resolved as far as its changes of sign require (`resolution.is_load_resolved`);
+    whether it is proved to have a sign on the whole leg; and the ratio of its middle coefficients to its size.
+
+    ``limits`` are the size and the noise of the function.
     """
-    size = extent_of_row(blocks, work, MEAN)[1]
-    tail, middle, fine = examine_row(blocks, work, LOAD, size)
+    size, noise = limits
+    tail, middle, fine = examine_row(blocks, work, row, size)
     if not (tail < inf and middle < inf):
-        return False, inf
-    if not fine and tail <= FAR_FROM_ZERO_RATIO * size:
-        limit = 4.0 * FAR_FROM_ZERO_RATIO * size
-        fine = tail <= ONE_SIGN_RATIO * size or keeps_sign(blocks, work, LOAD, contact_sign, limit)
-    return fine, middle / size
+        return False, False, inf
+    if fine or tail <= ONE_SIGN_RATIO * size:
+        return True, keeps_sign(blocks, work, row, sign, noise), middle / size
+    if tail <= FAR_FROM_ZERO_RATIO * size:
+        kept = keeps_sign(blocks, work, row, sign, max(noise, 4.0 * FAR_FROM_ZERO_RATIO * size))
+        return kept, kept, middle / size
+    return False, False, middle / size
+
+
+@Inner
+def load_sign(blocks, contact_sign, work):  # type: ignore[no-untyped-def]
+    """Return `sign_of_row` for N."""
+    size = extent_of_row(blocks, work, MEAN)[1]
+    return sign_of_row(blocks, work, LOAD, contact_sign, (size, ZERO_TOLERANCE * size))
 
 
 @Inner
@@ -266,18 +291,19 @@ def fill_lengths(forces, blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def has_no_kink(blocks, work):  # type: ignore[no-untyped-def]
-    """Return whether the curvature is proved to have one sign on the whole leg, and the ratio of its middle
-    coefficients to its size where it is not resolved, else 1.
+def curvature_sign(blocks, work):  # type: ignore[no-untyped-def]
+    """Return `sign_of_row` for the curvature, with a ratio that is compared with TAIL_RATIO; 0 if it is resolved.
+
+    The law at the nodes has the curvature itself, and only its sign matters here. Along a graph its coefficients
+    decrease more slowly than those of all that the law is made of.
     """
     for at in range(0, blocks * WIDE, WIDE):
         product(work, blocks * LOAD + at, blocks * DS + at, blocks * KAPPA + at)
     size = size_of_row(blocks, work, LOAD)
     sign = 1 if work[blocks * LOAD] > 0.0 else -1
-    _tail, middle, fine = examine_row(blocks, work, LOAD, size)
-    if not fine:
-        return False, middle / size
-    return keeps_sign(blocks, work, LOAD, sign, CANCELLATION_NOISE * size), 1.0
+    fine, kept, ratio = sign_of_row(blocks, work, LOAD, sign, (size, CANCELLATION_NOISE * size))
+    # FAR_FROM_ZERO_RATIO is about the root of TAIL_RATIO.
+    return fine, kept, 0.0 if fine else ratio * ratio
 
 
 @Inner

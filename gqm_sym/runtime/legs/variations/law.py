@@ -237,13 +237,13 @@ class FormulaLaw(Law):
         force, slope = self.values(self.force, states, lows)
         return force[0], ROUNDING_RATIO * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
-    def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """Return the force dW/dlam on a body at rest, without friction, and its derivative with respect to the place.
+    def at_rest(self, high: Array, low: Array, sense: tuple[int, int]) -> tuple[Array, Array]:
+        """Return the force dW/dlam on a body at rest, and its derivative with respect to the place.
 
-        Places are given as two doubles each.
+        Places are given as two doubles each; ``sense`` is the sign of dlam/dt and that of N.
         """
         ones = np.ones_like(high)
-        states = states_of(high, low, 0.0 * ones, ones, ones)
+        states = states_of(high, low, 0.0 * ones, *(sign * ones for sign in sense))
         force, slope = self.values(self.force, states)
         return force[0], slope[0]
 

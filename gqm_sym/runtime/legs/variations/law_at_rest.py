@@ -17,14 +17,16 @@ from gqm_sym.runtime.legs.variations.programs import chart_force_program
 
 
 class LawAtRest(Protocol):
-    """The force on a body at rest along a curve, without friction."""
+    """The force on a body at rest along a curve."""
 
     @property
     def place_error(self) -> float:
         """The error of a place that is found from the force, beyond that of two doubles."""
 
-    def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
-        """Return the force dW/dlam and its derivative with respect to the place, at places of two doubles each."""
+    def at_rest(self, high: Array, low: Array, sense: tuple[int, int]) -> tuple[Array, Array]:
+        """Return the force dW/dlam and its derivative with respect to the place, at places of two doubles each, for the
+        signs of dlam/dt and of N.
+        """
 
     def nearest_break(self, place: float) -> Pair:
         """Return the place nearest to a double at which the curve is not smooth."""
@@ -46,12 +48,11 @@ class ChartAtRest(ChartLaw):
         # A tangent comes from the derivative of a polynomial of NODES terms.
         return NODES * float(self._shape.pieces.doubt)
 
-    def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
+    def at_rest(self, high: Array, low: Array, sense: tuple[int, int]) -> tuple[Array, Array]:
         """See `LawAtRest`."""
-        zero, one = np.zeros_like(high), np.ones_like(high)
-        force, slope = self.values(chart_force_program(self._forces), states_of(high, low, zero, one, one), parts=1)[
-            :, 0
-        ]
+        ones = np.ones_like(high)
+        states = states_of(high, low, 0.0 * ones, *(sign * ones for sign in sense))
+        force, slope = self.values(chart_force_program(self._forces), states, parts=1)[:, 0]
         return force, slope
 
     def coordinates(self, states: Array) -> Array:

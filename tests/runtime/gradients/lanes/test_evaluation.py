@@ -1,8 +1,10 @@
 """Gradients in double precision agree with closed forms and with differences in mpmath, whatever their neighbours."""
 
 from collections import Counter
+from gc import collect
 from types import ModuleType
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -11,8 +13,11 @@ from orbits import FORMULAS, by_differences, half_orbit
 from paths import ROOT
 
 from gqm_sym.loading import load
+from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.lanes import periods
 from gqm_sym.runtime.gradients.lanes.evaluation import ANSWERED
+from gqm_sym.runtime.gradients.lanes.machine_code import coded
+from gqm_sym.runtime.gradients.programs import turning_point_program
 
 ULP = 2.0**-52
 
@@ -116,6 +121,17 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         found.append(module.sweep("period", lam0=lam0, v0=v0, gradient=names).gradient)
     assert np.isfinite(found[0]).all(axis=1).mean() > 0.9
     np.testing.assert_array_equal(*found)
+
+
+def test_machine_code_that_is_not_used_any_more() -> None:
+    """Machine code is removed from memory with its program, and is made again when it is needed."""
+    source = source_of(generated("circle").MODEL)
+    program = coded(turning_point_program(source))
+    code = ref(program.codes[0])
+    del program
+    collect()
+    assert code() is None
+    assert coded(turning_point_program(source)).codes[0].address
 
 
 def test_near_the_separatrix(answered: Counter[str]) -> None:

@@ -115,24 +115,29 @@ def test_a_pendulum_with_friction(start: float, mu: float) -> None:
 
 
 class Slope:
-    """A body that slides down a graph with friction or drag, by sums in 30 digits.
+    """A body that slides down a graph with friction, drag or the resistance of a droplet, by sums in 30 digits.
 
     With the slope z' and the sense v of the motion, ``dW/dx = -2 g (z' + mu v) - q' W`` with ``q = 2 mu v atan z'``, or
-    with drag ``q = 2 c v s``. So ``exp(q) W`` is an integral from the last turn.
+    with drag ``q = 2 c v s``. So ``exp(q) W`` is an integral from the last turn. On a droplet acts ``-2 b v |kappa|
+    ds/dx``, where ``kappa ds/dx`` is the derivative of atan z'.
     """
 
     def __init__(self, slope: Any, force: str) -> None:
         self.slope, self.mu, self.g = slope, mpf(MU if force == "friction" else 0.0), mpf("9.81")
+        self.is_droplet = force == "droplet"
 
     def exponent(self, x: mpf) -> Any:
         """Return v q; the arc length is that of the parabola z = x**2."""
-        if self.mu > 0:
+        if self.mu > 0 or self.is_droplet:
             return 2 * self.mu * mp.atan(self.slope(x))
         return C_D * (x * mp.sqrt(1 + 4 * x * x) + mp.asinh(2 * x) / 2)
 
     def force(self, x: mpf, v: int) -> Any:
         """Return the rate of exp(q) W along the motion."""
-        return -2 * v * self.g * (self.slope(x) + self.mu * v) * mp.exp(v * self.exponent(x))
+        gained = -2 * v * self.g * (self.slope(x) + self.mu * v) * mp.exp(v * self.exponent(x))
+        if self.is_droplet:
+            gained -= 2 * GAMMA * mpf(ELL_C) ** 2 * abs(mp.diff(self.slope, x)) / (1 + self.slope(x) ** 2)
+        return gained
 
     def gain(self, a: mpf, b: mpf, v: int, panels: int = 1) -> Any:
         """Return the change of exp(q) W from a to b, by Gauss-Legendre rules of 24 nodes."""
@@ -186,7 +191,12 @@ def gauss_legendre() -> list[tuple[mpf, mpf]]:
 
 
 PARABOLA, WAVE = (lambda x: 2 * x), (lambda x: x + mpf(3) / 10 * mp.cos(3 * x))
-MU, C_D = 0.125, 0.0625
+MU, C_D, GAMMA, ELL_C = 0.125, 0.0625, 0.0625, 0.25
+LAWS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "friction": (gqm.CoulombFriction(), {"mu": MU}),
+    "drag": (gqm.QuadraticDrag(b="c_d"), {"c_d": C_D, "t_max": 10.0}),
+    "droplet": (gqm.SurfaceTension(), {"gamma": GAMMA, "ell_c": ELL_C, "t_max": 10.0}),
+}
 
 
 @pytest.mark.parametrize(
@@ -195,15 +205,16 @@ MU, C_D = 0.125, 0.0625
         ("x**2", PARABOLA, 0.6, "friction"),
         ("x**2", PARABOLA, 1.125, "friction"),
         ("x**2", PARABOLA, 1.0, "drag"),
+        ("x**2", PARABOLA, 1.125, "droplet"),
+        ("x**2/2+sin(3*x)/10", WAVE, 1.125, "droplet"),
         ("x**2/2+sin(3*x)/10", WAVE, 1.0, "friction"),
     ],
 )
 def test_graphs(height: str, slope: Any, start: float, force: str, generated_folder: Path) -> None:
     """Along curves that polynomials of degree 22 do not resolve, times, turns, extremes and places agree with sums."""
-    law, name = gqm.Gravity(), f"whole_{force}_{'parabola' if slope is PARABOLA else 'wave'}"
-    law = law + (gqm.CoulombFriction() if force == "friction" else gqm.QuadraticDrag(b="c_d"))
-    module = gqm.build(gqm.derive(gqm.Curve.graph(height), law), name=name, folder=generated_folder)
-    given: dict[str, Any] = {"mu": MU} if force == "friction" else {"c_d": C_D, "t_max": 10.0}
+    name, (loss, given) = f"whole_{force}_{'parabola' if slope is PARABOLA else 'wave'}", LAWS[force]
+    model = gqm.derive(gqm.Curve.graph(height), gqm.Gravity() + loss)
+    module = gqm.build(model, name=name, folder=generated_folder)
 
     def swept(quantity: str, **more: Any) -> float:
         return float(module.sweep(quantity, [start], 0.0, **(given | more)).values[0])
@@ -211,7 +222,7 @@ def test_graphs(height: str, slope: Any, start: float, force: str, generated_fol
     with mp.workdps(30):
         body = Slope(slope, force)
         places, times, v = [mpf(start)], [], -1
-        while len(times) < (1 if force == "drag" else 20) and abs(slope(places[-1])) > body.mu:
+        while len(times) < (20 if force == "friction" else 1) and abs(slope(places[-1])) > body.mu:
             places.append(body.turn(places[-1], v))
             times.append(body.time(*places[-2:], v))
             v = -v
