@@ -20,13 +20,12 @@ from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.evaluation import values as results
 from gqm_sym.runtime.gradients.formula_orbit import source_of, variables_of
 from gqm_sym.runtime.gradients.orbit import pairs
-from gqm_sym.runtime.gradients.programs import extreme_program
+from gqm_sym.runtime.gradients.programs import extreme_program, range_program
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.variations.answers import forces_at_places
-from gqm_sym.runtime.legs.variations.programs import range_program
 from gqm_sym.runtime.model import CompiledModel
 
 # The quantities that may be limited, with their units, in the order of programs (`limit_programs`).

@@ -1,8 +1,10 @@
 """Every explicit curve of the corpus of famous curves is tested through the public interface and as YAML."""
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -26,6 +28,9 @@ POSITION = 8e-15
 
 # The largest ratio of the error bound to the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
+
+# A derivative that vanishes exactly has a difference of this size.
+ZERO = 1e-25
 
 ORBIT_POINTS = 401
 
@@ -142,6 +147,7 @@ def _read() -> list[FamousMotion]:
 
 
 MOTIONS = _read()
+GRADIENTS = json.loads((DATA / "gradients.json").read_text(encoding="ascii"))["corpus"]
 CURVES = list(dict.fromkeys(motion.curve for motion in MOTIONS))
 
 ModuleOf = Callable[[FamousCurve], ModuleType]
@@ -265,11 +271,44 @@ def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
     assert ulps(motion.period, famous.expect["loop_time"]) <= PERIOD_ULPS
 
 
+@pytest.mark.parametrize("famous", **of_kind("libration", "circulation"))
+def test_derivatives_of_periods(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
+    """Derivatives by each parameter and the launch are those of differences of 30 digits; the mass does not matter, and
+    a sweep has the same ones within two roundings of the integral of their absolute values.
+    """
+    known = GRADIENTS[f"{famous.curve.name}, {famous.count}"]
+    motion = famous_motion(famous)
+    found = motion.gradient(known["quantity"])
+    for name, wanted in known["by"].items():
+        assert error(found[name], wanted) <= PERIOD_ULPS * 2.0**-52 * abs(float(wanted)) + ZERO, name
+    assert {name for name, value in found.items() if value == 0.0} >= set(found) - set(known["by"])
+    names = tuple(known["by"])
+    launch = {name: float(Fraction(value)) for name, value in famous.start.items()} | {
+        name: float(Fraction(value)) for name, value in famous.curve.parameters
+    }
+    module = famous_module(famous.curve)
+    alone, swept = module.solve(**launch), module.sweep(known["quantity"], **launch, gradient=names)
+    wanted, means = alone.gradient(known["quantity"], names), alone._derivatives._means[0][:, 3]
+    rows = {name: row for row, name in enumerate((*module.PARAMETERS, "lam0", "v0"), start=1)}
+    share = math.pi if known["quantity"] == "half_period" else 1.0
+    for value, name in zip(swept.gradient.reshape(-1), names, strict=True):
+        assert abs(value - wanted[name]) <= PERIOD_ULPS * 2.0**-52 * max(abs(wanted[name]), share * means[rows[name]])
+
+
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The first time at the given place is correct; beyond it the body may turn or leave."""
     expected = famous.expect["transit_time"]
     assert error(famous_motion(famous).time_at(famous.launch["to"]), expected) <= TIME * float(expected)
+
+
+@pytest.mark.parametrize("famous", **of_kind("transit"))
+def test_derivatives_of_transits(famous: FamousMotion, famous_motion: MotionOf) -> None:
+    """The derivatives of the time at the given place are those of differences of 30 digits."""
+    motion = famous_motion(famous)
+    for name, wanted in GRADIENTS[f"{famous.curve.name}, {famous.count}"]["by"].items():
+        found = motion.gradient("time_at", name, lam=famous.launch["to"])[name]
+        assert error(found, wanted) <= TIME * max(abs(float(wanted)), float(famous.expect["transit_time"])), name
 
 
 @pytest.mark.parametrize("famous", **of_kind("transit"))

@@ -22,6 +22,7 @@ from gqm_sym.runtime.legs import driver
 
 CASES = {case["id"]: case for case in json.loads((DATA / "paper_cases.json").read_text())["cases"]}
 LOSING = [case for case in CASES if case.startswith(("example2", "table2_3", "table2_4", "table2_5"))]
+GRADIENTS = json.loads((DATA / "gradients.json").read_text())["losses"]
 KINDS = {"turning_point": "turn", "N_zero_crossing": "contact-sign", "final_rest": "rest"}
 
 # The tolerance of places relative to the leg that they end, and of V**2 and N relative to their largest value.
@@ -72,6 +73,21 @@ def reference(build: Build, name: str) -> tuple[Any, dict[str, Any]]:
         g=case["g"],
     )
     return motion, expected
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_derivatives_of_reference_cases(name: str, build: Build) -> None:
+    """Turning points and places of rest have the derivatives of differences of 30 digits, leg after leg."""
+    motion, expected = reference(build, name)
+    released, rests = motion.problem.w0 == 0.0, expected["comes_to_rest"]
+    for by, known in GRADIENTS[name]["by"].items():
+        variable = {"cd": "gamma"}.get(by, by)
+        found = list(motion.gradient("turning_points", variable)[variable])[released:]
+        if rests:
+            found.append(motion.gradient("rest_position", variable)[variable])
+        assert 0 < len(known) <= len(found)  # of many legs the first ones are known
+        for value, wanted in zip(found, known, strict=False):
+            assert value == pytest.approx(float(wanted), rel=ASKED, abs=ASKED), by
 
 
 @pytest.mark.parametrize("name", LOSING)

@@ -270,3 +270,42 @@ def test_slip_is_told_where_it_begins(slippery: ModuleType) -> None:
 def test_without_a_coefficient_nothing_slips(bowl: ModuleType) -> None:
     """Without a coefficient of friction there are no events of slipping."""
     assert [event.kind for event in bowl.solve(3, L=1, rho="1/4", beta=1).events].count("slip") == 0
+
+
+def test_a_ball_lifts_off_long_before_its_formulas_overflow(tmp_path: Path) -> None:
+    """A ball that falls beside a hyperbolic sine loses contact, though the track goes on to where its slope has no
+    square. Place and time are those of the laws of motion of its centre.
+    """
+    force = gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")
+    curve = gqm.Curve.graph("x/5 + sinh(x)/9", parameter="x")
+    module = gqm.build(gqm.derive(curve, force), name="falls_away", folder=tmp_path)
+    motion = module.solve(-0.5, 1.5, -1, contact="above")
+    with mp.workdps(30):
+        g, radius = mpf("9.81"), mpf(1) / 20
+
+        def slope(x: mpf) -> mpf:
+            return mpf(1) / 5 + mp.cosh(x) / 9
+
+        def curvature(x: mpf) -> mpf:
+            return mp.sinh(x) / 9 / (1 + slope(x) ** 2) ** 1.5
+
+        def squared_speed(x: mpf) -> mpf:
+            start, here = (y / 5 + mp.sinh(y) / 9 + radius / mp.sqrt(1 + slope(y) ** 2) for y in (mpf("-0.5"), x))
+            return mpf("1.5") ** 2 + 2 * g * (start - here) / (1 + mpf(2) / 5)
+
+        def load(x: mpf) -> mpf:
+            kappa = curvature(x) / (1 - radius * curvature(x))
+            return kappa * squared_speed(x) + g / mp.sqrt(1 + slope(x) ** 2)
+
+        def time_per_x(x: mpf) -> mpf:
+            return (1 - radius * curvature(x)) * mp.sqrt((1 + slope(x) ** 2) / squared_speed(x))
+
+        end = mp.findroot(load, (-3, -1), solver="anderson")
+        truth = mp.quad(time_per_x, [end, 0.5 * (end - 0.5), mpf("-0.5")])
+        assert motion.t_end == pytest.approx(float(truth), rel=EARLY)
+        assert motion.events[-1].kind == "liftoff"
+    assert module.sweep("t_end", [-0.5], [1.5], -1, contact="above").values[0] == pytest.approx(motion.t_end, rel=EARLY)
+    # Without a lift-off the ball is followed as far as its formulas are finite, and no end is claimed.
+    assert module.solve(-0.5, 1.5, -1, t_max=0.5).lam(0.5) == pytest.approx(motion.lam(0.5), rel=EARLY)
+    with pytest.raises(SolutionError, match="not finite"):
+        module.solve(-0.5, 1.5, -1)

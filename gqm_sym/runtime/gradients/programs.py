@@ -300,6 +300,18 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, [*op.values, op.place]))])
 
 
+@lru_cache(maxsize=64)
+def range_program(domain: Callable[..., Any], parameters: int) -> Program:
+    """Return the program of both ends of the parameter's range and its period, each with its derivatives with respect
+    to the run-time parameters.
+
+    Those that do not exist are zero.
+    """
+    op = Recorder(parameters)
+    numbers = [0 if number is None else number for number in domain(op, op.values)]
+    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
+
+
 def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, w: Any) -> Any:
     """Record N/m for V**2 = ``w``; for a curve that lies in no vertical plane, ``|N|/m``."""
     curvature, load = (f(op, lam, op.values) for f in (formulas.kappa, formulas.static_normal_load))

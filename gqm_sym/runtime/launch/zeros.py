@@ -54,8 +54,8 @@ class FoundEnd(NamedTuple):
     what : int
         TURN (V**2 has its first zero at ``near``), LIMIT (searched as far as was asked), CUSP (ds vanishes at ``far``),
         CRITICAL (V**2 and its slope are too close to zero between ``near`` and ``far`` for doubles to decide),
-        STEPS_SPENT (as many steps as are allowed were taken with V**2 > 0, up to ``near``) or NOT_FINITE (a value is
-        not finite near ``far``).
+        STEPS_SPENT (as many steps as are allowed were taken with V**2 > 0, up to ``near``, or numbers overflow beyond)
+        or NOT_FINITE (a value is not finite near ``far``).
     near, far : float
         Signed offsets from the launch place.
     """
@@ -163,6 +163,20 @@ def stays_positive(lower, upper, width, narrow, v2_near, v2_far, size):  # type:
 
 
 @Inner
+def without_length(near, far, ds_high, last_ds, widest_ds):  # type: ignore[no-untyped-def]
+    """Return what ends a search at a step on which ds > 0 cannot be proved.
+
+    ``ds_high`` is an upper bound of ds on the step, ``last_ds`` its value at the beginning, and ``widest_ds`` the
+    largest value so far.
+    """
+    if isfinite(ds_high):
+        return FoundEnd(CUSP if ds_high <= CUSP_SHARE * widest_ds else NOT_FINITE, near, far)
+    if last_ds <= CUSP_SHARE * widest_ds < inf:
+        return FoundEnd(CUSP, near, far)
+    return FoundEnd(STEPS_SPENT, near, near)  # terms of a formula overflow
+
+
+@Inner
 def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignore[no-untyped-def]
     """Search from lam0 + direction * begin to lam0 + direction * length, beginning with a step of ``step``.
 
@@ -183,7 +197,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
     near, v2_near = begin, w0
     if begin > 0.0:
         v2_near, _size = speed_squared(fns, p, lam0, w0, direction * begin, arrays)
-    widest_ds, size, passed = 0.0, w0, w0
+    widest_ds, last_ds, size, passed = 0.0, 0.0, w0, w0
     for _ in range(MAX_STEPS):
         if near >= length:
             return FoundEnd(LIMIT, direction * length, direction * length)
@@ -199,12 +213,12 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
         ds_low, ds_high = bounds[2], bounds[3]
         if ds_low <= 0.0:
             if narrow:
-                is_cusp = ds_high <= CUSP_SHARE * widest_ds or not isfinite(ds_high)
-                return FoundEnd(CUSP if is_cusp else NOT_FINITE, direction * near, direction * far)
+                return without_length(direction * near, direction * far, ds_high, last_ds, widest_ds)
             step = 0.5 * width
             continue
         v2_far, terms = speed_squared(fns, p, lam0, w0, direction * far, arrays)
-        widest_ds = max(widest_ds, arrays.rows[1, 0])
+        far_ds = arrays.rows[1, 0]
+        widest_ds = max(widest_ds, far_ds)
         if not isfinite(v2_far):
             if v2_near > OVERFLOW_V2:
                 return FoundEnd(STEPS_SPENT, direction * near, direction * near)
@@ -221,7 +235,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
         if positive < 0:
             return FoundEnd(CRITICAL, direction * near, direction * far)
         if positive:
-            near, v2_near, passed = far, v2_far, max(passed, terms)
+            near, v2_near, last_ds, passed = far, v2_far, far_ds, max(passed, terms)
             step = 2.0 * width
         else:
             step = 0.5 * width

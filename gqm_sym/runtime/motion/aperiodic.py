@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -10,15 +11,20 @@ from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, plus
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import without_formulas
+from gqm_sym.runtime.gradients.passage import PassageChanges, gradient
+from gqm_sym.runtime.gradients.quantities import selected
+from gqm_sym.runtime.gradients.sensitivity import STATE_ROWS, Sensitivity
+from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.ends import first_zero_from, search_beyond_barriers
-from gqm_sym.runtime.launch.kinds import MotionKind
+from gqm_sym.runtime.launch.kinds import PERIODIC_QUANTITIES, MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
 from gqm_sym.runtime.motion.events import Event, Leg, liftoff, sided_force
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import computed_once, locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segments.conditioning import v2_correction
@@ -173,6 +179,40 @@ class AperiodicMotion(Motion):
         """The turning points so far in the order of time; a launch from rest counts as one."""
         turns = [float(p.segment.places(np.array([p.phi_stop]))[0]) for p in self._segments if p.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
+
+    def _has_turned(self, t: float) -> bool:
+        """Return whether the body has turned by a time."""
+        return any(timed.end == "turn" and t > timed.t_stop[0] for timed in self._segments)
+
+    @computed_once
+    def _passage(self) -> PassageChanges:
+        """The changes of the motion."""
+        if not isinstance(self.problem.formulas.exact, ExactFormulas):
+            raise without_formulas()
+        turns, last = self.turning_points, self._segments[-1]
+        limit = last.segment.b if last.end == "asymptote" else self.legs[-1].lam_end if isfinite(self.t_end) else inf
+        turn, has_asymptote = turns[0] if turns else None, last.end == "asymptote"
+        return PassageChanges(self.problem, self.direction, turn, limit, has_asymptote=has_asymptote)
+
+    @locked
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
+        rows = selected(self.problem.formulas.parameters, wrt)
+        if quantity in PERIODIC_QUANTITIES:
+            raise SolutionError(
+                f"gradient: a motion of kind {self.kind!r} does not repeat, and so it has no {quantity}"
+            )
+        found = gradient(self, self._passage, quantity)
+        if quantity == "turning_points":
+            return {name: tuple(found[:, row].tolist()) for name, row in rows.items()}
+        return {name: float(found[row]) for name, row in rows.items()}
+
+    @locked
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
+        rows, passage = selected(self.problem.formulas.parameters, wrt), self._passage
+        times, _, shape = self._times(t)
+        states, turned = self.state(times), np.array([self._has_turned(time) for time in times.tolist()], dtype=bool)
+        made = passage.states(np.atleast_1d(states.lam), np.atleast_1d(states.v), turned)[:, list(rows.values())]
+        return Sensitivity(tuple(rows), *made.reshape(STATE_ROWS, len(rows), *shape))
 
     def _arc_end(self) -> float:
         last = self._segments[-1]

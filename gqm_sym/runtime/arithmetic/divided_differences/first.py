@@ -79,7 +79,7 @@ def divdiff1_cos_of_sum(phase, rate, start, gap):  # type: ignore[no-untyped-def
     return -sin_of_sum(phase, rate, start, 0.0, 0.5 * gap) * sinc(0.5 * rate * gap)
 
 
-@Inner
+@Inlined
 def divdiff1_tan(x, y, h):  # type: ignore[no-untyped-def]
     """tan[x,y] = sinc(h)/(cos x cos y)."""
     return sinc(h) / (cos(x) * cos(y))
@@ -97,11 +97,11 @@ def divdiff1_cosh(x, y, h):  # type: ignore[no-untyped-def]
     return sinh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
-@Inner
+@Inlined
 def divdiff1_tanh(x, y, h):  # type: ignore[no-untyped-def]
     """tanh[x,y] = sinhc(h)/(cosh x cosh y), with the growing exponentials cancelled by hand."""
     p, q = exp(-2.0 * fabs(x)), exp(-2.0 * fabs(y))
-    decay = max(p, q) if x * y > 0.0 else 1.0
+    decay = choose(x * y > 0.0, choose(p > q, p, q), 1.0)
     return 4.0 * decay * expc(2.0 * fabs(h)) / ((1.0 + p) * (1.0 + q))
 
 

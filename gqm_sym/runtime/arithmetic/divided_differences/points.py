@@ -44,3 +44,14 @@ def around(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
         *(choose(x_between, x, y), w, choose(x_between, gap, h2)),
         choose(x_between, h2, choose(w_between, h1, h1 + h2)),
     )
+
+
+@Inlined
+def ascending_gaps(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
+    """Return the gaps between three points in ascending order, and the highest point."""
+    _p, _q, first, _r, _s, second, _d = around(x, y, w, h1, h2)
+    w_between = (h1 * h2 < 0.0) & (fabs(h1) >= fabs(h2))
+    second_is_upper = ((second > 0.0) | ((second == 0.0) & (first > 0.0))) != w_between
+    lower, upper = choose(second_is_upper, first, second), choose(second_is_upper, second, first)
+    higher = choose(x > y, x, y)
+    return fabs(lower), fabs(upper), choose(higher > w, higher, w)

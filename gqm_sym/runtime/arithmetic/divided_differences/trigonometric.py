@@ -1,9 +1,8 @@
 """Second divided differences of sin, cos, sinh, cosh, exp, tan and tanh.
 
 As in `second`, there is a closed form for points near each other, here by `symmetric_parts`, and for others the
-difference of two first differences is taken. For sin, cos, sinh and cosh both values are computed and one is chosen, so
-that a loop over them fills vector registers. ``divdiff2_sin_near`` and its like are the closed forms alone: they are
-NaN for points too far apart.
+difference of two first differences is taken. Both values are computed and one is chosen, so that a loop over them fills
+vector registers. ``divdiff2_sin_near`` and its like are the closed forms alone: they are NaN for points too far apart.
 """
 
 from math import fabs, factorial, nan
@@ -17,10 +16,10 @@ from gqm_sym.runtime.arithmetic.divided_differences.first import (
     divdiff1_tanh,
     expc,
 )
-from gqm_sym.runtime.arithmetic.divided_differences.points import around, ordered, series_pair
+from gqm_sym.runtime.arithmetic.divided_differences.points import around, ascending_gaps, series_pair
 from gqm_sym.runtime.arithmetic.elementary import cos, cosh, exp, sin, sinh
 from gqm_sym.runtime.compiled.intrinsics import choose, polynomial
-from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.jit import Inlined
 
 # |h1| + |h2| up to which `symmetric_parts` may be used: the rest of its series is below 1e-19 there.
 MAX_SPAN = 1.0
@@ -163,35 +162,34 @@ def divdiff2_cosh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return choose(near == near, near, (divdiff1_cosh(r, s, second) - divdiff1_cosh(p, q, first)) / d)
 
 
-@Inner
+@Inlined
 def divdiff2_exp(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """exp[x,y,w] = exp(M) (A + B)/2; points far apart share the factor exp(w)."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= MAX_SPAN:
-        even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
-        return 0.5 * exp(0.25 * (x + w + 2.0 * y)) * (even + odd)
-    _a, _b, c, u, v = ordered(x, y, w, h1, h2)
+    """exp[x,y,w] = exp(M) (A + B)/2; points far apart share the factor exp of the highest."""
+    even, odd = symmetric_parts(0.5 * h1, 0.5 * h2, -1.0, NEAR_SERIES)
+    near = 0.5 * exp(0.25 * (x + w + 2.0 * y)) * (even + odd)
+    u, v, top = ascending_gaps(x, y, w, h1, h2)
     upper = expc(v)
-    return exp(c) * (upper - (1.0 - v * upper) * expc(u)) / (u + v)
+    far = exp(top) * (upper - (1.0 - v * upper) * expc(u)) / (u + v)
+    return choose(0.5 * (fabs(h1) + fabs(h2)) <= MAX_SPAN, near, far)
 
 
-@Inner
+@Inlined
 def divdiff2_tan(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tan[x,y,w] = (B cos m + A sin m)/(cos x cos y cos w), m = (x+w)/2, from whole gaps."""
-    if fabs(h1) + fabs(h2) <= MAX_SPAN:
-        even, odd = symmetric_parts(h1, h2, 1.0, NEAR_SERIES)
-        m = 0.5 * (x + w)
-        return (odd * cos(m) + even * sin(m)) / (cos(x) * cos(y) * cos(w))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (divdiff1_tan(b, c, v) - divdiff1_tan(a, b, u)) / (u + v)
+    even, odd = symmetric_parts(h1, h2, 1.0, NEAR_SERIES)
+    m = 0.5 * (x + w)
+    near = (odd * cos(m) + even * sin(m)) / (cos(x) * cos(y) * cos(w))
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    far = (divdiff1_tan(r, s, second) - divdiff1_tan(p, q, first)) / d
+    return choose(fabs(h1) + fabs(h2) <= MAX_SPAN, near, far)
 
 
-@Inner
+@Inlined
 def divdiff2_tanh(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tanh[x,y,w] = (B cosh m - A sinh m)/(cosh x cosh y cosh w), as for the tangent."""
-    if fabs(h1) + fabs(h2) <= MAX_SPAN:
-        even, odd = symmetric_parts(h1, h2, -1.0, NEAR_SERIES)
-        m = 0.5 * (x + w)
-        return (odd * cosh(m) - even * sinh(m)) / cosh(x) / (cosh(y) * cosh(w))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (divdiff1_tanh(b, c, v) - divdiff1_tanh(a, b, u)) / (u + v)
+    even, odd = symmetric_parts(h1, h2, -1.0, NEAR_SERIES)
+    m = 0.5 * (x + w)
+    near = (odd * cosh(m) - even * sinh(m)) / cosh(x) / (cosh(y) * cosh(w))
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    far = (divdiff1_tanh(r, s, second) - divdiff1_tanh(p, q, first)) / d
+    return choose(fabs(h1) + fabs(h2) <= MAX_SPAN, near, far)

@@ -11,7 +11,7 @@ from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
 from gqm_sym.runtime.gradients.lanes.evaluation import fill_lane_values
 from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
-from gqm_sym.runtime.gradients.programs import Program
+from gqm_sym.runtime.gradients.programs import Program, range_program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_segments import Run
@@ -23,7 +23,6 @@ from gqm_sym.runtime.legs.variations.programs import (
     law_in_doubles,
     law_program,
     load_program,
-    range_program,
 )
 from gqm_sym.runtime.motion.locking import computed_once
 

@@ -1,8 +1,8 @@
 """The programs of variations: the law of a motion with losses and its derivatives, recorded as tapes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
@@ -68,18 +68,6 @@ def force_program(law: ExactLaw, parameters: int) -> Program:
     """
     op, _, slope = _law(law, parameters)
     return assemble(op, [slope, *gradient(op, slope, [op.place])])
-
-
-@lru_cache(maxsize=64)
-def range_program(domain: Callable[..., Any], parameters: int) -> Program:
-    """Return the program of both ends of the parameter's range and its period, each with its derivatives with respect
-    to the run-time parameters.
-
-    Those that do not exist are zero.
-    """
-    op = Recorder(parameters)
-    numbers = [0 if number is None else number for number in domain(op, op.values)]
-    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
 
 
 class ChartForces(NamedTuple):

@@ -184,7 +184,4 @@ class Derivatives(Positions):
 
     def _without_gradients(self) -> SolutionError:
         """Return the error of motions without gradients."""
-        return SolutionError(
-            "gradients: only librations, circulations and motions with losses have them; "
-            f"this motion is of kind {self.kind!r}"
-        )
+        return SolutionError(f"gradients: there are none of a motion of kind {self.kind!r}")
