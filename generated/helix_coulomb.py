@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 15, input 3f2dfaf376e9, body 8eb5d6cac940
+# interface 15, input 3f2dfaf376e9, body d10c7b0ae841
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -11,7 +11,7 @@ dy/ds          = R*cos(theta)/sqrt(R**2 + c**2)
 dz/ds          = c/sqrt(R**2 + c**2)
 kappa          = R/(R**2 + c**2)
 W = V**2       = W(theta)
-|N|            = m*sqrt(R**4*W**2/(R**2 + c**2)**3 + (R*W*c*sin(theta)/(R**2 + c**2)**(3/2) + R*g*cos(theta)/sqrt(R**2 + c**2))**2 + (-R*W*c*cos(theta)/(R**2 + c**2)**(3/2) + R*g*sin(theta)/sqrt(R**2 + c**2))**2)
+|N|            = m*sqrt(R**4*W**2/(R**2 + c**2)**2 + (R*W*c*sin(theta)/(R**2 + c**2) + R*g*cos(theta))**2 + (-R*W*c*cos(theta)/(R**2 + c**2) + R*g*sin(theta))**2)/sqrt(R**2 + c**2)
 A              = -c*g/sqrt(R**2 + c**2) - direction*mu*sqrt(R**4*W**2/(R**2 + c**2)**2 + (R*W*c*sin(theta)/(R**2 + c**2) + R*g*cos(theta))**2 + (-R*W*c*cos(theta)/(R**2 + c**2) + R*g*sin(theta))**2)/sqrt(R**2 + c**2)
 dt/dtheta      = sqrt(R**2 + c**2)/sqrt(W)
 turning points : W = 0
@@ -48,20 +48,20 @@ def path_and_contact_force(n, places, speeds, p, out):
     R, c, g, m = p[0], p[1], p[3], p[4]
     _t0 = R**2 + c**2
     _t1 = sqrt(_t0)
-    _c0 = sqrt(_t0)
-    _c1 = 1/_t1
-    _c2 = _t1
-    _t3 = _c1*g
+    _t3 = 1/_t0
+    _t4 = R*_t3
+    _c0 = 1/_t1
+    _c1 = _t1
     for i in range(n):
         theta, v2 = places[i], speeds[i]
         _t2 = R*cos(theta)
-        _t4 = R*sin(theta)
-        _t5 = c*v2/_c0**3
+        _t5 = sin(theta)
+        _t6 = c*v2
         out[0, i] = _t2
         out[1, i] = c*theta
-        out[2, i] = _c2
-        out[3, i] = R/_t0
-        out[4, i] = m*sqrt(R**4*v2**2/_t0**3 + (_t2*_t3 + _t4*_t5)**2 + (-_t2*_t5 + _t3*_t4)**2)
+        out[2, i] = _c1
+        out[3, i] = _t4
+        out[4, i] = _c0*m*sqrt(R**4*v2**2/_t0**2 + (_t2*g + _t4*_t5*_t6)**2 + (R*_t5*g - _t2*_t3*_t6)**2)
 
 
 @compiled(PATH_IN_SPACE)
@@ -69,25 +69,23 @@ def path_in_space(n, places, speeds, v, p, out):
     """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (4, n))
     R, c, g, m = p[0], p[1], p[3], p[4]
-    _t0 = R**2 + c**2
-    _t5 = R**3/_t0**2
-    _c0 = sqrt(_t0)
-    _c1 = 1/sqrt(_t0)
-    _t6 = _c1*g
-    _t7 = c/_c0**3
+    _t3 = 1/(R**2 + c**2)
+    _t9 = _t3*m
     for i in range(n):
         theta, v2 = places[i], speeds[i]
-        _t1 = sin(theta)
-        _t2 = R*_t1
-        _t3 = cos(theta)
+        _t0 = sin(theta)
+        _t1 = R*_t0
+        _t2 = cos(theta)
         _t4 = _t3*v2
-        _t8 = -R*_t4*_t7 + _t2*_t6
-        _t9 = R*_t3
-        _t10 = _t2*_t7*v2 + _t6*_t9
-        out[0, i] = _t2
-        out[1, i] = m*(_c1*_t8*c - _t4*_t5)
-        out[2, i] = m*(-_c1*_t10*c - _t1*_t5*v2)
-        out[3, i] = m*(_c1*_t10*_t9 + _c1*_t2*_t8)
+        _t5 = R**3*_t4
+        _t6 = R*_t2
+        _t7 = _t4*c
+        _t8 = R*_t0*g - _t6*_t7
+        _t10 = _t1*_t7 + _t6*g
+        out[0, i] = _t1
+        out[1, i] = _t9*(-_t2*_t5 + _t8*c)
+        out[2, i] = _t9*(-_t0*_t5 - _t10*c)
+        out[3, i] = _t9*(_t1*_t8 + _t10*_t6)
 
 
 @compiled(SPEED_EQUATION)

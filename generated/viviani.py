@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 15, input c93b8a64a5a5, body 50a8a8c92863
+# interface 15, input c93b8a64a5a5, body baab8add24fc
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -11,7 +11,7 @@ dy/ds          = cos(theta)/sqrt(cos(theta/2)**2 + 1)
 dz/ds          = cos(theta/2)/sqrt(cos(theta/2)**2 + 1)
 kappa          = sqrt(3*cos(theta/2)**2 + 5)/(2*a*(cos(theta/2)**2 + 1)**(3/2))
 V**2           = 4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2
-|N|            = m*sqrt((g*sin(theta)/sqrt(cos(theta/2)**2 + 1) - (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*cos(theta/2)**3/(a*(cos(theta/2)**2 + 1)**(3/2)))**2 + (g*cos(theta)/sqrt(cos(theta/2)**2 + 1) + (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*(cos(theta) + 2)*sin(theta/2)/(2*a*(cos(theta/2)**2 + 1)**(3/2)))**2 + (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)**2/(a**2*(cos(theta/2)**2 + 1)**3))
+|N|            = m*sqrt((4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)**2/(cos(theta/2)**2 + 1)**2 + (a*g*sin(theta) - (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*cos(theta/2)**3/(cos(theta/2)**2 + 1))**2 + (a*g*cos(theta) + (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*(cos(theta) + 2)*sin(theta/2)/(2*(cos(theta/2)**2 + 1)))**2)/(a*sqrt(cos(theta/2)**2 + 1))
 A              = -g*cos(theta/2)/sqrt(cos(theta/2)**2 + 1)
 dt/dtheta      = a*sqrt(cos(theta/2)**2 + 1)/sqrt(4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)
 turning points : 4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2 = 0
@@ -48,6 +48,8 @@ def path_and_contact_force(n, places, speeds, p, out):
     """x, z, ds/dtheta, curvature kappa, contact force |N|, given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     a, g, m = p[0], p[1], p[2]
+    _t7 = 1/a
+    _t8 = a*g
     for i in range(n):
         theta, v2 = places[i], speeds[i]
         _t0 = cos(theta)
@@ -57,14 +59,12 @@ def path_and_contact_force(n, places, speeds, p, out):
         _t4 = _t3**2
         _t5 = _t4 + 1
         _t6 = sqrt(_t5)
-        _t7 = 1/(a*sqrt(_t5)**3)
-        _t8 = _t7/2
-        _t9 = g/_t6
+        _t9 = v2/_t5
         out[0, i] = a*(_t0 + 1)
         out[1, i] = 2*_t2*a
         out[2, i] = _t6*a
-        out[3, i] = _t8*sqrt(3*_t4 + 5)
-        out[4, i] = m*sqrt((_t0*_t9 + _t2*_t8*v2*(_t0 + 2))**2 + (-_t3**3*_t7*v2 + _t9*sin(theta))**2 + v2**2/(_t5**3*a**2))
+        out[3, i] = _t7*sqrt(3*_t4 + 5)/(2*sqrt(_t5)**3)
+        out[4, i] = _t7*m*sqrt((_t0*_t8 + _t2*_t9*(_t0 + 2)/2)**2 + (-_t3**3*_t9 + _t8*sin(theta))**2 + v2**2/_t5**2)/_t6
 
 
 @compiled(PATH_IN_SPACE)
@@ -74,23 +74,20 @@ def path_in_space(n, places, speeds, v, p, out):
     a, g, m = p[0], p[1], p[2]
     for i in range(n):
         theta, v2 = places[i], speeds[i]
-        _t0 = sin(theta)
-        _t1 = cos(theta)
-        _t2 = theta/2
-        _t3 = cos(_t2)
-        _t4 = _t3**2 + 1
-        _t5 = v2/a
-        _t6 = _t5/_t4**2
-        _t7 = 1/sqrt(_t4)
-        _t8 = _t7*g
-        _t9 = _t5/sqrt(_t4)**3
-        _t10 = _t0*_t8 - _t3**3*_t9
-        _t11 = _t3*_t7
-        _t12 = _t1*_t8 + _t9*(_t1 + 2)*sin(_t2)/2
-        out[0, i] = _t0*a
-        out[1, i] = m*(-_t1*_t6 + _t10*_t11)
-        out[2, i] = m*(-_t0*_t6 - _t11*_t12)
-        out[3, i] = m*(_t0*_t10*_t7 + _t1*_t12*_t7)
+        _t0 = a*sin(theta)
+        _t1 = theta/2
+        _t2 = cos(_t1)
+        _t3 = 1/(_t2**2 + 1)
+        _t4 = _t3*v2
+        _t5 = cos(theta)
+        _t6 = _t5*a
+        _t7 = _t0*g - _t2**3*_t4
+        _t8 = _t3*m/a**2
+        _t9 = _t4*(_t5 + 2)*sin(_t1)/2 + _t6*g
+        out[0, i] = _t0
+        out[1, i] = _t8*(_t2*_t7*a - _t4*_t6)
+        out[2, i] = _t8*(-_t0*_t4 - _t2*_t9*a)
+        out[3, i] = _t8*(_t0*_t7 + _t6*_t9)
 
 
 @compiled(EFFECTIVE_POTENTIAL)
@@ -318,27 +315,26 @@ def load_map(n, w0, level, places, p, out):
         _t5 = _t4**2
         _t6 = _t5 + 1
         _t7 = sqrt(_t6)
-        _t9 = _t8/sqrt(_t6)**3
-        _t10 = _t9/2
-        _t11 = speed_squared_from_potential(w0, _t3*g, level)
-        _t12 = sin(theta)
-        _t13 = 1/_t7
-        _t14 = _t13*g
-        _t15 = -_t11*_t4**3*_t9 + _t12*_t14
-        _t16 = _t0*_t14 + _t10*_t11*_t2*(_t0 + 2)
-        _t17 = _t11*_t8/_t6**2
-        _t18 = _t13*_t4
+        _t9 = speed_squared_from_potential(w0, _t3*g, level)
+        _t10 = a*sin(theta)
+        _t11 = 1/_t6
+        _t12 = _t11*_t9
+        _t13 = _t10*g - _t12*_t4**3
+        _t14 = _t0*a
+        _t15 = _t12*_t2*(_t0 + 2)/2 + _t14*g
+        _t16 = _t4*a
+        _t17 = _t11*m/a**2
         out[0, i] = a*(_t0 + 1)
         out[1, i] = _t3
         out[2, i] = _t7*a
-        out[3, i] = _t10*sqrt(3*_t5 + 5)
-        out[4, i] = _t11
-        out[5, i] = m*sqrt(_t11**2/(_t6**3*a**2) + _t15**2 + _t16**2)
+        out[3, i] = _t8*sqrt(3*_t5 + 5)/(2*sqrt(_t6)**3)
+        out[4, i] = _t9
+        out[5, i] = _t8*m*sqrt(_t13**2 + _t15**2 + _t9**2/_t6**2)/_t7
         out[6, i] = 2*_c0*_c1*fabs(_t2)
-        out[7, i] = _t12*a
-        out[8, i] = m*(-_t0*_t17 + _t15*_t18)
-        out[9, i] = m*(-_t12*_t17 - _t16*_t18)
-        out[10, i] = m*(_t0*_t13*_t16 + _t12*_t13*_t15)
+        out[7, i] = _t10
+        out[8, i] = _t17*(-_t12*_t14 + _t13*_t16)
+        out[9, i] = _t17*(-_t10*_t12 - _t15*_t16)
+        out[10, i] = _t17*(_t10*_t13 + _t14*_t15)
 
 
 @compiled(POTENTIAL_DIVDIFF1_BATCH)

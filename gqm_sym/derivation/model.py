@@ -212,7 +212,7 @@ class Model:
         v2 = _read_v2(v2)
         if not self.loads:
             return MASS * (self.kappa * v2 + self.static_normal_load)
-        return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2))))
+        return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2)))) / self.ds
 
     def normal_force_vector_at(self, v2: sp.Expr) -> Place:
         """Return the components of the contact force along x, y and z for a given value of V².
@@ -228,18 +228,21 @@ class Model:
             The three components in N.
         """
         v2 = _read_v2(v2)
-        tangent = (self.dxds, self.dyds, self.dzds)
         if self.loads:
-            turned = self._turned_force(v2)
-            along_x, along_y, along_z = (MASS * part for part in cross(turned, tangent))
-            return along_x, along_y, along_z
+            tangent = (self.ds * part for part in (self.dxds, self.dyds, self.dzds))
+            along_x, along_y, along_z = cross(self._turned_force(v2), (*tangent,))
+            scale = MASS / self.ds**2
+            return scale * along_x, scale * along_y, scale * along_z
         force = self.normal_force_at(v2)
         along_x, along_y, along_z = (force * part for part in self.normal)
         return along_x, along_y, along_z
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
-        """Return the vector t × N/m, which has the length of N/m."""
-        return turned_force(self.curvature_binormal, self.loads, self.coriolis, v2)
+        """Return the vector ds/dλ t × N/m, in which the square root of ds/dλ often cancels."""
+        binormal, loads, coriolis = (
+            tuple(self.ds * part for part in parts) for parts in (self.curvature_binormal, self.loads, self.coriolis)
+        )
+        return turned_force(binormal, loads, coriolis, v2)
 
     @property
     def units(self) -> dict[str, str]:

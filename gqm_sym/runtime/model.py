@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 # The smallest number of places of a load map for which another thread is started.
 MIN_PLACES_PER_THREAD = 2**16
 
+# The number of places whose rows in space stay in the cache until they are copied to the load map.
+PLACES_IN_CACHE = 2**12
+
 NO_LOW_PARTS: Array = np.empty(0)
 
 # The arguments of a module's functions in addition to its run-time parameters.
@@ -184,7 +187,7 @@ class CompiledModel(Formulas):
         v2 = arrays.v2.reshape(-1)
         rows, force = [array.reshape(-1) for array in arrays[filled:]], arrays.normal_force.reshape(-1)
 
-        def fill(part: slice) -> None:
+        def fill_block(part: slice) -> None:
             # From rest the body may move to either side of the launch.
             side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
             ahead = np.where(side != 0.0, side, float(launch.direction))
@@ -197,6 +200,10 @@ class CompiledModel(Formulas):
                 found.extend(rider_loads(self, p, places[part], v2[part], ahead, force[part]))
             for row, values in zip(rows, found, strict=True):
                 row[part] = values
+
+        def fill(part: slice) -> None:
+            for begin in range(part.start, part.stop, PLACES_IN_CACHE):
+                fill_block(slice(begin, min(begin + PLACES_IN_CACHE, part.stop)))
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
 

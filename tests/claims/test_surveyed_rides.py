@@ -181,3 +181,29 @@ def test_planar_tracks_are_not_banked(roll: Any) -> None:
     """Banking of planar tracks is refused, because lateral loads on riders are known for tracks in space only."""
     with pytest.raises(DeclarationError, match=r"^sampled: roll: is for tracks in space; give rows of x, y and z"):
         gqm.Curve.sampled(ring(48)[:, [0, 2]], roll=roll)
+
+
+def test_work_of_friction_over_a_circuit() -> None:
+    """Along a circuit of surveyed points the lost energy is the work of friction, by Gauss's rule between the points,
+    with the contact force by Newton's law from the derivatives of the track.
+    """
+    mu, g, speed = 0.02, 9.81, 24.0
+    u = 2.0 * np.pi * np.arange(96) / 96
+    across, along, up = 32 * np.cos(u) + 8 * np.cos(2 * u), 50 * np.sin(u), 9 * np.cos(u) + 4 * np.cos(3 * u)
+    points = np.stack([across, along, up], axis=1)
+    curve = gqm.Curve.sampled(points, closed=True)
+    module = transient(gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction()))
+    motion = module.solve(0, speed, mu=mu, g=g, t_max=100)
+    chart = motion.problem.formulas.chart.chart(())
+    edges = np.array([motion.time_at(place) if place else 0.0 for place in np.append(chart.edges[:-1], chart.period)])
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = np.diff(edges)[:, None] / 2
+    times = edges[:-1, None] + half * (nodes + 1)
+    state = motion.state(times)
+    _, ahead, bend = (chart.derivatives(state.lam.ravel(), order)[:3] for order in range(3))
+    force = state.v2.ravel() * bend + g * (np.array([[0.0], [0.0], [1.0]]) - ahead[2] * ahead)
+    work = mu * (np.linalg.norm(force, axis=0).reshape(times.shape) * np.abs(state.v) * weights * half).sum()
+    assert motion.energy(edges[-1]).lost == pytest.approx(work, rel=1e-13)
+    end = motion.state(edges[-1])
+    assert [end.x, end.y, end.z] == pytest.approx(points[0], abs=1e-12)
+    assert (speed**2 - end.v2) / 2 == pytest.approx(work, rel=1e-13)

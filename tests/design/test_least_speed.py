@@ -154,6 +154,10 @@ def test_corkscrew(tmp_path: Path) -> None:
     speed = gqm.least_speed(coil, 0, between=(-1, 4))
     assert near(speed, sqrt(9.81 * (16 + 25 / 4)))
     assert near(gqm.least_speed(coil, 0, between=(-1, 4), contact="bilateral"), sqrt(9.81 * 16))
+    turning = gqm.transition(length=25, pitch="4/25", roll="3/25")
+    rail = gqm.Curve.piecewise([turning], start=(0, 0, -4), heading=("atan(4/3)", 0), roll="pieces")
+    coiled = gqm.build(gqm.derive(rail, gqm.Gravity()), name="coiled", folder=tmp_path)
+    assert near(gqm.least_speed(coiled, 1), sqrt(9.81 * (16 + 25 / 4 - 8 * (1 - cos(1 / 5)))))
     for factor, end in ((1.001, "transit"), (0.999, "liftoff")):
         motion = coil.solve(0, factor * speed, contact="above")
         assert (motion.kind if end == "transit" else motion.events[-1].kind) == end

@@ -6,7 +6,7 @@ the same again for twice the angle.
 
 from collections.abc import Iterable
 from fractions import Fraction
-from math import gcd, lcm
+from math import gcd, lcm, prod
 
 import sympy as sp
 
@@ -19,6 +19,9 @@ MAX_SPELLED = 24
 # The largest number of terms, and of factors in a term, for which sines and cosines of different angles are combined.
 MAX_COMBINED_TERMS = 12
 MAX_COMBINED_FACTORS = 4
+
+# The largest size of the terms of a form, in units of the smallest of all forms tried.
+MAX_CANCELLATION = 8.0
 Monomial = tuple[int, ...]
 Terms = dict[sp.Expr, dict[Monomial, Fraction]]
 """For each product of sines, cosines and exponentials, the polynomial that multiplies it."""
@@ -66,7 +69,28 @@ def _spell(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
             view, form, divisor = doubled
             content, form = form.primitive()
             candidates.append(spell(view, form) * sp.Rational(int(content), divisor))
-    return shortest(candidates)
+    return shortest(_without_cancellation(candidates))
+
+
+def _without_cancellation(candidates: list[sp.Expr]) -> list[sp.Expr]:
+    """Return the forms of one sum without those whose terms are so much larger than those of another that digits are
+    lost: cos(7u) has the size 1, and in powers of cos(u) its terms have sizes up to 112.
+    """
+    sizes = [_size(form) for form in candidates]
+    return [form for form, size in zip(candidates, sizes, strict=True) if size <= MAX_CANCELLATION * min(sizes)]
+
+
+def _size(form: sp.Expr) -> float:
+    """Return the size of the terms of a form in which all functions and symbols have the size 1."""
+    if form.is_Number:
+        return abs(float(form))
+    if form.is_Add:
+        return sum(_size(term) for term in form.args)
+    if form.is_Mul:
+        return prod(_size(factor) for factor in form.args)
+    if form.is_Pow and form.exp.is_Integer and form.exp > 0:
+        return float(_size(form.base) ** int(form.exp))
+    return 1.0
 
 
 def _in_powers(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:

@@ -2,6 +2,7 @@
 
 import pytest
 import sympy as sp
+from mpmath import mp, mpf
 
 from gqm_sym.declare import Curve
 from gqm_sym.derivation.algebra.algebra import Algebra
@@ -76,6 +77,19 @@ def test_a_sum_without_minus_signs_is_preferred():
     algebra = Algebra([sp.sin(t)], t)
     polynomial = algebra.fraction(2 - sp.cos(t) ** 2).top
     assert spell(algebra, polynomial) == sp.sin(t) ** 2 + 1
+
+
+def test_powers_that_cancel_are_written_as_multiple_angles():
+    """A short sum of powers, part of the curvature of a knot, whose terms are 36 times as large as its values, is
+    written in multiple angles and keeps its digits.
+    """
+    powers = read("300*cos(t)**7 - 440*cos(t)**5 - 30*cos(t)**4 + 185*cos(t)**3 + 23*cos(t)**2 - 11")
+    algebra = Algebra([powers], t)
+    written = sp.lambdify(t, spell(algebra, algebra.fraction(powers).top), "math")
+    true, places = sp.lambdify(t, powers, "mpmath"), [k / 100 for k in range(150)]
+    with mp.workdps(30):
+        errors = [abs(float(true(mpf(place)) - written(place))) for place in places]
+    assert max(errors) < 8e-16 * 27  # the largest value; in powers the error is 28e-16 of it
 
 
 @pytest.mark.parametrize(
