@@ -1,7 +1,8 @@
 """Hold every quantity of a sweep against the motions that `solve` finds, for random curves and forces.
 
 ``soak_sweeps.py [COUNT] [SEED]``. COUNT modules are drawn: heights and forces are random sums, so that closed forms
-meet in combinations that nobody has chosen. Each module is swept over a few launches for each quantity. What differs by
+meet in combinations that nobody has chosen; a third of the curves are tracks, rails and implicit curves, in a plane and
+in space, and curves in space with formulas. Each module is swept over a few launches for each quantity. What differs by
 more than roundings, or is refused by one and answered by the other, is printed with its launch.
 """
 
@@ -38,6 +39,15 @@ PATHS = (
     ("u + sin(u)", "-cos(u)"),
     ("sin(u) + u/3", "cosh(u)"),
 )
+PATHS_IN_SPACE = (
+    ("cos(u)", "sin(u)", "u**2/3"),
+    ("sin(u)", "u/3", "-cos(u)"),
+    ("u", "sin(2*u)/4", "u**2/2"),
+    ("2*sin(u)", "cos(u)**2/3", "-cos(u)"),
+    ("(2 + cos(3*u))*cos(2*u)", "(2 + cos(3*u))*sin(2*u)", "sin(3*u)"),
+    ("u", "u**2/5", "cosh(u)/2"),
+)
+FIELDS = ("x**2 + z**2 - 1", "x**2/4 + z**2 - 1", "x**4 + z**4 - 1", "x**2/3 + z**2 + x*z/4 - 1", "x**2 - z - 1")
 # Families with the range of launches.
 FAMILIES: tuple[tuple[Callable[[], Any], float, float], ...] = (
     (lambda: gqm.families.circle(L=1), -1.0, 1.3),
@@ -57,8 +67,56 @@ POTENTIALS = (
 )
 
 
+def drawn_rail(draw: random.Random) -> tuple[str, Any, float, float]:
+    """Return a rail that begins downwards, with its description and the range of its launches."""
+    pieces, said, length, heading = [], [], 0.0, -60
+    for _ in range(draw.choice((2, 3, 4))):
+        kind, size = draw.choice(("line", "arc", "arc", "clothoid")), draw.choice((4, 7, 11))
+        if kind == "line":
+            pieces.append(gqm.line(length=f"{size}/5"))
+        elif kind == "arc":
+            turn = draw.choice((15, 30, 45)) if heading < 30 else -30
+            heading += turn
+            pieces.append(gqm.arc(radius=f"{size}/6", angle=f"{turn}*pi/180"))
+        else:
+            pieces.append(gqm.clothoid(length=f"{size}/6", kappa_start="0", kappa_end="1/3"))
+        length += size / 5 if kind == "line" else size / 6 * (1 if kind == "clothoid" else abs(turn) * math.pi / 180)
+        said.append(f"{kind} {size}")
+    return f"rail of {', '.join(said)}", gqm.Curve.piecewise(pieces, heading="-pi/3"), 0.05 * length, 0.95 * length
+
+
+def drawn_points(draw: random.Random, *, in_space: bool) -> tuple[str, Any, float, float]:
+    """Return a track through points of a random valley, with its description and the range of its launches."""
+    count, amplitude, phase = draw.randint(7, 25), draw.uniform(0.1, 0.6), draw.uniform(-0.5, 0.5)
+    x = np.linspace(-2.0, 2.0, count)
+    z = 0.4 * x**2 + amplitude * np.sin(2.0 * x + phase)
+    y = draw.uniform(0.2, 0.8) * np.cos(1.3 * x)
+    points = np.round(np.column_stack([x, y, z] if in_space else [x, z]), 3)
+    kind = "spline" if in_space or draw.random() < 0.7 else "linear"
+    length = float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
+    return f"{kind} track through {points.tolist()}", gqm.Curve.sampled(points, kind=kind), 0.1 * length, 0.9 * length
+
+
+def drawn_chart(draw: random.Random) -> tuple[str, Any, float, float]:
+    """Return a curve whose parameter is arc length, or one in space, with its description and the range of its
+    launches.
+    """
+    which = draw.choice(("rail", "points", "implicit", "points in space", "space", "space"))
+    if which == "rail":
+        return drawn_rail(draw)
+    if which.startswith("points"):
+        return drawn_points(draw, in_space=which != "points")
+    if which == "implicit":
+        field = draw.choice(FIELDS)
+        return field, gqm.Curve.implicit(field, start=(0, -1)), -1.5, 1.5
+    x, y, z = draw.choice(PATHS_IN_SPACE)
+    return f"({x}, {y}, {z})", gqm.Curve.space(x=x, y=y, z=z, parameter="u"), -1.5, 1.2
+
+
 def drawn_curve(draw: random.Random) -> tuple[str, Any, float, float]:
     """Return a curve with its description and the range of its launches."""
+    if draw.random() < 1 / 3:
+        return drawn_chart(draw)
     which = draw.random()
     if which < 0.55:
         z = "+".join(draw.sample(EVEN, draw.choice((1, 1, 2))) + draw.sample(OTHER, int(which < 0.2)))
@@ -108,8 +166,11 @@ def check(module: ModuleType, places: Any, speeds: Any, direction: int, given: d
     target = float(np.mean(places))
     for quantity in kinds.QUANTITIES:
         where = {"lam": target} if quantity == "time_at" else {}
-        swept = module.sweep(quantity, places, speeds, direction, **given, **where)
-        for place, speed, value in zip(places.tolist(), speeds.tolist(), swept.values, strict=True):
+        try:
+            swept = module.sweep(quantity, places, speeds, direction, **given, **where).values
+        except GQMError:  # no launch has this quantity
+            swept = np.full(places.size, np.nan)
+        for place, speed, value in zip(places.tolist(), speeds.tolist(), swept, strict=True):
             try:
                 expected = QUANTITIES[quantity].of_motion(module.solve(place, speed, direction, **given), target)
             except GQMError:
@@ -125,14 +186,18 @@ def main() -> int:
     draw, failed = random.Random(seed), 0
     with tempfile.TemporaryDirectory() as folder:
         for number in range(count):
-            said, curve, low, high = drawn_curve(draw)
+            try:
+                said, curve, low, high = drawn_curve(draw)
+            except GQMError as error:
+                print(f"refused: {error}", flush=True)
+                continue
             laws, force, loses = drawn_force(draw)
             places = np.array([draw.uniform(low, high) for _ in range(LAUNCHES)])
             speeds = np.array([abs(draw.gauss(0.0, 1.0)) * (draw.random() < 0.4) for _ in range(LAUNCHES)])
             given = {"t_max": HORIZON if loses else None, "contact": draw.choice(("bilateral", "bilateral", "above"))}
             try:
                 model = gqm.derive(curve, force)
-            except GQMError:  # a body with a radius does not roll over a cusp
+            except GQMError:  # a body with a radius does not roll over a cusp, or along a curve in space
                 continue
             module = gqm.build(model, name=f"drawn_{number}", folder=Path(folder))
             failures = check(module, places, speeds, draw.choice((1, -1)), given)

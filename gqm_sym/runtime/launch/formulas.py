@@ -53,7 +53,8 @@ class ParameterValues(tuple[Number, ...]):
     columns : tuple of lists of arrays or None
         The columns of sweeps with these values (`sweep.columns`), once one has been asked for.
     conditions : dict
-        What all legs with losses share (`legs.conditions.Conditions`), by contact, once it has been asked for.
+        What all legs with losses share (`legs.conditions.Conditions`), by contact, and their law
+        (`legs.variations.law.FormulaLaw`) as "law", once they have been asked for.
     """
 
     values: Array

@@ -59,6 +59,7 @@ from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
     BEGIN_LOW,
     END,
+    HEADING,
     LAPS_BEFORE,
     PANELS,
     PASSAGE,
@@ -183,19 +184,36 @@ def sought_extreme(question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def after_leg(body, question, findings, record):  # type: ignore[no-untyped-def]
+def load_at(dissipation, p, question, place, direction, v2):  # type: ignore[no-untyped-def]
+    """Return the contact force per mass, or its length, on a body at a place."""
+    point = point_buffer()
+    if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
+        point[0] = place
+        call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
+        return sqrt(point[2] + v2 * (point[3] + v2 * point[4]))
+    slope_of_v2(forces_on(dissipation, p, direction), place, v2, 0, point)
+    return point[5] + point[6] * v2
+
+
+@Inner
+def after_leg(dissipation, p, body, question, findings, record):  # type: ignore[no-untyped-def]
     """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
-    if question == ARRIVAL and body[ENDING] != END_LIFTOFF_AT_ONCE:
+    if question < LEAST_SPEED:
+        if question != ARRIVAL or body[ENDING] == END_LIFTOFF_AT_ONCE:
+            return findings
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
         return Findings(begin + (low + spent), findings.peak)
-    if body[ENDING] == END_LIFTOFF_AT_ONCE and question in (LEAST_SPEED, MOST_SPEED):
-        v = sqrt(record[START_V2])
-        return Findings(findings.arrival, max(findings.peak, v if question == MOST_SPEED else -v))
-    if question >= LEAST_SPEED:
-        until = 0.0 if body[ENDING] == END_LIFTOFF_AT_ONCE else (body[HORIZON] - begin) - low
-        return Findings(findings.arrival, peak_of_leg(record, until, sought_extreme(question), findings.peak))
-    return findings
+    function, sign = sought_extreme(question)
+    if body[ENDING] != END_LIFTOFF_AT_ONCE:
+        until = (body[HORIZON] - begin) - low
+        return Findings(findings.arrival, peak_of_leg(record, until, (function, sign), findings.peak))
+    v2 = record[START_V2]
+    if function == SPEED:
+        value = sqrt(v2)
+    else:
+        value = load_at(dissipation, p, question, record[START], int(record[HEADING]), v2)
+    return Findings(findings.arrival, max(findings.peak, sign * value))
 
 
 @Inner
@@ -211,13 +229,7 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
         return (0.0, FOUND) if body[TARGET] == body[LAM0] else (np.nan, NONE)
     if question < LEAST_LOAD:
         return 0.0, FOUND
-    point = point_buffer()
-    if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
-        point[0] = body[LAM0]
-        call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
-        return sqrt(point[2]), FOUND
-    slope_of_v2(forces_on(dissipation, p, 1), body[LAM0], 0.0, 0, point)
-    return point[5], FOUND
+    return load_at(dissipation, p, question, body[LAM0], 1, 0.0), FOUND
 
 
 @Inner
@@ -265,7 +277,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             return 0.0, FOUND
         if dissipation.friction and slides_little(record, body[LEAST_SIZE]):
             break
-        findings = after_leg(body, question, findings, record)
+        findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
         if not goes_on(body, question, findings.arrival):

@@ -129,7 +129,7 @@ class DissipativeMotion(FollowedMotion):
     def turning_points(self) -> tuple[float, ...]:
         """The turning points on `legs` in the order of time; the place of a launch from rest is one."""
         self._look_ahead()
-        turns = [leg.lam_end for leg in self._up_to_horizon(self._runs_as_legs()) if leg.end == "turn"]
+        turns = [leg.lam_end for leg in self._runs_as_legs() if leg.end == "turn" and leg.t_end <= self._horizon]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property

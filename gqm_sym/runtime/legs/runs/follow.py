@@ -50,7 +50,14 @@ from gqm_sym.runtime.legs.panels.equation import (
 )
 from gqm_sym.runtime.legs.panels.point import point_buffer
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
-from gqm_sym.runtime.legs.panels.widest import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel
+from gqm_sym.runtime.legs.panels.widest import (
+    ALWAYS,
+    MAX_PANELS,
+    MIN_RELATIVE_WIDTH,
+    NEVER,
+    PanelRequest,
+    next_panel,
+)
 from gqm_sym.runtime.legs.runs.arrival import run_to_target
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
@@ -96,7 +103,10 @@ def next_stop(march, passed, length_back, record, breaks, remaining):  # type: i
     while upcoming >= 0 and offset(breaks[upcoming], origin, u) <= passed:
         upcoming -= 1
     if change >= 0:
-        stop = min(stop, offset(record[change_at(record, change)], origin, u))
+        to_change = offset(record[change_at(record, change)], origin, u)
+        # Where the run ahead ended at this change, the two places may differ by their roundings.
+        if length_back - to_change > MIN_RELATIVE_WIDTH * max(fabs(origin[0]), length_back):
+            stop = min(stop, to_change)
     if upcoming >= 0:
         stop = min(stop, offset(breaks[upcoming], origin, u))
     return stop, (change, upcoming, contact_sign)

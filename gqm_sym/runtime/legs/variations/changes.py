@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import accumulate
 from math import inf, log2
 from typing import NamedTuple
 
@@ -84,7 +85,7 @@ class Changes:
         self.law, self._problem = law_of(problem), problem
         self.followed, self.runs = len(runs), [run for run in runs if run.what != END_ASYMPTOTE]
         records = [run.record for run in self.runs]
-        begins = np.cumsum([0, *(record.size for record in records[:-1])])
+        begins = np.array([0, *accumulate(record.size for record in records[:-1])], dtype=np.int64)
         self._first = np.empty(2 * len(records) + 1, dtype=np.int64)
         panels = np.empty((sum(map(_most_panels, self.runs)), PANEL_COLUMNS))
         line = np.concatenate(records)

@@ -103,5 +103,11 @@ class ChartLaw(Law):
 
 
 def law_of(problem: Problem) -> Law:
-    """Return the law of the motion of a launch."""
-    return FormulaLaw(problem) if problem.formulas.chart is None else ChartLaw(problem)
+    """Return the law of the motion of a launch; along a curve with formulas it is kept with the run-time parameters."""
+    if problem.formulas.chart is not None:
+        return ChartLaw(problem)
+    kept = problem.p.conditions
+    known: Law | None = kept.get("law")
+    if known is None:
+        known = kept["law"] = FormulaLaw(problem)
+    return known
