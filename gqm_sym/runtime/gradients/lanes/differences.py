@@ -9,7 +9,6 @@ from fractions import Fraction
 from typing import Any
 
 from gqm_sym.runtime.double_double.recording import TapeNumber
-from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 
 
 class WithoutRuleError(Exception):
@@ -31,15 +30,15 @@ class Places:
 
     Parameters
     ----------
-    op : LaneRecorder
-        The tape, whose places have two coordinates, the shares of the way from a and from b.
-    ends : two numbers
-        a and b.
+    op : LaneRecorder or SeriesRecorder
+        The tape.
+    ends, shares : two numbers each
+        a and b, and the shares of the way from a and from b at the place.
     """
 
-    def __init__(self, op: LaneRecorder, ends: tuple[TapeNumber, TapeNumber]) -> None:
-        (a, b), (share, rest), half = ends, op.places, Fraction(1, 2)
-        self.op, self.whole = op, b - a
+    def __init__(self, op: Any, ends: tuple[TapeNumber, TapeNumber], shares: tuple[TapeNumber, TapeNumber]) -> None:
+        (a, b), (share, rest), half = ends, shares, Fraction(1, 2)
+        self.op, self.whole, self.shares = op, b - a, shares
         self.gaps = self.whole * share, self.whole * rest
         # The distances of a, of the place between them, and of b from the middle, which is known to more digits.
         self.middle, self.tilt = (a + b) * half, share - rest
@@ -212,7 +211,7 @@ class Differenced:
     @property
     def over_ends(self) -> TapeNumber:
         """The divided difference over the first and the last place."""
-        (left, right), (share, rest) = self.first, self.places.op.places
+        (left, right), (share, rest) = self.first, self.places.shares
         found: TapeNumber = left if is_same(left, right) else left * share + right * rest
         return found
 

@@ -95,11 +95,14 @@ def fill_lane_values(program, work, inputs, places, found):  # type: ignore[no-u
 
 @Inner
 def fill_place(program, work, places, lanes):  # type: ignore[no-untyped-def]
-    """Carry out what depends on the place in a program in double-double arithmetic."""
+    """Carry out what depends on the place in a program in double-double arithmetic.
+
+    The rows of ``places`` are two doubles and a bound on the error.
+    """
     address, operations, first, count, _ = program
     for i in range(lanes):
         at = count * ROW + i
-        work[at], work[at + LOW], work[at + ERROR] = places[0, i], places[1, i], 0.0
+        work[at], work[at + LOW], work[at + ERROR] = places[0, i], places[1, i], places[2, i]
     call_interpreter(address, operations, first, operations.shape[0], work, lanes)
 
 
@@ -109,7 +112,7 @@ def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: igno
 
     The turning points of the launches are improved by some steps of Newton's method.
     """
-    size, places = launches.shape[0], np.empty((2, BLOCK))
+    size, places = launches.shape[0], np.empty((3, BLOCK))
     for program, work in ((ends[0], works[0]), (ends[1], works[1])):
         for k in range(program[3]):
             fill_input(work, k, launches, k, size, lanes)
@@ -118,7 +121,7 @@ def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: igno
     wanted = moves[4].size
     for end in range(2):
         for i in range(lanes):
-            places[0, i], places[1, i] = launches[min(i, size - 1), count + end], 0.0
+            places[0, i], places[1, i], places[2, i] = launches[min(i, size - 1), count + end], 0.0, 0.0
         for number in range(steps):
             fill_place(step, works[0], places, lanes)
             for i in range(lanes):
@@ -127,6 +130,8 @@ def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: igno
                 last = fabs(works[0][at]) if number > 0 else 0.0  # the first step is far larger than what remains
                 target[to], target[to + LOW] = places[0, i], places[1, i]
                 target[to + ERROR] = works[0][at + ERROR] + UNIT * fabs(places[0, i]) + last
+        for i in range(lanes):  # the slope at a turning point of a small swing is small, and changes much
+            places[2, i] = target[(first + end) * ROW + i + ERROR]
         fill_place(moves, works[1], places, lanes)
         for j in range(wanted):
             source, to = moves[4][j], (first + 2 + end * wanted + j) * ROW

@@ -52,16 +52,17 @@ def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[n
 
 
 @Inner
-def judge_means(level, lanes, sums, means, states):  # type: ignore[no-untyped-def]
+def judge_means(level, lanes, sums, means, states, most):  # type: ignore[no-untyped-def]
     """Take the means of a level for orbits for which the rule has not converged; return whether there is none left.
 
-    The criteria are those of `evaluation.fill_means_of`.
+    The criteria are those of `evaluation.fill_means_of`. The next change is also at most the share ``most`` of each
+    mean.
     """
     is_done = True
     for i in range(lanes):
         if states[DONE, i] != 0.0:
             continue
-        change, rounding = 0.0, 0.0
+        change, rounding, condition = 0.0, 0.0, 0.0
         for j in range(sums.shape[0]):
             size = sums[j, 3, i]
             if not size <= sums[j, 2, i]:  # a smaller mean is zero within rounding
@@ -69,9 +70,13 @@ def judge_means(level, lanes, sums, means, states):  # type: ignore[no-untyped-d
                 change = step if not step <= change else change
                 share = sums[j, 2, i] / size
                 rounding = share if not share <= rounding else rounding
-            means[j, 0, i], means[j, 1, i] = sums[j, 0, i], sums[j, 1, i]
+            means[j, 0, i], means[j, 1, i], means[j, 2, i] = sums[j, 0, i], sums[j, 1, i], 0.0
+            if not size <= sums[j, 2, i]:
+                means[j, 2, i] = sums[j, 2, i]
+                condition = max(condition, size / fabs(sums[j, 0, i]) if sums[j, 0, i] != 0.0 else inf)
         before = states[CHANGE, i]
         has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
+        has_converged = has_converged and not change * change * condition > most * before
         if not rounding <= MAX_ROUNDING:
             states[DONE, i] = -1.0
         elif level > 1 and has_converged:
@@ -84,7 +89,8 @@ def judge_means(level, lanes, sums, means, states):  # type: ignore[no-untyped-d
 @entry(
     types.void(
         *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), PROGRAM, VECTOR),
-        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX)), MATRIX, types.boolean[::1], MATRIX),
+        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX, types.float64)),),
+        *(MATRIX, types.boolean[::1], MATRIX),
     ),
     nogil=True,
 )
@@ -99,9 +105,10 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         (`programs.end_programs`), with their work spaces; without results where the program needs no turning points.
     program, work
         The program of an orbit, with its work space.
-    rule : (int, (float, float), (4, k) array)
+    rule : (int, (float, float), (4, k) array, float)
         The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
-        and the table of shares (`nodes.trapezoidal_nodes`).
+        the table of shares (`nodes.trapezoidal_nodes`); and the largest error of a derivative as a share of it, in
+        addition to the share of the mean of absolute values.
     launches : (m, n) array
         The launches; the turning points, to the accuracy of doubles, are last.
     mirrored : (m,) array
@@ -109,8 +116,8 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
     found : (m, k) array
         Filled with the derivatives.
     """
-    count, (inputs, phase, nodes), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
-    sums, means, states = np.empty((count, MEAN, BLOCK)), np.empty((count, 2, BLOCK)), np.empty((2, BLOCK))
+    count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
+    sums, means, states = np.empty((count, MEAN, BLOCK)), np.empty((count, 3, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[0], BLOCK):
         stop = min(start + BLOCK, launches.shape[0])
         some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
@@ -121,9 +128,10 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         means[:, :, :], states[CHANGE, :], states[DONE, :] = 0.0, inf, 0.0
         for level in range(1, len(LEVELS) - 1):
             add_nodes(program, work, nodes, LEVELS[level], even, lanes, sums)
-            if judge_means(level, lanes, sums, means, states):
+            if judge_means(level, lanes, sums, means, states, most):
                 break
         for i in range(stop - start):
             for j in range(count):
                 value = multiply(means[j, 0, i], means[j, 1, i], phase[0], phase[1])[0]
-                found[start + i, j] = value if states[DONE, i] == 1.0 else nan
+                is_known = states[DONE, i] == 1.0 and not means[j, 2, i] > most * fabs(means[j, 0, i])
+                found[start + i, j] = value if is_known else nan

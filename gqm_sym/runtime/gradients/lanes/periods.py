@@ -1,12 +1,13 @@
 """Gradients of half periods and times of laps of many launches, by the fastest program that keeps its digits.
 
 About an axis of symmetry that is an arithmetic-geometric mean or an integral without divided differences. For other
-librations it is an integral in double precision, and for what remains and for laps one in double-double arithmetic.
+librations it is an integral in double precision, and for what remains and for laps one in double-double arithmetic,
+for the smallest swings with divided differences.
 """
 
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from math import nan
+from math import inf, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     fill_lane_gradients,
     fill_mean_gradients,
 )
+from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, UNEVEN, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
 from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients
@@ -50,6 +52,10 @@ MAX_CODED = 48
 
 # The ranges of phases of half periods and laps, as two doubles.
 PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.0)}
+
+# The largest error of a derivative of a small swing as a share of it. The values at its nodes all but cancel, because
+# its turning points move much farther than its half period changes.
+MAX_SHARE = 2.0**-56
 
 # A program without results.
 NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))
@@ -142,6 +148,7 @@ def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Ite
     uneven = swings if source.formulas.time_integrand is None else swings & ~about_axis
     yield Stage(uneven, swing_program, (source, rows), table, n, True)
     yield Stage(swings, libration_program, (source, rows), table, source.variables, True)
+    yield Stage(swings, exact_swing_program, (source, rows), table, n, True)
     laps = np.hstack([table[:, : source.variables], table[:, n : n + 1]])  # a lap begins at lam0
     for direction in (1, -1):
         chosen = ~swings & (launches.directions == direction)
@@ -189,7 +196,8 @@ def carried_out(
         elif stage.make is mean_program:
             fill_mean_gradients(*given, stage.inputs, some, answers)
         else:
-            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind)
+            max_error = MAX_SHARE if stage.make is exact_swing_program else inf
+            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind), max_error
             fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)

@@ -63,7 +63,7 @@ def swing_program(source: Source, wanted: tuple[int, ...]) -> LaneProgram | None
     n, count = source.parameters, len(wanted)
     op = LaneRecorder(n + 2 + 2 * count, 2)
     p, (a, b), moves = op.values[:n], op.values[n : n + 2], op.values[n + 2 :]
-    over = Places(op, (a, b))
+    over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
     except WithoutRuleError:

@@ -44,7 +44,9 @@ def carried_out(program: LaneProgram, run: Callable[..., None], p: float, ends: 
 def recorded(name: str) -> LaneProgram:
     """Return the program of a second divided difference, and of its derivatives with respect to p and both ends."""
     op = LaneRecorder(3, 2)
-    second = Places(op, (op.values[1], op.values[2])).of(FORMULAS[name], op.values[:1]).second
+    second = (
+        Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(FORMULAS[name], op.values[:1]).second
+    )
     moves = [[op.number(int(j == k)) for j in range(3)] for k in range(3)]
     return assemble(op, [second, *changes(op, second, op.values, moves)])
 
@@ -91,4 +93,4 @@ def test_formulas_without_a_rule(formula: Any) -> None:
     """Other functions are refused, so that other arithmetic is used."""
     op = LaneRecorder(3, 2)
     with pytest.raises(WithoutRuleError):
-        Places(op, (op.values[1], op.values[2])).of(formula, op.values[:1])
+        Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(formula, op.values[:1])

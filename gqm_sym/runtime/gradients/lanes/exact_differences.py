@@ -1,0 +1,75 @@
+"""Derivatives of half periods of small swings: the divided differences of `differences` in double-double arithmetic.
+
+About an equilibrium V**2 as a difference of potentials loses as many digits as the square of a swing's width has, and
+its derivatives lose as many again. As a divided difference it loses none, and the derivatives those by which the
+changes of both turning points exceed that of the half period.
+"""
+
+from fractions import Fraction
+from functools import lru_cache
+from math import factorial
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
+from gqm_sym.runtime.gradients.lanes.programs import total_change
+from gqm_sym.runtime.gradients.programs import Program, Source, assemble
+
+# The series of sin(t)/t in t**2, highest power first. For squares up to 1 its rest is below 1e-36.
+TERMS = tuple(Fraction((-1) ** k, factorial(2 * k + 1)) for k in reversed(range(16)))
+
+
+class SeriesRecorder(Recorder):
+    """A tape on which ``S(t**2) = sin(t)/t`` and its divided differences are series.
+
+    Attributes
+    ----------
+    squares : TapeNumber
+        The sum of the squares of all arguments of S. If it is above 1, the series may be too short.
+    """
+
+    def __init__(self, parameters: int) -> None:
+        super().__init__(parameters)
+        self.squares = self.number(0)
+
+    def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
+        """Record sin(t)/t, or sinh(t)/t for the sign -1."""
+        return self._series(sign * (t * t), sign * (t * t))[0]
+
+    def sinc_pair(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record S(p) + S(q) and S[p, q]."""
+        value, slope = self._series(p, q)
+        return 2 * value + (q - p) * slope, slope
+
+    def _series(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record S(p) and S[p, q]."""
+        self.squares = self.squares + p * p + q * q
+        value, slope = self.number(0), self.number(0)
+        for term in TERMS:
+            slope, value = slope * q + value, value * p + term
+        return value, slope
+
+
+@lru_cache(maxsize=64)
+def exact_swing_program(source: Source, wanted: tuple[int, ...]) -> Program | None:
+    """Return the derivatives of `programs.swing_program` as a program in double-double arithmetic.
+
+    The coordinate of a place is the square of the sine of half the phase angle. On orbits that are too wide for the
+    series the results are NaN. It is None if the formulas are too long, or contain an operation without a rule for
+    divided differences.
+    """
+    n, count = source.parameters, len(wanted)
+    op = SeriesRecorder(n + 2 + 2 * count)
+    p, (a, b), moves = op.values[:n], op.values[n : n + 2], op.values[n + 2 :]
+    over = Places(op, (a, b), (op.place, 1 - op.place))
+    try:
+        factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
+        by_inputs = gradient(op, ds / op.sqrt(2 * factor), [a, b, *p])
+        reach = op.sqrt(1 - op.squares)
+        moved = [
+            (moves[j], moves[count + j], *(op.number(int(i == k)) for i in range(n))) for j, k in enumerate(wanted)
+        ]
+        return assemble(op, [total_change(op, by_inputs, move) * (reach / reach) for move in moved])
+    except (WithoutRuleError, SolutionError):
+        return None
