@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.elementary import HALF_PI
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
@@ -121,6 +121,21 @@ def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def
             sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3] = high, low, error, size
 
 
+@Inlined
+def is_significant(j, size, error):  # type: ignore[no-untyped-def]
+    """Return whether a mean is not zero within its rounding. The first one, the time, never is zero."""
+    return j == 0 or not size <= error
+
+
+@Inlined
+def rounding_of(j, size, error, time):  # type: ignore[no-untyped-def]
+    """Return the rounding of a mean as a share of it; of one that is zero within its rounding, as a share of the time.
+
+    A derivative may vanish, but it must not count as zero because all of its digits are lost.
+    """
+    return error / (size if is_significant(j, size, error) else time)
+
+
 @Inner
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means` does."""
@@ -133,10 +148,10 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
         for j in range(found.shape[0]):
             size = sums[j, 3] / n
             high, low = sums[j, 0] / n, sums[j, 1] / n
-            if not size <= sums[j, 2] / n:  # a smaller mean is zero within rounding
+            if is_significant(j, size, sums[j, 2] / n):
                 step = fabs(add(high, low, -found[j, 0], -found[j, 1])[0]) / size
                 change = step if not step <= change else change
-                rounding = max(rounding, sums[j, 2] / (n * size))
+            rounding = max(rounding, rounding_of(j, size, sums[j, 2] / n, sums[0, 3] / n))
             found[j, 0], found[j, 1], found[j, 2], found[j, 3] = high, low, sums[j, 2] / n, size
         has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
         if level > 1 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
@@ -223,7 +238,7 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
             change = 0.0 if panels > MIN_PANELS else inf
             for j in range(found.shape[0]):
                 size = now[j, 3] + found[j, 3]
-                if panels > MIN_PANELS and not size <= now[j, 2]:
+                if panels > MIN_PANELS and is_significant(j, size, now[j, 2]):
                     step = max(0.0, fabs(add(now[j, 0], now[j, 1], -before[j, 0], -before[j, 1])[0]) - now[j, 2]) / size
                     change = step if not step <= change else change
                 before[j, 0], before[j, 1] = now[j, 0], now[j, 1]
@@ -233,8 +248,7 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
             found[j, 2], found[j, 3] = found[j, 2] + now[j, 2], found[j, 3] + now[j, 3]
     rounding, whole = 0.0, (edges[edges.size - 1], 2.0 * HALF_PI[1] if kind == LIBRATION else 0.0)
     for j in range(found.shape[0]):
-        if not found[j, 3] <= found[j, 2]:
-            rounding = max(rounding, found[j, 2] / found[j, 3])
+        rounding = max(rounding, rounding_of(j, found[j, 3], found[j, 2], found[0, 3]))
         found[j, 0], found[j, 1] = divide(found[j, 0], found[j, 1], whole[0], whole[1])
         found[j, 2], found[j, 3] = found[j, 2] / whole[0], found[j, 3] / whole[0]
     return edges.size - 1 if rounding <= MAX_ROUNDING else LOST_DIGITS

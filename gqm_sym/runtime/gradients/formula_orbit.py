@@ -165,15 +165,16 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return found or (*self._multiprecision.means[:2], False)
 
     def _means_of(self, program: Program, inputs: Array, nodes: Array) -> tuple[Array, int, bool] | None:
-        """Return `_means` of any program in double-double arithmetic; None if digits are lost."""
+        """Return `_means` of any program whose first result is the rate of time, in double-double arithmetic; None if
+        digits are lost.
+        """
         found = np.zeros((program.outputs.size, MEAN))
         n = fill_means(program.operands, program.work, inputs, nodes, found)
         if n == NOT_SMOOTH:
             kind = CIRCULATION if self.direction else LIBRATION
-            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found)
-            if n > 0:
-                return found, 0, True
-            raise SolutionError(UNDECIDED)
+            if fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found) <= 0:
+                raise SolutionError(UNDECIDED)
+            return found, 0, True
         return None if n == LOST_DIGITS else (found, n, True)
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
@@ -186,7 +187,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         found = None
         if self._orbit is not None:
             found = self._means_of(program, *self._rule_with(np.empty(0) if self.direction else self._ends_by(turns)))
-        return self._over_phase(found[0] if found else self._in_multiprecision(program, turns).means[0])
+        return self._over_phase(found[0] if found else self._in_multiprecision(program, turns).means[0])[1:]
 
     def _integrals(self, first: int, count: int) -> Array:
         """Return the integrals of results over a half period, or over a lap."""

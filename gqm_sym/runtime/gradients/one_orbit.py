@@ -64,7 +64,7 @@ def fill_period_gradient(programs, works, kind, parameters, launch, nodes, found
         set_variable(variables, k, parameters[0, k], parameters[1, k])
     for k in range(2):
         set_variable(variables, n + k, launch[2 * k], launch[2 * k + 1])
-    inputs, means = np.zeros((3, program[3])), np.zeros((count, MEAN))
+    inputs, means = np.zeros((3, program[3])), np.zeros((1 + count, MEAN))
     if kind == LIBRATION:
         fill_turns(programs[0], works[0], variables, (launch[4], launch[5]), inputs)
     else:
@@ -73,12 +73,13 @@ def fill_period_gradient(programs, works, kind, parameters, launch, nodes, found
     if fill_means_of(program, work, inputs, nodes, means) <= 0:
         return False
     for k in range(count):
-        if fabs(means[k, 0]) <= means[k, 2]:  # within the rounding of double-double arithmetic
+        high, low, error, _ = means[1 + k]
+        if fabs(high) <= error:  # within the rounding of double-double arithmetic
             found[k] = 0.0
         elif kind == LIBRATION:
-            found[k] = multiply(means[k, 0], means[k, 1], 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])[0]
+            found[k] = multiply(high, low, 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])[0]
         else:
-            found[k] = means[k, 0] + means[k, 1]
+            found[k] = high + low
     return True
 
 

@@ -127,7 +127,7 @@ class PassageChanges:
         return self.launch if self._near is None else self.turn
 
     def _program(self, a: Place, b: Place) -> tuple[Program, Array]:
-        """Return the program of the derivatives of the time per phase from a place to a later one, and its inputs."""
+        """Return the program of the time per phase from a place to a later one and its derivatives, and its inputs."""
         program = libration_program(self.source, tuple(range(self.source.variables - 1)))
         places = np.array([[a.high, b.high], [a.low, b.low], [0.0, 0.0]])
         inputs = np.hstack([self.variables, places, a.moves[:, :-1], b.moves[:, :-1]])
@@ -144,7 +144,7 @@ class PassageChanges:
         if fill_panel_means(*given) <= 0:
             raise SolutionError(UNDECIDED)
         slopes = PI * np.where(np.abs(found[:, 0]) <= found[:, 2], 0.0, found[:, 0] + found[:, 1])
-        return np.append(slopes, 0.0)
+        return np.append(slopes[1:], 0.0)  # without the time itself
 
     def _span(self, distance: float) -> float:
         """Return how far from the base a series reaches that serves a place at this distance.
@@ -181,12 +181,12 @@ class PassageChanges:
             lam, width = a.high + (b.high - a.high) * share, b.high - a.high
             path = path_rows(self.source.formulas, self._parameters, self.source.mass, lam)
             arcs = 0.5 * width * np.sin(phi) * path.ds[1:-1]
-            samples = np.vstack([rates, arcs]).reshape(-1, panels, rule.size)
+            samples = np.vstack([rates[1:], arcs]).reshape(-1, panels, rule.size)
             sizes = np.abs(samples).max(axis=(1, 2))
-            if not np.isfinite(sizes).all():
+            if not (np.isfinite(sizes).all() and errors[0].max() <= MAX_TAIL * np.abs(rates[0]).min()):
                 return None
             tails = np.abs((samples @ to_legendre())[:, :, -2:]).max(axis=(1, 2))
-            rounding = np.append(errors.max(axis=1), np.zeros(len(arcs)))
+            rounding = np.append(errors[1:].max(axis=1), np.zeros(len(arcs)))
             if (tails <= MAX_TAIL * sizes + rounding).all():
                 return PanelSeries(edges, samples)
             panels *= 2

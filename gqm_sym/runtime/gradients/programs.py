@@ -225,7 +225,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives with respect to
     all variables, V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam with respect to the
     run-time parameters at the same place. If variables are ``wanted``, there are derivatives of the turning points with
-    respect to these alone, and the results are the derivatives of dt/dphi with respect to them.
+    respect to these alone, and the results are dt/dphi and its derivatives with respect to them.
     """
     n, rows = source.variables, range(source.variables) if wanted is None else wanted
     op = Recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
@@ -246,7 +246,7 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:
-        return assemble(op, rates[1:])
+        return assemble(op, rates)
     return assemble(op, [*rates, *powers, *ds_partials])
 
 
@@ -272,7 +272,7 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
     """
     op, lap, ds, v2, rate = lap_rate(source, direction)
     if wanted is not None:
-        return assemble(op, gradient(op, rate, [op.values[k] for k in wanted]))
+        return assemble(op, [rate, *gradient(op, rate, [op.values[k] for k in wanted])])
     outputs: list[Any] = []
     for quantity in (rate, rate * v2 * source.one_plus_beta(op), lap * ds, lap):
         outputs += [quantity, *gradient(op, quantity, op.values[: source.variables])]

@@ -28,7 +28,7 @@ def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=16)
 def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
-    """Return the program of the second derivatives of dt/dphi at the same phase angle, with respect to the pairs of
+    """Return the program of dt/dphi and its second derivatives at the same phase angle, with respect to the pairs of
     variables in ``rows``.
 
     The inputs are those of `libration_program`, where the first derivatives of each turning point are followed by the
@@ -51,7 +51,7 @@ def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
     longer = [part + ds_slope * move for part, move in zip([*ds_partials, *by_launch], moved, strict=False)]
     log_rates = [wider[k] + longer[k] / ds - faster[k] / (2 * half) for k in range(n)]
     second = {k: [gradient(op, q[k], [lam, *op.values[:n]]) for q in (faster, longer)] for k in rows}
-    outputs = []
+    outputs = [rate]
     for k, (i, j) in enumerate(pairs, start=n):
         by_half, by_ds = (by[1 + j] + by[0] * moved[j] for by in second[i])
         by_half, by_ds = by_half + half_slope * moved[k], by_ds + ds_slope * moved[k]
@@ -63,10 +63,10 @@ def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
 
 @lru_cache(maxsize=16)
 def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
-    """Return the program of the second derivatives of dt/dshare at the same share of a lap, with respect to the pairs
+    """Return the program of dt/dshare and its second derivatives at the same share of a lap, with respect to the pairs
     of variables in ``rows``.
     """
     op, *_, rate = lap_rate(source, direction)
     first = gradient(op, rate, op.values[: source.variables])
     second = {i: gradient(op, first[i], op.values[: source.variables]) for i in rows}
-    return assemble(op, [second[i][j] for i, j in pairs_of(rows)])
+    return assemble(op, [rate, *(second[i][j] for i, j in pairs_of(rows))])

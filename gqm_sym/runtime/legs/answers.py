@@ -29,6 +29,7 @@ from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
     ENDING,
+    FIRST_STEP,
     FROM_REST,
     HORIZON,
     LAM0,
@@ -104,9 +105,9 @@ MAX_TURNS = 20000
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
 
-# With friction, a leg that is shorter than this share of its place loses digits of its time: those of the force, which
-# is a difference.
-SLIDING_SHARE = 2.0**-11
+# With friction, a leg that is shorter than this share of its place, and of the first step of a search, loses digits of
+# its time: those of the force, which is a difference.
+SLIDING_SHARE = 2.0**-15
 
 # Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
 # without bound there, as at a cusp.
@@ -277,7 +278,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        if dissipation.friction and slides_little(record, body[LEAST_SIZE]):
+        if dissipation.friction and slides_little(record, body):
             break
         findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
@@ -291,17 +292,12 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
 
 
 @Inner
-def is_short(record, share, least_size):  # type: ignore[no-untyped-def]
-    """Return whether a leg is shorter than a share of the place where it ends."""
-    return fabs(record[END] - record[START]) < share * max(fabs(record[END]), least_size)
-
-
-@Inner
-def slides_little(record, least_size):  # type: ignore[no-untyped-def]
+def slides_little(record, body):  # type: ignore[no-untyped-def]
     """Return whether a leg from rest is so short that, with friction, it is followed by the distance from where
     friction balances the other forces.
     """
-    return record[START_V2] == 0.0 and is_short(record, SLIDING_SHARE, least_size)
+    width, size = fabs(record[END] - record[START]), max(fabs(record[END]), body[LEAST_SIZE])
+    return record[START_V2] == 0.0 and width < SLIDING_SHARE * min(size, body[FIRST_STEP])
 
 
 @Inner
@@ -309,8 +305,8 @@ def is_tiny(record, least_size):  # type: ignore[no-untyped-def]
     """Return whether a leg is so short that the next one may have to be followed by the distance from an equilibrium,
     or cannot be followed at all.
     """
-    largest = max(fabs(record[START]), fabs(record[END]))
-    return is_short(record, SMALL_SHARE, least_size) or largest < LEAST_SWING
+    start, end = record[START], record[END]
+    return fabs(end - start) < SMALL_SHARE * max(fabs(end), least_size) or max(fabs(start), fabs(end)) < LEAST_SWING
 
 
 @Inner

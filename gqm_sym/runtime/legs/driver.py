@@ -318,8 +318,9 @@ class Driver:
         """
         if self._frame is not None or not self.dissipation.friction:
             return False
-        share = SLIDING_SHARE * max(abs(float(record[END])), self.number(LEAST_SIZE))
-        is_short = what in (END_TOO_MANY_PANELS, END_TOO_NARROW) or abs(float(record[END] - record[START])) < share
+        size = min(max(abs(float(record[END])), self.number(LEAST_SIZE)), self.number(FIRST_STEP))
+        is_slide = abs(float(record[END] - record[START])) < SLIDING_SHARE * size
+        is_short = what in (END_TOO_MANY_PANELS, END_TOO_NARROW) or is_slide
         if record[START_V2] or not is_short:
             return False
         line, after = self.body[0], self.body[0].copy()

@@ -53,7 +53,7 @@ class SeriesRecorder(Recorder):
 
 @lru_cache(maxsize=64)
 def exact_swing_program(source: Source, wanted: tuple[int, ...]) -> Program | None:
-    """Return the derivatives of `programs.swing_program` as a program in double-double arithmetic.
+    """Return dt/dphi and the derivatives of `programs.swing_program` as a program in double-double arithmetic.
 
     The coordinate of a place is the square of the sine of half the phase angle. On orbits that are too wide for the
     series the results are NaN. It is None if the formulas are too long, or contain an operation without a rule for
@@ -65,11 +65,12 @@ def exact_swing_program(source: Source, wanted: tuple[int, ...]) -> Program | No
     over = Places(op, (a, b), (op.place, 1 - op.place))
     try:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
-        by_inputs = gradient(op, ds / op.sqrt(2 * factor), [a, b, *p])
-        reach = op.sqrt(1 - op.squares)
+        rate = ds / op.sqrt(2 * factor)
+        by_inputs, reach = gradient(op, rate, [a, b, *p]), op.sqrt(1 - op.squares)
         moved = [
             (moves[j], moves[count + j], *(op.number(int(i == k)) for i in range(n))) for j, k in enumerate(wanted)
         ]
-        return assemble(op, [total_change(op, by_inputs, move) * (reach / reach) for move in moved])
+        changes = [total_change(op, by_inputs, move) for move in moved]
+        return assemble(op, [result * (reach / reach) for result in (rate, *changes)])
     except (WithoutRuleError, SolutionError):
         return None

@@ -10,7 +10,15 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS
-from gqm_sym.runtime.gradients.evaluation import MAX_NEXT_CHANGE, MAX_RATIO, MAX_ROUNDING, MEAN, PROGRAM
+from gqm_sym.runtime.gradients.evaluation import (
+    MAX_NEXT_CHANGE,
+    MAX_RATIO,
+    MAX_ROUNDING,
+    MEAN,
+    PROGRAM,
+    is_significant,
+    rounding_of,
+)
 from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs
 
 # The number of Newton steps to the turning points, starting from doubles.
@@ -65,13 +73,13 @@ def judge_means(level, lanes, sums, means, states, most):  # type: ignore[no-unt
         change, rounding, condition = 0.0, 0.0, 0.0
         for j in range(sums.shape[0]):
             size = sums[j, 3, i]
-            if not size <= sums[j, 2, i]:  # a smaller mean is zero within rounding
+            if is_significant(j, size, sums[j, 2, i]):
                 step = fabs(add(sums[j, 0, i], sums[j, 1, i], -means[j, 0, i], -means[j, 1, i])[0]) / size
                 change = step if not step <= change else change
-                share = sums[j, 2, i] / size
-                rounding = share if not share <= rounding else rounding
+            share = rounding_of(j, size, sums[j, 2, i], sums[0, 3, i])
+            rounding = share if not share <= rounding else rounding
             means[j, 0, i], means[j, 1, i], means[j, 2, i] = sums[j, 0, i], sums[j, 1, i], 0.0
-            if not size <= sums[j, 2, i]:
+            if is_significant(j, size, sums[j, 2, i]):
                 means[j, 2, i] = sums[j, 2, i]
                 condition = max(condition, size / fabs(sums[j, 0, i]) if sums[j, 0, i] != 0.0 else inf)
         before = states[CHANGE, i]
@@ -104,7 +112,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         The programs of the Newton step to a turning point, and of the derivatives of a turning point
         (`programs.end_programs`), with their work spaces; without results where the program needs no turning points.
     program, work
-        The program of an orbit, with its work space.
+        The program of an orbit, whose first result is dt/dphi, and its work space.
     rule : (int, (float, float), (4, k) array, float)
         The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
         the table of shares (`nodes.trapezoidal_nodes`); and the largest error of a derivative as a share of it, in
@@ -117,7 +125,8 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         Filled with the derivatives.
     """
     count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
-    sums, means, states = np.empty((count, MEAN, BLOCK)), np.empty((count, 3, BLOCK)), np.empty((2, BLOCK))
+    # The time itself is never zero, so that its rounding shows where all digits of derivatives are lost.
+    sums, means, states = np.empty((1 + count, MEAN, BLOCK)), np.empty((1 + count, 3, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[0], BLOCK):
         stop = min(start + BLOCK, launches.shape[0])
         some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
@@ -132,6 +141,6 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
                 break
         for i in range(stop - start):
             for j in range(count):
-                value = multiply(means[j, 0, i], means[j, 1, i], phase[0], phase[1])[0]
-                is_known = states[DONE, i] == 1.0 and not means[j, 2, i] > most * fabs(means[j, 0, i])
-                found[start + i, j] = value if is_known else nan
+                high, low, error = means[1 + j, 0, i], means[1 + j, 1, i], means[1 + j, 2, i]
+                is_known = states[DONE, i] == 1.0 and not error > most * fabs(high)
+                found[start + i, j] = multiply(high, low, phase[0], phase[1])[0] if is_known else nan

@@ -142,7 +142,7 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
 
 @lru_cache(maxsize=64)
 def exact_axis_program(orbits: Orbits) -> Program | None:
-    """Return the derivatives of `axis_program` as a program in double-double arithmetic.
+    """Return dt/dphi and the derivatives of `axis_program` as a program in double-double arithmetic.
 
     The coordinate of a place is the square of the sine of half the phase angle (`programs.libration_program`).
     """
@@ -154,7 +154,7 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
     share, tilt = op.place, 1 - 2 * op.place
     rate = op.sqrt(formula(op, half, tilt * tilt, 4 * (share * (1 - share)), p)[0])
     by_inputs = gradient(op, rate, [half, *p])
-    return in_double_double(op, [total_change(op, by_inputs, move) for move in moves])
+    return in_double_double(op, [rate, *(total_change(op, by_inputs, move) for move in moves)])
 
 
 @lru_cache(maxsize=64)
