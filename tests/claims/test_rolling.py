@@ -309,3 +309,17 @@ def test_a_ball_lifts_off_long_before_its_formulas_overflow(tmp_path: Path) -> N
     assert module.solve(-0.5, 1.5, -1, t_max=0.5).lam(0.5) == pytest.approx(motion.lam(0.5), rel=EARLY)
     with pytest.raises(SolutionError, match="not finite"):
         module.solve(-0.5, 1.5, -1)
+
+
+def test_sweeps_refuse_a_radius_on_a_track_with_corners_too(tmp_path: Path) -> None:
+    """They went on as if the centre of the body jumped from one plane to the next."""
+    track = gqm.Curve.sampled([(-1, 1), (0, 0), (2, 1)], kind="linear")
+    module = gqm.build(
+        gqm.derive(track, gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")), name="cornered", folder=tmp_path
+    )
+    with pytest.raises(LaunchError, match="corner"):
+        module.solve(0.3)
+    for quantity in ("half_period", "t_end", "v_max"):
+        swept = module.sweep(quantity, [0.3, np.nan, 99.0])
+        assert np.isnan(swept.values).all()
+        assert swept.status.tolist() == [6, 3, 4]

@@ -125,6 +125,8 @@ def sweep(
             run_in_threads(work, some.status.size, least)
             if asked is None and group.corners.size:
                 some.status[np.broadcast_to(rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
+                if formulas.rolling_radius:  # as `rolling.check_launch` does
+                    refuse(some)
             if chosen is not None:
                 answers.put(chosen, some)
     if domain and (far := _too_far(columns[0], domain[2])).any():
@@ -135,6 +137,12 @@ def sweep(
         values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
         answers.route[k] = quantities.SOLVE
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
+
+
+def refuse(answers: Answers) -> None:
+    """Refuse all launches that are possible as such."""
+    refused = ~np.isin(answers.status, (quantities.NOT_FINITE, quantities.OUTSIDE_DOMAIN))
+    answers.values[refused], answers.status[refused] = nan, quantities.REFUSED
 
 
 def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
