@@ -306,7 +306,7 @@ class Driver:
             self.ending = "asymptote"
         elif what == END_ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
-        elif not in_frame:
+        elif not in_frame and not self.dissipation.friction:  # with friction it slides (`_slides_nearby`)
             turns_nearby = what == END_TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
             creeps = what == END_PAUSE and self.number(STEP) <= CREEPING_SHARE * self.number(FIRST_STEP)
             if turns_nearby or creeps:
