@@ -109,7 +109,9 @@ def sweeping() -> list[tuple[str, float]]:
     scratch = rows.Scratch(count, held, chosen, chosen.copy(), work)
     answers = quantities.Answers(np.zeros((n, 1)), status, status.copy())
 
-    unknown = wells.Wells(np.zeros(0, dtype=np.int64), nan, np.empty((count, rows.LANES)), np.empty((6, rows.LANES)))
+    params, of_wells = np.empty((count, rows.LANES)), np.empty((8, rows.LANES))
+    no_side = wells.WellSide(np.zeros(0, dtype=np.int8), np.full(1, nan), 1.0, params, of_wells)
+    unknown = wells.Wells(no_side, no_side, no_side)
 
     @njit
     def search(s: Any, start: Any, p: Any, known: Any, monotone: bool, work: Any) -> None:
