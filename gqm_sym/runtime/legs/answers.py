@@ -301,12 +301,16 @@ def slides_little(record, body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_tiny(record, least_size):  # type: ignore[no-untyped-def]
-    """Return whether a leg is so short that the next one may have to be followed by the distance from an equilibrium,
-    or cannot be followed at all.
+def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
+    """Return whether a leg is so short that the next one, or with friction this one, may have to be followed by the
+    distance from an equilibrium, or cannot be followed at all.
     """
     start, end = record[START], record[END]
-    return fabs(end - start) < SMALL_SHARE * max(fabs(end), least_size) or max(fabs(start), fabs(end)) < LEAST_SWING
+    if max(fabs(start), fabs(end)) < LEAST_SWING:
+        return True
+    if dissipation.friction:
+        return slides_little(record, body)
+    return fabs(end - start) < SMALL_SHARE * max(fabs(end), body[LEAST_SIZE])
 
 
 @Inner
@@ -346,7 +350,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         count += 1
         record[USED] = size
         body[PANEL_COUNT] += 1.0 + record[AHEAD] + record[BACK]
-        body[STATUS] = 1.0 if is_tiny(record, body[LEAST_SIZE]) else 0.0
+        body[STATUS] = 1.0 if is_tiny(dissipation, record, body) else 0.0
         if what in (END_TURN, END_REST):
             pack(record)
         body[LAST_AT] = used

@@ -18,7 +18,6 @@ from gqm_sym.runtime.legs.answers import (
     MAX_PAUSES,
     MAX_TURNS,
     RUN_AGAIN,
-    SLIDING_SHARE,
     Track,
     drive_along,
 )
@@ -245,13 +244,13 @@ class Driver:
             frame.move(record, 1)
             self._place_in_frame = float(record[END])
         heading, at_limit = int(record[HEADING]), frame is not None and what == END_LIMIT
-        # A frame with friction serves one leg.
-        is_over = at_limit or (what == END_TURN and self.dissipation.friction and not self.number(ENDING))
         is_inside = abs(self.body[0, PLACE]) < self._reach_in_frame
-        if frame is not None and frame.breaks.size and is_inside:
+        if frame is not None and self.dissipation.friction and what == END_TURN and not self.number(ENDING):
+            self._leave_frame(record)  # with friction it serves one leg
+        elif frame is not None and frame.breaks.size and is_inside:
             self._limit_frame(frame)
             self.body[0, ENDING] = 0.0 if at_limit else self.body[0, ENDING]
-        elif frame is not None and is_over:
+        elif at_limit:
             self._leave_frame(record)
         if self._slides_nearby(what, record):
             self._store(*self._completed(*self._drive(1)))
@@ -318,10 +317,8 @@ class Driver:
         """
         if self._frame is not None or not self.dissipation.friction:
             return False
-        size = min(max(abs(float(record[END])), self.number(LEAST_SIZE)), self.number(FIRST_STEP))
-        is_slide = abs(float(record[END] - record[START])) < SLIDING_SHARE * size
-        is_short = what in (END_TOO_MANY_PANELS, END_TOO_NARROW) or is_slide
-        if record[START_V2] or not is_short:
+        failed = what in (END_TOO_MANY_PANELS, END_TOO_NARROW)
+        if record[START_V2] or not (failed or self.number(STATUS)):
             return False
         line, after = self.body[0], self.body[0].copy()
         line[[PLACE, PLACE_LOW, LAPS, DIRECTION]] = record[[START, START_LOW, LAPS_BEFORE, HEADING]]

@@ -229,7 +229,7 @@ def frame_near(
         return None
     # The distance from an unstable equilibrium needs more digits than places of that size have.
     of_places = max(abs(middle), float(line[LEAST_SIZE]) if frame.is_stable else 0.0)
-    if not frame.size((place - middle) + (place_low - low), v2) <= (min(SMALL_SHARE * of_places, RANGE_SHARE * size)):
+    if not frame.size((place - middle) + (place_low - low), v2) <= min(SMALL_SHARE * of_places, RANGE_SHARE * size):
         return None
     return frame._replace(error=fit.noise / abs(frame.slope) + ULP * abs(middle))
 
