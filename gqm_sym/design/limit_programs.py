@@ -3,16 +3,15 @@ track.
 """
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.double_double.recording import Recorder
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.evaluation import values
-from gqm_sym.runtime.gradients.programs import Program, assemble
+from gqm_sym.runtime.gradients.programs import Program, with_derivatives
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 
 # The number of coordinates of a point of a track: x, z, their first derivatives, and their second ones.
@@ -28,7 +27,7 @@ def shape_program(formulas: ExactFormulas | ExactLaw, parameters: int) -> Progra
     arguments = op, op.place, op.values
     x, z, curvature = (op.number(f(*arguments)) for f in (formulas.x, formulas.z, formulas.kappa))
     ((across,), (rise,)) = (gradient(op, q, [op.place]) for q in (x, z))
-    return _with_derivatives(op, [z, rise / across, curvature], [op.place, *op.values])
+    return with_derivatives(op, [z, rise / across, curvature], [op.place, *op.values])
 
 
 @lru_cache(maxsize=64)
@@ -46,12 +45,7 @@ def track_program(source: ChartSource) -> Program:
     value, by_x, by_z = map(op.number, source.potential(op, x, z, p))
     load = source.one_plus_beta(op) * (by_z * dx - by_x * dz) / speed
     force = p[source.mass] * (curvature * (energy - 2 * value) + load)
-    return _with_derivatives(op, [z, dz / dx, curvature, force], [*op.places, energy])
-
-
-def _with_derivatives(op: Recorder, quantities: list[TapeNumber], variables: list[Any]) -> Program:
-    """Return the program of quantities, each followed by its derivatives."""
-    return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, variables))])
+    return with_derivatives(op, [z, dz / dx, curvature, force], [*op.places, energy])
 
 
 def rows_at(program: Program, inputs: Array, places: Array) -> Array:

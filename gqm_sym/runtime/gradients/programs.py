@@ -204,6 +204,11 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
     return Program(codes, len(before), inputs, np.array([slots[k] for k in wanted], dtype=np.int64), work, constants)
 
 
+def with_derivatives(op: Recorder, quantities: Sequence[Any], variables: Sequence[Any]) -> Program:
+    """Return the program of quantities, each followed by its derivatives."""
+    return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, variables))])
+
+
 @lru_cache(maxsize=64)
 def turning_point_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
     """Return the program of the Newton step from the place to a turning point, and of the turning point's derivatives
@@ -272,11 +277,9 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
     """
     op, lap, ds, v2, rate = lap_rate(source, direction)
     if wanted is not None:
-        return assemble(op, [rate, *gradient(op, rate, [op.values[k] for k in wanted])])
-    outputs: list[Any] = []
-    for quantity in (rate, rate * v2 * source.one_plus_beta(op), lap * ds, lap):
-        outputs += [quantity, *gradient(op, quantity, op.values[: source.variables])]
-    return assemble(op, outputs)
+        return with_derivatives(op, [rate], [op.values[k] for k in wanted])
+    quantities = rate, rate * v2 * source.one_plus_beta(op), lap * ds, lap
+    return with_derivatives(op, quantities, op.values[: source.variables])
 
 
 @lru_cache(maxsize=64)
@@ -297,7 +300,7 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
         quantities.append(formulas.y(*arguments))
     if formulas.load_along_curvature is not None:
         quantities.append(m * m * formulas.load_along_curvature(*arguments))
-    return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, [*op.values, op.place]))])
+    return with_derivatives(op, quantities, [*op.values, op.place])
 
 
 @lru_cache(maxsize=64)
@@ -309,7 +312,7 @@ def range_program(domain: Callable[..., Any], parameters: int) -> Program:
     """
     op = Recorder(parameters)
     numbers = [0 if number is None else number for number in domain(op, op.values)]
-    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
+    return with_derivatives(op, numbers, op.values)
 
 
 def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, w: Any) -> Any:

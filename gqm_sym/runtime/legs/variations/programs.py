@@ -9,7 +9,7 @@ from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
 from gqm_sym.runtime.gradients.lanes.assembly import assemble as assemble_lanes
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.programs import Program, assemble, load_per_mass
+from gqm_sym.runtime.gradients.programs import Program, assemble, load_per_mass, with_derivatives
 from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
 
 
@@ -51,7 +51,7 @@ def load_program(law: ExactLaw, parameters: int) -> Program:
     load = load_per_mass(op, law, lam, w)
     by_place, by_w = gradient(op, load, [lam, w])
     load_slope = by_place + by_w * slope
-    return assemble(op, [load_slope, *gradient(op, load_slope, [lam, w])])
+    return with_derivatives(op, [load_slope], [lam, w])
 
 
 def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
@@ -67,7 +67,7 @@ def force_program(law: ExactLaw, parameters: int) -> Program:
     those of `law_program`.
     """
     op, _, slope = _law(law, parameters)
-    return assemble(op, [slope, *gradient(op, slope, [op.place])])
+    return with_derivatives(op, [slope], [op.place])
 
 
 class ChartForces(NamedTuple):
