@@ -91,7 +91,7 @@ def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
     each, n = pendulum.MODEL.batch, rows.BATCH
     assert each is not None
-    fns, held = each.addresses(), (each.orbit_rows, each.integrand_rows)
+    fns, held = each.addresses(), (each.orbit_rows, each.integrand_rows, -1)
     start_search, search_zeros, start_search_behind, set_ends, prove = (
         getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "set_ends", "prove")
     )
