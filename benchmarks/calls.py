@@ -5,13 +5,15 @@ are for reading, not for passing. ``make bench`` puts them into ``docs/benchmark
 """
 
 from math import inf, nan
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-from measure import least, readable
-from numba import njit
+from measure import least, on_one_core, readable
 
 import generated.cubic_coulomb as friction
+import generated.double_well as double_well
+import generated.parabola as parabola
 import generated.pendulum as pendulum
 from gqm_sym.runtime.inversion import table
 from gqm_sym.runtime.launch.problem import bind
@@ -23,9 +25,7 @@ from gqm_sym.runtime.legs.body import launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS, TIME_FROM_END
 from gqm_sym.runtime.legs.leg_segments import Run, read_panels
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
-from gqm_sym.runtime.quadrature import time_panels, trapezoid
-from gqm_sym.runtime.sweep import quantities
-from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points, wells
+from gqm_sym.runtime.quadrature import time_panels
 
 
 def conservative() -> list[tuple[str, float]]:
@@ -88,74 +88,25 @@ def dissipative() -> list[tuple[str, float]]:
 
 
 def sweeping() -> list[tuple[str, float]]:
-    """Parts of an orbit's share of a sweep over pendulums, on one core."""
-    each, n = pendulum.MODEL.batch, rows.BATCH
-    assert each is not None
-    fns, held = each.addresses(), (each.orbit_rows, each.integrand_rows)
-    start_search, search_zeros, start_search_behind, set_ends, prove = (
-        getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "set_ends", "prove")
-    )
-    by_trapezoid, by_agm = times.times_by_trapezoid, times.half_periods_by_agm
-    start = np.zeros((rows.ROWS, n))
-    start[rows.INDEX], start[rows.SEARCH_DIRECTION] = np.arange(n), 1.0
-    start[rows.LAUNCH_PLACE] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
-    p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
-    count, given = len(p), np.append(p.reshape(-1), np.zeros(max(held) * n))
-    known, work = (
-        np.repeat([[-inf], [inf], [2 * np.pi], [-np.pi / 2], [-6.1e-17], [np.pi]], n, axis=1),
-        np.empty((13, n)),
-    )
-    chosen, status = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int8)
-    scratch = rows.Scratch(count, held, chosen, chosen.copy(), work)
-    answers = quantities.Answers(np.zeros((n, 1)), status, status.copy())
+    """Measure an orbit's share of sweeps, on one core: the rows differ in what compiled code has to find."""
+    launches, released = 4096, (-np.pi / 2 + 0.05, -np.pi / 2 + 2.5)
 
-    params, of_wells = np.empty((count, rows.LANES)), np.empty((8, rows.LANES))
-    no_side = wells.WellSide(np.zeros(0, dtype=np.int8), np.full(1, nan), 1.0, params, of_wells)
-    unknown = wells.Wells(no_side, no_side, no_side)
+    def share(module: ModuleType, quantity: str, ends: tuple[float, float], v0: float = 0.0) -> float:
+        lam0 = np.random.default_rng(0).uniform(*ends, launches)
+        swept = module.sweep(quantity, lam0, v0)
+        assert swept.route_counts() == {"batch": launches}
+        return least(on_one_core(lambda: module.sweep(quantity, lam0, v0)), 3, 50) / launches
 
-    @njit
-    def search(s: Any, start: Any, p: Any, known: Any, monotone: bool, work: Any) -> None:
-        s[:] = start
-        start_search(fns, n, s, p, known, monotone, unknown, work)
-        search_zeros(fns, n, s, p, work)
-        start_search_behind(fns, n, s, p, monotone, work)
-        search_zeros(fns, n, s, p, work)
-        set_ends(n, s)
-
-    @njit
-    def proof(s: Any, found: Any, p: Any, work: Any) -> None:
-        s[:] = found
-        prove(fns, 0, True, batches.FEW_PIECES_OF_HALF, n, s, p, work)
-
-    @njit
-    def trapezoidal(orbits: Any, found: Any, given: Any, scratch: Any, answers: Any) -> None:
-        orbits.rows[:], orbits.params[:] = found, given
-        by_trapezoid(fns, trapezoid.LIBRATION, True, orbits, scratch, quantities.HALF_PERIOD, answers)
-
-    @njit
-    def mean(orbits: Any, found: Any, scratch: Any, answers: Any) -> None:
-        orbits.rows[:] = found
-        by_agm(fns, orbits, scratch, quantities.HALF_PERIOD, answers)
-
-    s, flat = start.copy(), given.copy()
-    orbits = rows.Orbits(n, s, flat)
-    search(s, start, p, known, True, work)
-    found = s.copy()
     return [
+        ("turning points of a pendulum in a sweep, released from rest", share(pendulum, "turning_points", released)),
+        ("- launched with speed", share(pendulum, "turning_points", released, 0.3)),
+        ("- in a double well, where no orbit is symmetric", share(double_well, "turning_points", (1.02, 1.35))),
         (
-            "turning points of an orbit in a sweep: in closed form",
-            least(lambda: search(s, start, p, known, True, work)) / n,
+            "half period of a pendulum in a sweep, by an arithmetic-geometric mean",
+            share(pendulum, "half_period", released),
         ),
-        ("- by Newton's method, without proof", least(lambda: search(s, start, p, known, False, work)) / n),
-        ("- proof by intervals, where symbols do not suffice", least(lambda: proof(s, found, p, work)) / n),
-        (
-            "half period of an orbit in a sweep: by an arithmetic-geometric mean",
-            least(lambda: mean(orbits, found, scratch, answers)) / n,
-        ),
-        (
-            "- by the trapezoidal rule, with error control",
-            least(lambda: trapezoidal(orbits, found, given, scratch, answers)) / n,
-        ),
+        ("- along a parabola, by the trapezoidal rule", share(parabola, "half_period", (0.1, 1.2))),
+        ("- in a double well, by the trapezoidal rule", share(double_well, "half_period", (1.02, 1.35))),
     ]
 
 
