@@ -143,7 +143,7 @@ class PassageChanges:
         given = (program.operands, program.work, inputs, LIBRATION, WHOLE_PHASE, panel_rule(), found)
         if fill_panel_means(*given) <= 0:
             raise SolutionError(UNDECIDED)
-        slopes = PI * np.where(np.abs(found[:, 0]) <= found[:, 2], 0.0, found[:, 0] + found[:, 1])
+        slopes = PI * (found[:, 0] + found[:, 1])
         return np.append(slopes[1:], 0.0)  # without the time itself
 
     def _span(self, distance: float) -> float:
