@@ -133,8 +133,8 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
     if felt > NOTICEABLE_LOAD:
         warnings.warn(
             "sampled: the curvature goes up and down from point to point (it changes between rising and falling at "
-            f"{len(swings)} of {len(steps) - 1} places), and loads with it, by about {felt:.2g} g where a body is fast: "
-            f"the points scatter, or are too far apart; {remedy}",
+            f"{len(swings)} of {len(steps) - 1} places), and loads with it, by about {felt:.2g} g where a body is "
+            f"fast: the points scatter, or are too far apart; {remedy}",
             NoisyPointsWarning,
             stacklevel=5,
         )
