@@ -191,8 +191,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
         if batches is not None:
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
-            counts = (batches.orbit_rows, batches.integrand_rows)
-            answer_batches(batches.addresses(), counts, *launches, wanted, found._replace(values=spans))
+            layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
+            answer_batches(batches.addresses(), layout, *launches, wanted, found._replace(values=spans))
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
