@@ -197,6 +197,16 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return chart_circulation_program(self.source) if self.direction else libration_program(self.source)
 
     @cached_property
+    def _wanted(self) -> NDArray[np.intp]:
+        """The results of the program that must be resolved: those of all variables whose displacement is known."""
+        n, first, last = self.source.variables, 0, len(self._shape.pieces.curve.counts) - 1
+        if not self.direction:
+            first, last = int(self._found[LOWER, 0]), int(self._found[UPPER, 0])
+        begin = self._shape.pieces.begin
+        unknown = [self.source.shaping[i] for i in self._shape.unknown(min(first, begin), max(last, begin))]
+        return np.setdiff1d(np.arange(2 + 2 * n), [row + k for k in unknown for row in (1, 2 + n)])
+
+    @cached_property
     def _panels(self) -> tuple[Array, Array, Array]:
         """The edges of panels on which all integrands are resolved, their values there, and the integrals.
 
@@ -205,7 +215,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         SolutionError
             If there are no such panels, or digits are lost.
         """
-        curve, found, n = self._shape.pieces.curve, self._found, self.source.variables
+        curve, found, wanted = self._shape.pieces.curve, self._found, self._wanted
         row, kind = (LAUNCH, CIRCULATION) if self.direction else (LOWER, LIBRATION)
         if self.direction:
             length = curve.lengths[:, :2].sum(axis=0)
@@ -225,14 +235,14 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             places[:, 0] = found[row, :PLACE]
             fill_nodes(curve, kind, panels, (width[0], width[1], found[row, 0], 0.0), shares, places)
             got = self._values(self._program, inputs, shares, places).reshape(-1, 3, len(panels), RULE)
-            high, widths = got[: 2 + 2 * n, 0], pending[:, 1]
+            high, widths = got[wanted, 0], pending[:, 1]
             if not np.isfinite(high).all():
                 break
             here = (np.abs(got[:, 0]) @ rule[2]) @ widths
             sizes = sizes if sizes.size else here
-            scale = np.where(sizes > 0.0, sizes, 1.0)[: 2 + 2 * n, None]
+            scale = np.where(sizes > 0.0, sizes, 1.0)[wanted, None]
             tails = np.abs(high @ tail_factors).sum(axis=-1) * widths / scale
-            noise = (got[: 2 + 2 * n, 2] @ rule[2]) * widths / scale
+            noise = (got[wanted, 2] @ rule[2]) * widths / scale
             resolved = (tails <= np.maximum(MAX_TAIL, noise)).all(axis=0)
             done.append((pending[resolved], got[:, :, resolved]))
             left, width_left = pending[~resolved].T
@@ -249,7 +259,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         panels, samples = panels[order], samples[:, :, order]
         weights = rule[2] * panels[:, 1:]
         errors = np.einsum("kmj,mj->k", samples[:, 2], weights)
-        if not (errors[: 2 + 2 * n] <= MAX_ROUNDING * sizes[: 2 + 2 * n]).all():
+        if not (errors[wanted] <= MAX_ROUNDING * sizes[wanted]).all():
             raise SolutionError(UNDECIDED)
         integrals = np.array([_total(r[0] * weights, r[1] * weights) for r in samples])
         integrals[np.abs(integrals) <= errors] = 0.0
