@@ -13,7 +13,7 @@ from numba import types
 from numpy.polynomial.chebyshev import cheb2poly
 
 from gqm_sym.literals.numbers import Number, read_number
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
 from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
@@ -179,6 +179,24 @@ class ShapedPieces:
             fill_coordinates(sides[1].curve, places, after)
             rows.append(_quotient(before[: 2 * d], after[: 2 * d], step))
         return np.concatenate(rows)
+
+    def bends(self, places: Array) -> Array:
+        """Return the points at places, two doubles each: the coordinates, and their first two derivatives with respect
+        to u.
+        """
+        self.pieces.make(int(places[0].min()), int(places[0].max()))
+        curve, d = self.pieces.curve, self.dimension
+        high, low = curve.terms[:, ::2], curve.terms[:, 1::2]
+        # The terms of the derivatives.
+        orders = np.arange(NODES, dtype=float)
+        steeper, rounding = two_product.py_func(high, orders)
+        terms = np.zeros_like(curve.terms)
+        terms[:, ::2, :-1], terms[:, 1::2, :-1] = steeper[..., 1:], (rounding + low * orders)[..., 1:]
+        counts = np.repeat(curve.counts[:, 1:], 2, axis=1)
+        rows, rates = np.empty((2, 4 * d, places.shape[1]))
+        fill_coordinates(curve, places, rows)
+        fill_coordinates(curve._replace(terms=terms, counts=counts), places, rates)
+        return np.concatenate([rows, rates[2 * d :]])
 
     def places(self, high: Array, low: Array | float = 0.0) -> Array:
         """Return the places (PLACE rows) at arc lengths from the start point."""
