@@ -49,14 +49,14 @@ CUBE = types.float64[:, :, ::1]
 
 
 @Inner
-def begin(program, work, inputs):  # type: ignore[no-untyped-def]
-    """Fill the registers of the inputs, and all that do not depend on the place."""
+def begin(program, work, inputs, lanes=BLOCK):  # type: ignore[no-untyped-def]
+    """Fill the registers of the inputs, and all that do not depend on the place, for a number of places."""
     address, operations, first, count, _ = program
     for k in range(count):
-        for i in range(BLOCK):
+        for i in range(lanes):
             for part in range(3):
                 work[k * ROW + part * BLOCK + i] = inputs[part, k]
-    call_interpreter(address, operations, 0, first, work, BLOCK)
+    call_interpreter(address, operations, 0, first, work, lanes)
 
 
 @Inner
@@ -137,6 +137,17 @@ def rounding_of(j, size, error, time):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def clear_rounding(found):  # type: ignore[no-untyped-def]
+    """Set means to zero that are zero within their rounding, except for the first one.
+
+    So that this does not happen to a derivative all digits of which are lost, `rounding_of` must be small.
+    """
+    for j in range(1, found.shape[0]):
+        if fabs(found[j, 0]) <= found[j, 2]:
+            found[j, 0], found[j, 1] = 0.0, 0.0
+
+
+@Inner
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means` does."""
     begin(program, work, inputs)
@@ -155,6 +166,7 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
             found[j, 0], found[j, 1], found[j, 2], found[j, 3] = high, low, sums[j, 2] / n, size
         has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
         if level > 1 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
+            clear_rounding(found)
             return n
         before = change if level > 1 else 1.0
     return NOT_SMOOTH if rounding <= MAX_ROUNDING else LOST_DIGITS
@@ -173,7 +185,8 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
     nodes : (4, n) array
         The table of shares (`nodes.trapezoidal_nodes`).
     found : (k, 4) array
-        For each result the mean as two doubles, a bound on its rounding error, and the mean of the absolute values.
+        For each result the mean as two doubles (0 if it is zero within its rounding), a bound on its rounding error,
+        and the mean of the absolute values.
     """
     address, operations, first, count, outputs = program
     program = (address, borrowed(operations), first, count, borrowed(outputs))
@@ -251,6 +264,7 @@ def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: 
         rounding = max(rounding, rounding_of(j, found[j, 3], found[j, 2], found[0, 3]))
         found[j, 0], found[j, 1] = divide(found[j, 0], found[j, 1], whole[0], whole[1])
         found[j, 2], found[j, 3] = found[j, 2] / whole[0], found[j, 3] / whole[0]
+    clear_rounding(found)
     return edges.size - 1 if rounding <= MAX_ROUNDING else LOST_DIGITS
 
 
@@ -294,7 +308,7 @@ def fill_signed_values_of(program, work, inputs, places, states, found):  # type
                 total += 1
         if total > 0:
             inputs[0, count - 2], inputs[0, count - 1] = heading, sign
-            begin(program, work, inputs)
+            begin(program, work, inputs, min(BLOCK, total))
         for start in range(0, total, BLOCK):
             size = min(BLOCK, total - start)
             for k in range(coordinates):

@@ -195,8 +195,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     def _over_phase(self, found: Array) -> Array:
         """Return the integrals over a half period, or over a lap, from means."""
-        is_zero = np.abs(found[:, 0]) <= found[:, 2]  # within the rounding of double-double arithmetic
-        high, low = np.where(is_zero, 0.0, found[:, :2].T)
+        high, low = found[:, :2].T
         integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)
         return integrals
 

@@ -176,6 +176,7 @@ class MultiprecisionOrbit:
                 inputs = self._inputs()
                 means, sizes, n = self._means(inputs)
                 if n and last is not None and self._share_of_change(means, last, sizes) <= AGREEMENT:
+                    means = [mean if abs(mean) > self._zero else mean * 0 for mean in means]
                     high = np.array([float(mean) for mean in means])
                     low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
                     return np.stack([high, low, np.full_like(sizes, self._zero), sizes], axis=1), n, inputs

@@ -73,10 +73,8 @@ def fill_period_gradient(programs, works, kind, parameters, launch, nodes, found
     if fill_means_of(program, work, inputs, nodes, means) <= 0:
         return False
     for k in range(count):
-        high, low, error, _ = means[1 + k]
-        if fabs(high) <= error:  # within the rounding of double-double arithmetic
-            found[k] = 0.0
-        elif kind == LIBRATION:
+        high, low = means[1 + k, 0], means[1 + k, 1]
+        if kind == LIBRATION:
             found[k] = multiply(high, low, 2.0 * HALF_PI[0], 2.0 * HALF_PI[1])[0]
         else:
             found[k] = high + low

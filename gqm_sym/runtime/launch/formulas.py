@@ -243,6 +243,15 @@ class Formulas:
         p.conditions = {}
         return p
 
+    @property
+    def inertia_row(self) -> int:
+        """The index of the run-time parameter beta if the inertia is 1 + beta, else -1."""
+        if self.inertia is None:
+            return -1
+        numbers = range(len(self.parameters))
+        found = [k for k in numbers if self.inertia(FLOATS, [float(j == k) for j in numbers]) == 2.0]
+        return found[0] if len(found) == 1 else -1
+
     def trigonometric_over(self, operations: Any, p: tuple[Any, ...]) -> tuple[Any, ...]:
         """Return the sines, cosines and tangents of the run-time parameters, over a namespace of operations."""
         values = () if self.trigonometric is None else self.trigonometric(operations, p)

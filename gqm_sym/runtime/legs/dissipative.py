@@ -22,6 +22,7 @@ from gqm_sym.runtime.legs.leg_record import (
     BEGIN_LOW,
     LAPS_BEFORE,
 )
+from gqm_sym.runtime.legs.leg_segments import TURN
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import (
     MarchPoints,
@@ -289,10 +290,8 @@ class DissipativeMotion(FollowedMotion):
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         rows = selected(self.problem.formulas.parameters, wrt)
         self._look_ahead()
-        found = gradient(self, self._changes, quantity)
-        return {
-            name: tuple(found[row].tolist()) if found.ndim == 2 else float(found[row]) for name, row in rows.items()
-        }
+        found = gradient(self, quantity).tolist()
+        return {name: tuple(found[row]) if quantity == "turning_points" else found[row] for name, row in rows.items()}
 
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
@@ -308,6 +307,7 @@ class DissipativeMotion(FollowedMotion):
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
         found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        self._check_known("sensitivity", rows, found)
         return found
 
     def _march_points(self, t: Any) -> tuple[MarchPoints, tuple[int, ...]]:
@@ -337,10 +337,24 @@ class DissipativeMotion(FollowedMotion):
     def _changes(self) -> Changes:
         """The derivatives of the legs so far."""
         self._follow_again()
-        runs = self._all_runs
-        if self._known_changes is None or self._known_changes.followed < len(runs):
-            self._known_changes = Changes(self.problem, runs)
+        return self._changes_of(len(self._all_runs))
+
+    def _changes_of(self, count: int) -> Changes:
+        """Return the derivatives of the first runs, which have panels."""
+        if self._known_changes is None or self._known_changes.followed < count:
+            self._known_changes = Changes(self.problem, self._all_runs[:count])
         return self._known_changes
+
+    @property
+    def _turns(self) -> list[int]:
+        """The numbers of the runs at the ends of which are the turning points of the motion, without the launch; all
+        runs have panels.
+        """
+        self._follow_again()
+        runs = self._all_runs
+        turns = [k for k, run in enumerate(runs[: self._beginning or None]) if run.end == TURN]
+        is_late = turns and turns[-1] + 1 == len(runs) and self._driver.elapsed > self._horizon
+        return turns[:-1] if is_late else turns
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""

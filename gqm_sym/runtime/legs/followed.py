@@ -192,8 +192,10 @@ class FollowedMotion(Motion):
 
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""
-        runs: list[Run] = []
-        for run in self._driver.runs.all():
+        known, runs = self._driver.runs.all(), list[Run]()
+        if all(run.has_panels for run in known):
+            return
+        for run in known:
             parts = self._driver.with_panels(run)
             if len(self._layout.runs) + len(runs) < self._beginning:
                 self._known_beginning += len(parts) - 1

@@ -151,6 +151,11 @@ class Run(NamedTuple):
         return self.record if begin <= until <= begin + 2.0 * times else None
 
     @property
+    def has_panels(self) -> bool:
+        """Whether its record has panels, and not only their times or rows of the whole leg."""
+        return self.before is None and not self.record.item(WHOLE)
+
+    @property
     def laps(self) -> int:
         """Whole laps of a closed curve that are not part of its places."""
         return int(self.record[LAPS_BEFORE])
@@ -267,7 +272,8 @@ class TurnedLegs(NamedTuple):
         for k in range(self.size):
             end = at + int(self.line[at + USED])
             before = None if self.before is None else self.before[k]
-            runs.append(Run(self.line[at:end], END_TURN, TURN, None, before))
+            # This avoids the constructor of a named tuple, which is slow.
+            runs.append(tuple.__new__(Run, (self.line[at:end], END_TURN, TURN, None, before, None)))
             at = end
         return runs
 
@@ -306,11 +312,12 @@ class Runs:
 
     def all(self) -> list[Run]:
         """Return all runs."""
-        runs: list[Run] = []
-        for part in self._parts:
-            runs += part.runs() if isinstance(part, TurnedLegs) else [part]
-        self.replace(runs)
-        return runs
+        if any(isinstance(part, TurnedLegs) for part in self._parts):
+            runs: list[Run] = []
+            for part in self._parts:
+                runs += part.runs() if isinstance(part, TurnedLegs) else [part]
+            self.replace(runs)
+        return [part for part in self._parts if isinstance(part, Run)]
 
     @property
     def parts(self) -> list[Run | TurnedLegs]:

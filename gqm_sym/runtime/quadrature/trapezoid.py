@@ -3,7 +3,7 @@
 The nodes are phase angles (`substitution`): a half period is an integral over [0, pi], a lap time over [0, 1].
 """
 
-from math import fabs, inf, pi, sqrt
+from math import fabs, inf, isqrt, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,9 +70,26 @@ def _node_shares() -> np.ndarray:
     return np.concatenate(levels)
 
 
-# The nodes, and the offsets from both turning points at them as shares of the width (`substitution`, TURN_TURN).
+def _squares_of_sines() -> np.ndarray:
+    """Return ``sin(pi*k/(2*MAX_NODES))**2`` for k up to MAX_NODES, correctly rounded.
+
+    Cosines of half the angles follow from square roots of integers. Errors of the nodes would be common to all orbits.
+    """
+    one = 1 << 120
+    cosines = [one, 0]  # of angles up to a right angle
+    while len(cosines) <= MAX_NODES // 2:
+        cosines = [isqrt((one + c) << 119) for c in cosines] + [isqrt((one - c) << 119) for c in cosines[-2::-1]]
+    cosines += [-c for c in cosines[-2::-1]]
+    return np.array([(one - c) / (2 * one) for c in cosines])
+
+
+# The nodes, and the squares of the sine and cosine of half the phase angle at them, which are the offsets from both
+# turning points as shares of the width (`substitution`, TURN_TURN); and those of the phase angle itself.
 NODE_SHARES = _node_shares()
-OFFSETS_FROM_A, OFFSETS_TO_B = np.sin(0.5 * pi * NODE_SHARES) ** 2, np.cos(0.5 * pi * NODE_SHARES) ** 2
+_SQUARES, _NUMBERS = _squares_of_sines(), np.rint(MAX_NODES * NODE_SHARES).astype(int)
+OFFSETS_FROM_A, OFFSETS_TO_B = _SQUARES[_NUMBERS], _SQUARES[MAX_NODES - _NUMBERS]
+SINES_SQUARED = _SQUARES[MAX_NODES - np.abs(MAX_NODES - 2 * _NUMBERS)]
+COSINES_SQUARED = _SQUARES[np.abs(MAX_NODES - 2 * _NUMBERS)]
 
 
 @Inner

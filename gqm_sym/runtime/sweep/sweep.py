@@ -191,16 +191,16 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
         if batches is not None:
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
-            counts = (batches.orbit_rows, batches.integrand_rows)
-            answer_batches(batches.addresses(), counts, *launches, wanted, found._replace(values=spans))
+            layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
+            answer_batches(batches.addresses(), layout, *launches, wanted, found._replace(values=spans))
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        directed = formulas.path_in_space.address if formulas.path_in_space and formulas.directed else 0
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, formulas.signed, directed)
+        of_force = formulas.signed, formulas.path_in_space.address if formulas.path_in_space else 0, formulas.directed
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, *of_force)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
         if code in ANSWERED_BY_BATCHES and exact.work.size:

@@ -59,40 +59,6 @@ def fill_input(work, register, launches, column, size, lanes):  # type: ignore[n
         work[at], work[at + LOW], work[at + ERROR] = launches[min(i, size - 1), column], 0.0, 0.0
 
 
-@entry(types.void(LANE_PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX), checked=False)
-def fill_lane_values(program, work, inputs, places, found):  # type: ignore[no-untyped-def]
-    """Fill the results of a program at places, in double precision.
-
-    Parameters
-    ----------
-    program, work
-        The program (`assembly.LaneProgram.operands`), with its work space.
-    inputs : (3, m) array
-        The inputs: high and low doubles, and bounds on the errors.
-    places : (k, n) array
-        The coordinates of the places.
-    found : (m, n) array
-        Filled with the results.
-    """
-    count, lanes = places.shape[1], min(BLOCK, places.shape[1])
-    for k in range(inputs.shape[1]):
-        for i in range(lanes):
-            at = k * ROW + i
-            work[at], work[at + LOW], work[at + ERROR] = inputs[0, k], inputs[1, k], inputs[2, k]
-    call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
-    for start in range(0, count, BLOCK):
-        n = min(BLOCK, count - start)
-        for k in range(places.shape[0]):
-            at = program[4][k]
-            for i in range(n):
-                work[at + i] = places[k, start + i]
-        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, n)
-        for k in range(found.shape[0]):
-            at = program[5][k]
-            for i in range(n):
-                found[k, start + i] = work[at + i]
-
-
 @Inner
 def fill_place(program, work, places, lanes):  # type: ignore[no-untyped-def]
     """Carry out what depends on the place in a program in double-double arithmetic.

@@ -25,12 +25,12 @@ from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.gradients.programs import assemble as in_double_double
-from gqm_sym.runtime.quadrature.trapezoid import NODE_SHARES, OFFSETS_FROM_A, OFFSETS_TO_B
+from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, OFFSETS_FROM_A, OFFSETS_TO_B, SINES_SQUARED
 
 # The coordinates of the nodes of the trapezoidal rule: the squares of the sine and cosine of half the phase angle, or
 # of the angle from an axis of symmetry.
 ALONG = np.array([OFFSETS_FROM_A, OFFSETS_TO_B])
-FROM_AXIS = np.array([np.cos(np.pi * NODE_SHARES) ** 2, np.sin(np.pi * NODE_SHARES) ** 2])
+FROM_AXIS = np.array([COSINES_SQUARED, SINES_SQUARED])
 
 # The steps of an arithmetic-geometric mean. The relative difference of two numbers in the ratio 1 : 10 is then 4e-9,
 # and the square of this is the error of one more arithmetic mean.

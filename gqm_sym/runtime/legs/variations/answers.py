@@ -15,7 +15,7 @@ from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece
-from gqm_sym.runtime.legs.variations.chain import DELAY, SIGMA
+from gqm_sym.runtime.legs.variations.chain import ARC, DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.law import LawRows
 from gqm_sym.runtime.motion.events import Leg
@@ -163,7 +163,7 @@ def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
     return found
 
 
-def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
+def gradient(motion: Any, quantity: str) -> Array:
     """Return the derivatives of a quantity of a motion with respect to all variables; for turning points, a column for
     each.
 
@@ -171,15 +171,14 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
     ----------
     motion : legs.dissipative.DissipativeMotion
         The motion.
-    changes : Changes
-        The changes of its legs.
     quantity : str
         One of `launch.kinds.QUANTITIES`.
     """
     if quantity in PERIODIC_QUANTITIES:
         raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
     if quantity == "turning_points":
-        return turning_points(motion, changes)
+        return turning_points(motion)
+    changes = motion._changes
     if quantity in EXTREMES:
         return extreme(motion, changes, quantity)
     t_end = motion.t_end
@@ -193,15 +192,16 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
     return place
 
 
-def turning_points(motion: Any, changes: Changes) -> Array:
+def turning_points(motion: Any) -> Array:
     """Return the derivatives of the turning points of a motion."""
-    turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
-    columns = [
-        changes.parameter_change(changes.ends[k].sigma, changes.ends[k].arc, changes.runs[k].laps) for k in turns
-    ]
-    if motion.problem.w0 == 0.0:
-        columns.insert(0, np.eye(changes.variables)[-2])
-    return np.array(columns).reshape(-1, changes.variables).T[:, : len(motion.turning_points)]
+    turns, variables = motion._turns, len(motion.problem.p) + 2
+    launch = np.eye(variables)[:, -2:-1] if motion.problem.w0 == 0.0 else np.empty((variables, 0))
+    if not turns:
+        return launch
+    changes = motion._changes_of(turns[-1] + 1)
+    sigma, arc = changes.ends[turns, SIGMA].T, changes.ends[turns, ARC].T
+    columns = changes.parameter_change(sigma, arc, np.array([changes.runs[k].laps for k in turns]))
+    return np.hstack([launch, columns]) if launch.size else columns
 
 
 def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
@@ -211,9 +211,9 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     what, k, zero = motion.legs[-1].end, len(changes.runs) - 1, np.zeros(changes.variables)
     if what == "horizon" or motion.t_end == 0.0:
         return zero, zero
-    run, origin = changes.runs[k], changes.ends[k]
+    run, (sigma, y, delay, arc) = changes.runs[k], changes.ends[k]
     if what == "rest":
-        return changes.parameter_change(origin.sigma, origin.arc, run.laps), origin.delay
+        return changes.parameter_change(sigma, arc, run.laps), delay
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
@@ -222,14 +222,12 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
         path = changes.law.path(*place)
         curvature, load = path.curvature[:, 0], path.load[:, 0]
-        faster = origin.y - law.force[0, 0] * origin.sigma
+        faster = y - law.force[0, 0] * sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
         moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
-    return changes.parameter_change(moved, origin.arc, run.laps), origin.delay + v * law.ds[0] * (
-        moved - origin.sigma
-    ) / speed
+    return changes.parameter_change(moved, arc, run.laps), delay + v * law.ds[0] * (moved - sigma) / speed
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))

@@ -10,13 +10,13 @@ A change of an origin has ORIGIN_ROWS rows with a number for each variable, whic
 v0: sigma, y, ``delay``, and ``arc``, the change of the arc length from launch, less ds/dlam times that of the place.
 """
 
-from math import inf, sqrt
+from math import fabs, inf, sqrt
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.gradients.path import path_changes
 from gqm_sym.runtime.legs.leg_record import AHEAD, BACK, HALF_C, HEADING, LAPS_BEFORE, START_V2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE
@@ -29,6 +29,7 @@ from gqm_sym.runtime.legs.variations.equation import (
     PANEL_BEGIN,
     PANEL_HEADING,
     PANEL_WIDTH,
+    PANELS_OF_RUNS,
     PLACE,
     PLACE_LOW,
     STATE_HEADING,
@@ -38,16 +39,19 @@ from gqm_sym.runtime.legs.variations.equation import (
     WHOLE,
     W,
     end_speed,
-    jump,
+    lay_panels,
+    lay_states,
     place_on,
-    solve_panels,
 )
+from gqm_sym.runtime.legs.variations.solving import jump, solve_panels
 
 SIGMA, Y, DELAY, ARC, ORIGIN_ROWS = range(5)
 
-# The records of runs, the indices at which they begin and at which the panels of each half begin, and the panels
-# (`equation.lay_panels`).
-PANELS_OF_RUNS = types.Tuple((VECTOR, WHOLE, WHOLE, MATRIX))
+# The launch speed, the chosen direction, and the force dW/dlam on a body at rest that moves the other way.
+THROWN = types.UniTuple(REAL, 3)
+
+# The solutions on all panels, and the changes of origins and of ends (`follow`).
+FOLLOWED = types.Tuple((CUBE, CUBE, CUBE))
 
 # The rows of changes of states.
 LAM, S, X, SPEED_ROW, Y_ROW, ARC_ROW, STATE_ROWS = 0, 1, 2, 4, 6, 7, 8
@@ -101,8 +105,23 @@ def go_back(origin, solutions, parameters, force, step, rate):  # type: ignore[n
             origin[ARC, i] -= solutions[(2 * n + 4 + i) * WIDE + COUNT]
 
 
-@entry(types.void(PANELS_OF_RUNS, MATRIX, MATRIX, VECTOR, VECTOR, CUBE, CUBE, CUBE), checked=False)
-def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends):  # type: ignore[no-untyped-def]
+@Inner
+def launched(moves, thrown, heading, ds, force, origin):  # type: ignore[no-untyped-def]
+    """Fill the change of the launch, given ds/dlam and dW/dlam there; ``moves`` is that of the launch place.
+
+    A body at rest that is thrown the other way comes back with little less speed.
+    """
+    (v0, direction, other_force), last = thrown, moves.size - 1
+    origin[:, :] = 0.0
+    for i in range(moves.size):
+        origin[SIGMA, i], origin[ARC, i] = moves[i], -(ds * moves[i])
+    origin[Y, last] = 2.0 * v0
+    if v0 == 0.0:
+        origin[DELAY, last] = -2.0 * ds / fabs(force) if direction == heading else 2.0 * ds / fabs(other_force)
+
+
+@Inner
+def follow(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-def]
     """Solve the variational equation on all panels, and carry the change of the launch from run to run.
 
     Parameters
@@ -110,23 +129,31 @@ def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends): 
     laid : PANELS_OF_RUNS
         The runs.
     law : array
-        The law in the states of `equation.lay_panels`.
-    launched : (ORIGIN_ROWS, n + 2) array
-        The change of the launch.
+        The law in the states of `equation.lay_states`.
+    moves : (n + 2,) array
+        The change of the launch place.
+    thrown : THROWN
     lap : (n + 2,) array
-        That of the period of the curve's parameter.
+        The change of the period of the curve's parameter.
     breaks : array
         The places at which the force may jump.
+
+    Returns
+    -------
     solutions : (panels, 3 * n + 4, WIDE) array
-        The solutions, which are filled.
+        The solutions.
     origins, ends : (halves, ORIGIN_ROWS, n + 2) and (runs, ORIGIN_ROWS, n + 2) arrays
         The changes where each half begins, and where each run ends: at the turn, or at a place that moves with the
-        origin of its last half. They are filled.
+        origin of its last half.
     """
     records, begins, first, panels = laid
-    runs, n, rows = begins.size, lap.size - 2, solutions.shape[1] * WIDE
+    runs, n = begins.size, lap.size - 2
+    solutions, origin = np.empty((panels.shape[0], 3 * n + 4, WIDE)), np.empty((ORIGIN_ROWS, n + 2))
+    origins, ends = np.empty((2 * runs, ORIGIN_ROWS, n + 2)), np.empty((runs, ORIGIN_ROWS, n + 2))
+    rows = solutions.shape[1] * WIDE
     solve_panels(panels, first, law, n, breaks, solutions)
-    forces, origin, laps = law[n + 2, MARKS * runs :], launched.copy(), 0.0
+    launched(moves, thrown, records[begins[0] + HEADING], law[0, 0], law[n + 2, 0], origin)
+    forces, laps = law[n + 2, MARKS * runs :], 0.0
     for k in range(runs):
         record, ds = records[begins[k] :], law[0, k]
         v, v2, was_ahead = record[HEADING], record[START_V2], record[AHEAD] > 0.0
@@ -159,6 +186,20 @@ def follow_changes(laid, law, launched, lap, breaks, solutions, origins, ends): 
             go_back(origin, solutions[end - 1].reshape(rows), n, law[n + 2, runs + k], step, rate)
             origins[2 * k + 1] = origin
         ends[k] = origin
+    return solutions, origins, ends
+
+
+@entry(types.Tuple((WHOLE, MATRIX, MATRIX))(VECTOR, WHOLE), checked=False)
+def lay(records, begins):  # type: ignore[no-untyped-def]
+    """Return the panels of runs (`equation.lay_panels`), and the states in which the law is needed."""
+    first, panels = lay_panels(records, begins)
+    return first, panels, lay_states(records, begins, first, panels)
+
+
+@entry(FOLLOWED(PANELS_OF_RUNS, MATRIX, VECTOR, THROWN, VECTOR, VECTOR), checked=False)
+def follow_changes(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-def]
+    """Return what `follow` does."""
+    return follow(laid, law, moves, thrown, lap, breaks)
 
 
 @Inner

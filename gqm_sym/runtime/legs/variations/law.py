@@ -1,34 +1,36 @@
 """The law of a motion with losses in given states, with its derivatives, in double-double arithmetic."""
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.evaluation import fill_signed_values, values
-from gqm_sym.runtime.gradients.lanes.evaluation import fill_lane_values
 from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import Program, range_program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import Launch
+from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
+from gqm_sym.runtime.legs.variations.chain import follow_changes, lay
 from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
+from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas
 from gqm_sym.runtime.legs.variations.programs import (
     force_program,
     law_in_doubles,
     law_program,
     load_program,
+    rates_program,
 )
 from gqm_sym.runtime.motion.locking import computed_once
-
-# The largest distance of a motion from the zero of the curve's parameter, in its width, for which places in doubles
-# suffice at the nodes of panels.
-MAX_DISTANCE = 10.0
 
 # The largest relative error of the force at which panels still distinguish rounding from structure.
 MAX_FORCE_ERROR = 1e-11
@@ -58,6 +60,23 @@ class LawRows(NamedTuple):
         first = (len(self.matrix) - 1) // 2
         force: Array = self.matrix[first : first + 3]
         return force
+
+
+class Followed(NamedTuple):
+    """The changes of a motion along its runs.
+
+    Attributes
+    ----------
+    laid : tuple
+        The runs and their panels (`equation.PANELS_OF_RUNS`).
+    solutions, origins, ends : arrays
+        As `chain.follow` returns them.
+    """
+
+    laid: tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]
+    solutions: Array
+    origins: Array
+    ends: Array
 
 
 def states_of(high: Array, low: Array, w: Array, heading: Array, contact_sign: Array) -> Array:
@@ -111,12 +130,31 @@ class Law(ABC):
     def matrix(self, states: Array) -> Array:
         """Return the law in states, as `LawRows.matrix`."""
 
-    def matrix_on_panels(self, states: Array, marks: int) -> Array:
-        """Return the law in states, to the last digits in the first ``marks`` of them only.
+    def followed(
+        self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array, breaks: Array
+    ) -> Followed:
+        """Return the changes of a motion along its runs.
 
-        Roundings at the nodes of panels average out. Where a body turns, the force may be a small difference.
+        Parameters
+        ----------
+        records, begins
+            The records of the runs, and the indices at which they begin.
+        launch : Launch
+            The launch.
+        lap : array
+            The change of the period of the curve's parameter.
+        breaks : array
+            The places at which the force may jump.
         """
-        return self.matrix(states)
+        first, panels, states = lay(records, begins)
+        law, v0, heading = self.matrix(states), launch.v0.value, float(records[begins[0] + HEADING])
+        other_force = 0.0
+        if v0 == 0.0 and launch.direction != heading:
+            start = states[:, :1]
+            turned = states_of(start[0], start[1], np.zeros(1), np.array([-heading]), start[4])
+            other_force = float(LawRows(self.matrix(turned)).force[0, 0])
+        laid, thrown = (records, begins, first, panels), (v0, float(launch.direction), other_force)
+        return Followed(laid, *follow_changes(laid, law, self.launch_changes, thrown, lap, breaks))
 
     @abstractmethod
     def loads(self, states: Array) -> Array:
@@ -156,7 +194,7 @@ class FormulaLaw(Law):
             raise without_formulas()
         self._exact, self._domain = formulas.exact, formulas.domain_of
 
-    @property
+    @computed_once
     def launch_changes(self) -> Array:
         """See `Law`."""
         moves = np.zeros(self.count + 2)
@@ -179,17 +217,27 @@ class FormulaLaw(Law):
         found: Array = self.values(law_program(self._exact, self.count), states, parts=1)[:, 0]
         return found
 
-    def matrix_on_panels(self, states: Array, marks: int) -> Array:
-        """See `Law`."""
-        places = states[0, :marks].tolist()
-        low, high = min(places), max(places)
-        if MAX_DISTANCE * (high - low) < max(-low, high):
-            return self.matrix(states)  # doubles do not resolve places so near to each other
-        program = law_in_doubles(self._exact, self.count)
-        found = np.empty((program.outputs.size, states.shape[1]))
-        fill_lane_values(program.operands, program.work, self.parameters, states, found)
-        found[:, :marks] = self.matrix(np.ascontiguousarray(states[:, :marks]))
-        return found
+    def followed(
+        self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array, breaks: Array
+    ) -> Followed:
+        """See `Law`. Along formulas this is one call of compiled code."""
+        thrown = launch.v0.value, float(launch.direction)
+        first, panels, found = changes_along_formulas(
+            records, begins, self._programs, self._inputs, thrown, self.launch_changes, lap
+        )
+        return Followed((records, begins, first, panels), *found)
+
+    @computed_once
+    def _programs(self) -> tuple[Any, ...]:
+        """The programs of compiled code (`formula_changes.PROGRAMS`)."""
+        makers = law_in_doubles, law_program, rates_program
+        return tuple(part for make in makers for part in attrgetter("operands", "work")(make(self._exact, self.count)))
+
+    @computed_once
+    def _inputs(self) -> Array:
+        """The inputs of the programs in double-double arithmetic; the last two are signs that compiled code sets."""
+        inputs: Array = np.concatenate([self.parameters, np.zeros((3, 2))], axis=1)
+        return inputs
 
     def loads(self, states: Array) -> Array:
         """See `Law`."""

@@ -27,6 +27,13 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
 
 
 @lru_cache(maxsize=64)
+def rates_program(law: ExactLaw, parameters: int) -> Program:
+    """Return the program of ds/dlam and dW/dlam, whose inputs and coordinates are those of `law_program`."""
+    op, *rates = _law(law, parameters)
+    return assemble(op, rates)
+
+
+@lru_cache(maxsize=64)
 def law_in_doubles(law: ExactLaw, parameters: int) -> LaneProgram:
     """Return the program of `law_program` in double precision.
 

@@ -239,7 +239,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     answers = Answers(borrowed(answers.values), borrowed(answers.status), borrowed(answers.route))
     first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
     chosen, others, work = borrowed(scratch.chosen), borrowed(scratch.others), borrowed(scratch.work)
-    scratch = Scratch(scratch.param_count, scratch.invariant_counts, chosen, others, work)
+    scratch = Scratch(scratch.param_count, scratch.layout, chosen, others, work)
     wells = borrowed_wells(wells)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
@@ -261,19 +261,19 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
 
 @entry(
     types.void(
-        *(BATCH_ADDRESSES, types.UniTuple(types.int64, 2), types.int64[:, ::1], types.boolean, types.int64, ANSWERS)
+        *(BATCH_ADDRESSES, types.UniTuple(types.int64, 3), types.int64[:, ::1], types.boolean, types.int64, ANSWERS)
     ),
     nogil=True,
 )
-def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):  # type: ignore[no-untyped-def]
+def answer_batches(fns, layout, columns, monotone, quantity, answers):  # type: ignore[no-untyped-def]
     """Answer the launches that batches can answer; the others keep their status.
 
     Parameters
     ----------
     fns : BatchAddresses
         The module's compiled functions for batches.
-    invariant_counts : (int, int)
-        The number of values that `orbit_invariants` and `integrand_invariants` fill for an orbit.
+    layout : (int, int, int)
+        As in `rows.Scratch`.
     columns : array
         The launches, as `strided.pointers` gives them.
     monotone : bool
@@ -284,10 +284,10 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
         Filled in.
     """
     count = columns.shape[0] - PARAMETERS
-    size = (count + max(invariant_counts[0], invariant_counts[1])) * BATCH
+    size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    scratch = Scratch(count, invariant_counts, chosen, others, np.empty((13, BATCH)))
+    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)))
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))

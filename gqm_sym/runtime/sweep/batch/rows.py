@@ -8,7 +8,8 @@ row                  meaning                                                    
 ==================== ==================================================================== ======================
 INDEX                index of the launch in the caller's arrays                           all
 SUM                  sum of the time integrand over all nodes so far                      time
-VALUE                the time by the last level of nodes                                  time
+REST                 what rounding took from that sum                                     time
+VALUE                the mean of the time integrand by the last level of nodes            time
 CHANGE               relative change of the time by that level                            time
 FACTOR_LOW           smallest value of V**2's regular factor at the nodes                 time
 FACTOR_HIGH          its largest value                                                    time
@@ -48,10 +49,10 @@ from gqm_sym.runtime.compiled.types import Array
 # a register.
 BATCH, LANES = 128, 8
 
-INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(9)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(9, 15)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(15, 20)
-ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(20, 26)
+INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 16)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(16, 21)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(21, 27)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
@@ -86,8 +87,9 @@ class Scratch(NamedTuple):
     ----------
     param_count : int
         The number of run-time parameters.
-    invariant_counts : (int, int)
-        The number of values that `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
+    layout : (int, int, int)
+        The number of values that `orbit_invariants` and `integrand_invariants` of the module fill for an orbit, and the
+        row of the parameter beta if the inertia is 1 + beta, else -1.
     chosen, others : int arrays
         Lists of columns.
     work : (13, BATCH) array
@@ -95,7 +97,7 @@ class Scratch(NamedTuple):
     """
 
     param_count: int
-    invariant_counts: tuple[int, int]
+    layout: tuple[int, int, int]
     chosen: NDArray[np.int64]
     others: NDArray[np.int64]
     work: Array

@@ -3,11 +3,10 @@
 They are computed by the trapezoidal rule, or by the arithmetic-geometric mean if the model gives its two arguments.
 """
 
-from math import fabs, inf, nan, pi, sqrt
-
-import numpy as np
+from math import fabs, inf, nan, sqrt
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.calls import (
     call_agm_arguments_batch,
     call_integrand_invariants_batch,
@@ -16,17 +15,19 @@ from gqm_sym.runtime.compiled.calls import (
     call_potential_divdiff2_batch,
     call_time_integrand_batch,
 )
-from gqm_sym.runtime.compiled.intrinsics import choose
+from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
+    COSINES_SQUARED,
     LIBRATION,
     MAX_NODES,
     MIN_INTERVALS,
     NODE_SHARES,
     OFFSETS_FROM_A,
     OFFSETS_TO_B,
+    SINES_SQUARED,
     has_converged,
 )
 from gqm_sym.runtime.sweep.batch.rows import (
@@ -42,6 +43,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     LAUNCH_V2,
     OFFSET_HIGH,
     OFFSET_LOW,
+    REST,
     SUM,
     TIME_ROWS,
     VALUE,
@@ -56,8 +58,8 @@ AXIS_LIBRATION, AGM_LIBRATION = 2, 3
 # For each kind except the last, the number of rows of a batch that the trapezoidal rule needs.
 NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
 
-# The squares of cosine and sine at the nodes. Share 0 is one end of the orbit, share 1/2 its axis of symmetry.
-COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
+# Pi as two doubles.
+PI_HIGH, PI_LOW = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
 
 # The verdict on an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
@@ -128,14 +130,14 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
             replace_on_wide_orbits(fns, n, node, rows, p, two, work)
         for j in range(n):
             q = two[0, j]
-            rates[j] = pi * two[1, j] / sqrt(2.0 * q)
+            rates[j] = two[1, j] / sqrt(2.0 * q)
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     elif kind == AXIS_LIBRATION:
         two = out[: 2 * n].reshape(2, n)
-        call_time_integrand_batch(fns.time_integrand, n, COS2[node], SIN2[node], p, two)
+        call_time_integrand_batch(fns.time_integrand, n, COSINES_SQUARED[node], SINES_SQUARED[node], p, two)
         for j in range(n):
             q = two[1, j]
-            rates[j] = pi * sqrt(two[0, j])
+            rates[j] = sqrt(two[0, j])
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     else:
         share, three = NODE_SHARES[node], out[: 3 * n].reshape(3, n)
@@ -155,7 +157,7 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
 def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
     """Append the terms that are constant along an orbit to the rows of parameters; return the new number of rows."""
     count, n, rows, params = scratch.param_count, orbits.size, orbits.rows, orbits.params
-    more = 0 if kind == CIRCULATION else scratch.invariant_counts[kind // AXIS_LIBRATION]
+    more = 0 if kind == CIRCULATION else scratch.layout[kind // AXIS_LIBRATION]
     if more:
         p, halves = params[: count * n].reshape(count, n), scratch.work[0, :n]
         middles, rests = scratch.work[1, :n], scratch.work[2, :n]
@@ -176,7 +178,7 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 
 @Inner
 def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
-    """Set each orbit's time by a level of the rule, and the verdict on it.
+    """Set the mean of each orbit's integrand by a level of the rule, and the verdict on it.
 
     ``ratios`` are the smallest ratios of factors that doubles permit, for a launch from rest and for another one.
     """
@@ -192,12 +194,39 @@ def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def
 
 
 @Inner
-def answer_level(rows, n, factor, verdict, chosen, answers):  # type: ignore[no-untyped-def]
+def relative_rests(params, row, rests):  # type: ignore[no-untyped-def]
+    """Fill the changes of half periods, as shares of them, if the inertia 1 + beta is not rounded.
+
+    Its rounding is common to all nodes and, for the same beta, to all orbits. ``row`` is that of beta; if it is
+    negative, the changes are zero.
+    """
+    rests[:] = 0.0
+    if row >= 0:
+        for j in range(rests.size):
+            total, rounding = two_sum(1.0, params[row * rests.size + j])
+            rests[j] = 0.5 * rounding / total
+
+
+@Inner
+def set_times(rows, nodes, ranges, rests, times):  # type: ignore[no-untyped-def]
+    """Set times from the means of the integrand, with one rounding.
+
+    ``ranges`` is the range of the phase angle, or 1 for laps, as two doubles.
+    """
+    high, low = ranges
+    for j in range(times.size):
+        mean = rows[VALUE, j]
+        rest = mean * (low + high * rests[j]) + high * (rows[REST, j] / nodes)
+        times[j] = fma(mean, high, rest)
+
+
+@Inner
+def answer_level(rows, times, verdict, chosen, answers):  # type: ignore[no-untyped-def]
     """Fill the answers of orbits that have converged and list those that continue; return the number of the latter."""
     out, status, number = answers.values, answers.status, 0
-    for j in range(n):  # there are no branches, because they would be unpredictable
+    for j in range(times.size):  # there are no branches, because they would be unpredictable
         k, done = int(rows[INDEX, j]), verdict[j] == CONVERGED
-        out[k, 0] = choose(done, factor * rows[VALUE, j], nan)
+        out[k, 0] = choose(done, times[j], nan)
         status[k] = ANSWERED if done else UNDECIDED
         chosen[number] = j
         number += verdict[j] == CONTINUES
@@ -214,10 +243,11 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     count = add_invariants(fns, kind, orbits, scratch)
     n, rows, work, chosen = orbits.size, orbits.rows, scratch.work, scratch.chosen
     for j in range(n):
-        rows[SUM, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, inf
+        rows[SUM, j], rows[REST, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, 0.0, inf
         rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
         rows[FACTOR_AT_TURN, j] = inf
-    begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD and kind != CIRCULATION else 1.0
+    begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD else 1.0
+    ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
     from_rest = MIN_REST_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
@@ -239,10 +269,14 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
                 for j in range(n):
                     rows[VALUE, j] += share * rates[j]
         for j in range(n):
-            rows[SUM, j] += more[j]
+            total, rounding = two_sum(rows[SUM, j], more[j])
+            rows[SUM, j], rows[REST, j] = total, rows[REST, j] + (rounding - lost[j])
         judge_level(rows, n, nodes, (from_rest, thrown), work[0, :n])
         if begin > 0:
-            continuing = answer_level(rows, n, factor, work[0, :n], chosen, answers)
+            rests, times = work[1, :n], work[2, :n]
+            relative_rests(orbits.params, -1 if kind == CIRCULATION else scratch.layout[2], rests)
+            set_times(rows, nodes, ranges, rests, times)
+            continuing = answer_level(rows, times, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:
                 return
             orbits = shrink(orbits, count, chosen, continuing, NEEDED_ROWS[kind])
@@ -256,6 +290,7 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
     p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
     pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]
+    rests = work[5, :n]
     for j in range(n):
         halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
@@ -269,9 +304,14 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
         for j in range(n):
             a, b = pair[0, j], pair[1, j]
             pair[0, j], pair[1, j] = 0.5 * (a + b), sqrt(a * b)
-    numerator = 2.0 * pi if quantity != PERIOD else 4.0 * pi
+    factor = 2.0 if quantity != PERIOD else 4.0
+    high, low = factor * PI_HIGH, factor * PI_LOW
+    relative_rests(orbits.params, scratch.layout[2], rests)
     for j in range(n):
-        times[j] = choose(clear[j] == 1.0, numerator / (pair[0, j] + pair[1, j]), nan)
+        total, rounding = two_sum(pair[0, j], pair[1, j])
+        time = high / total
+        rest = (fma(-time, total, high) + fma(-time, rounding, low)) / total
+        times[j] = choose(clear[j] == 1.0, time + fma(time, rests[j], rest), nan)
     for j in range(n):
         k = int(rows[INDEX, j])
         answers.values[k, 0] = times[j]

@@ -331,3 +331,20 @@ def test_ends_that_do_not_move() -> None:
     assert module.solve(3, "0.1", contact="above").gradient("t_end", "L") == {"L": 0.0}
     assert load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag").solve(1).nearest_switch is None
     assert module.solve(1).gradient("v_min", ("L", "mu")) == {"L": 0.0, "mu": 0.0}
+
+
+@pytest.mark.parametrize("t_max", [0.5, 2.9, 3.1, 6.1, None])
+def test_turning_points_alone(t_max: float | None) -> None:
+    """Each turning point of a motion has its derivatives, whatever has been asked before, also where the motion ends
+    short of the next one.
+    """
+    circle = load(str(ROOT / "generated" / "circle_coulomb.py"), "circle_coulomb")
+    alone, asked = (circle.solve(0.9, 0.0, mu=0.05, t_max=t_max) for _ in range(2))
+    later = asked.sensitivity(0.4 if t_max is None else t_max)
+    assert np.isfinite(later.lam).all()
+    found = alone.gradient("turning_points")
+    assert found == asked.gradient("turning_points")
+    assert {len(row) for row in found.values()} == {len(alone.turning_points)}
+    assert found["lam0"][0] == 1.0
+    longer = circle.solve(0.9, 0.0, mu=0.05).gradient("turning_points")
+    assert found == {name: row[: len(alone.turning_points)] for name, row in longer.items()}

@@ -40,7 +40,8 @@ def answered(
     out, status = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
     answers = quantities.Answers(out, status, np.zeros_like(status))
     each = module.MODEL.batch
-    answer_batches(each.addresses(), (each.orbit_rows, each.integrand_rows), pointers(lines), monotone, asked, answers)
+    layout = (each.orbit_rows, each.integrand_rows, -1)
+    answer_batches(each.addresses(), layout, pointers(lines), monotone, asked, answers)
     return out, status
 
 

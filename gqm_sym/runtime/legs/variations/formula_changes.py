@@ -1,0 +1,140 @@
+"""The changes of a motion with losses along a curve with formulas, in one call of compiled code.
+
+The law at the nodes of panels is evaluated in doubles, whose roundings average out. Where runs begin and end, the force
+is evaluated in double-double arithmetic, because it may be a small difference there.
+"""
+
+from math import inf
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_signed_values_of
+from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
+from gqm_sym.runtime.legs.leg_record import HEADING
+from gqm_sym.runtime.legs.panels.point import LEAST_V2
+from gqm_sym.runtime.legs.variations.chain import FOLLOWED, follow
+from gqm_sym.runtime.legs.variations.equation import (
+    MARKS,
+    PLACE,
+    PLACE_LOW,
+    STATE_HEADING,
+    WHOLE,
+    W,
+    lay_panels,
+    lay_states,
+)
+
+# The largest distance of a motion from the zero of the curve's parameter, in its width, for which places in doubles
+# suffice at the nodes of panels.
+MAX_DISTANCE = 10.0
+
+# The programs of the law in doubles, of the law in double-double arithmetic, and of ds/dlam and dW/dlam alone, each
+# with its work space.
+PROGRAMS = types.Tuple((LANE_PROGRAM, VECTOR, PROGRAM, VECTOR, PROGRAM, VECTOR))
+
+
+@Inner
+def fill_in_doubles(program, work, inputs, places, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program at places, in double precision.
+
+    Parameters
+    ----------
+    program, work
+        The program (`assembly.LaneProgram.operands`), with its work space.
+    inputs : (3, m) array
+        The inputs: high and low doubles, and bounds on the errors.
+    places : (k, n) array
+        The coordinates of the places.
+    found : (m, n) array
+        Filled with the results.
+    """
+    count, lanes = places.shape[1], min(BLOCK, places.shape[1])
+    for k in range(inputs.shape[1]):
+        for i in range(lanes):
+            at = k * ROW + i
+            work[at], work[at + LOW], work[at + ERROR] = inputs[0, k], inputs[1, k], inputs[2, k]
+    call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
+    for start in range(0, count, BLOCK):
+        n = min(BLOCK, count - start)
+        for k in range(places.shape[0]):
+            at = program[4][k]
+            for i in range(n):
+                work[at + i] = places[k, start + i]
+        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, n)
+        for k in range(found.shape[0]):
+            at = program[5][k]
+            for i in range(n):
+                found[k, start + i] = work[at + i]
+
+
+@Inner
+def exact_values(program, work, inputs, states):  # type: ignore[no-untyped-def]
+    """Return the results of a program in states, computed in double-double arithmetic and rounded to doubles."""
+    n, found = states.shape[1], np.empty((program[4].size, 1, states.shape[1]))
+    places = np.zeros((4, n))
+    for i in range(n):
+        places[0, i], places[1, i], places[2, i] = states[PLACE, i], states[PLACE_LOW, i], max(states[W, i], LEAST_V2)
+    fill_signed_values_of(program, work, inputs, places, states, found)
+    return found.reshape(found.shape[0], n)
+
+
+@Inner
+def is_far(states, marks):  # type: ignore[no-untyped-def]
+    """Return whether doubles do not resolve the places of a motion, because they are so near to each other."""
+    low, high = inf, -inf
+    for i in range(marks):
+        low, high = min(low, states[PLACE, i]), max(high, states[PLACE, i])
+    return MAX_DISTANCE * (high - low) < max(-low, high)
+
+
+@Inner
+def law_on_panels(programs, inputs, states, marks):  # type: ignore[no-untyped-def]
+    """Return the law in states; in the first ``marks`` of them ds/dlam and dW/dlam have all digits."""
+    doubles, doubles_work, exact, exact_work, rates, rates_work = programs
+    if is_far(states, marks):
+        return exact_values(exact, exact_work, inputs, states)
+    parameters = inputs.shape[1] - 2
+    found = np.empty((2 * parameters + 5, states.shape[1]))
+    fill_in_doubles(doubles, doubles_work, inputs[:, :parameters], states, found)
+    both = exact_values(rates, rates_work, inputs, np.ascontiguousarray(states[:, :marks]))
+    found[0, :marks], found[parameters + 2, :marks] = both[0], both[1]
+    return found
+
+
+@entry(
+    types.Tuple((WHOLE, MATRIX, FOLLOWED))(
+        *(VECTOR, WHOLE, PROGRAMS, MATRIX, types.UniTuple(types.float64, 2)),
+        *(VECTOR, VECTOR),
+    ),
+    checked=False,
+)
+def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap):  # type: ignore[no-untyped-def]
+    """Return the panels of runs (`equation.lay_panels`), and the changes on them (`chain.follow`).
+
+    Parameters
+    ----------
+    records, begins
+        As for `equation.lay_panels`.
+    programs : PROGRAMS
+        `programs.law_in_doubles`, `programs.law_program` and `programs.rates_program`.
+    inputs : (3, n + 2) array
+        The inputs of the latter two; the last two are set here.
+    launch : (float, float)
+        The launch speed and the chosen direction.
+    moves, lap
+        As for `chain.follow`.
+    """
+    first, panels = lay_panels(records, begins)
+    states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
+    law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0
+    if v0 == 0.0 and direction != heading:
+        turned = np.ascontiguousarray(states[:, :1])
+        turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
+        other_force = exact_values(programs[4], programs[5], inputs, turned)[1, 0]
+    laid = records, begins, first, panels
+    thrown = v0, direction, other_force
+    return first, panels, follow(laid, law, moves, thrown, lap, np.empty(0))

@@ -1,0 +1,48 @@
+"""Times of batches: their rounding errors are small, and on average nearly zero."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+# The largest error of a half period, and of its mean over many launches, in units in the last place.
+MAX_ERROR, MAX_MEAN_ERROR = 2.5, 0.4
+
+
+def errors(values: np.ndarray, truths: list[Any]) -> np.ndarray:
+    """Return errors in units in the last place of the truths."""
+    with mp.workdps(40):
+        pairs = zip(values.tolist(), truths, strict=True)
+        return np.array([float((mpf(value) - truth) / mpf(float(np.spacing(float(truth))))) for value, truth in pairs])
+
+
+@pytest.mark.parametrize("beta", [0.1, 0.3, 0.4, 0.7])
+def test_roundings_of_the_inertia_do_not_add_up(beta: float, build: Callable[..., ModuleType]) -> None:
+    """Inertia and pi are not representable; with both rounded, all times would be too short or too long."""
+    module = build("rolling_mean", gqm.families.circle(L=1), gqm.Rolling())
+    amplitudes = np.linspace(0.3, 2.0, 400)
+    values = module.sweep("half_period", amplitudes, beta=beta).values
+    with mp.workdps(40):
+        scale = 2 * mp.sqrt((1 + mpf(beta)) / mpf(9.81))
+        truths = [scale * mp.ellipk(mp.sin(mpf(a) / 2) ** 2) for a in amplitudes.tolist()]
+    found = errors(values, truths)
+    assert np.abs(found).max() <= MAX_ERROR
+    assert abs(found.mean()) <= MAX_MEAN_ERROR
+
+
+@pytest.mark.parametrize("beta", [0.1, 0.4, 0.7])
+def test_sums_over_nodes_are_rounded_once(beta: float, build: Callable[..., ModuleType]) -> None:
+    """On Huygens's cycloid all times are the same, and those of the trapezoidal rule are rounded at random about it."""
+    module = build("rolling_cycloid_sums", gqm.families.cycloid(R=1, inverted=True), gqm.Rolling())
+    places = np.pi + np.linspace(0.2, 2.5, 400)
+    values = module.sweep("half_period", places, beta=beta).values
+    with mp.workdps(40):
+        truth = 2 * mp.pi * mp.sqrt((1 + mpf(beta)) / mpf(9.81))
+    found = errors(values, [truth] * len(values))
+    assert np.abs(found).max() <= MAX_ERROR
+    assert abs(found.mean()) <= MAX_MEAN_ERROR
