@@ -52,11 +52,12 @@ docs: $(VENV)/.docs ## build the documentation into docs/_build/html; a warning 
 	$(BIN)/python -m sphinx -W --keep-going --quiet -b html docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
-soak: $(VENV)/.run ## solve random launches and hold each motion to its laws and bounds (COUNT, BOUNDS, KINDS, SWEEPS, SEED)
+soak: $(VENV)/.run ## solve random launches and hold each motion to its laws and bounds (COUNT, BOUNDS, KINDS, SWEEPS, GRADIENTS, SEED)
 	$(BIN)/python scripts/soak.py $(or $(COUNT),100000) $(or $(SEED),0)
 	$(BIN)/python scripts/soak_bounds.py $(or $(BOUNDS),10000) $(or $(SEED),0)
 	$(BIN)/python scripts/soak_kinds.py $(or $(KINDS),10000) $(or $(SEED),0)
 	$(BIN)/python scripts/soak_sweeps.py $(or $(SWEEPS),100) $(or $(SEED),0)
+	$(BIN)/python scripts/soak_gradients.py $(or $(GRADIENTS),30) $(or $(SEED),0)
 
 fuzz: $(VENV)/.run ## read mutated files and expressions for ten minutes (SECONDS, SEED)
 	$(BIN)/python scripts/fuzz.py $(or $(SECONDS),600) $(or $(SEED),0)

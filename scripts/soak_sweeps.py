@@ -47,6 +47,7 @@ PATHS_IN_SPACE = (
     ("(2 + cos(3*u))*cos(2*u)", "(2 + cos(3*u))*sin(2*u)", "sin(3*u)"),
     ("u", "u**2/5", "cosh(u)/2"),
 )
+RADII = ("2 + cos(th)", "1 + cos(2*th)/5", "exp(th/5)", "3/(2 + cos(th))", "2 - sin(3*th)/4")
 FIELDS = ("x**2 + z**2 - 1", "x**2/4 + z**2 - 1", "x**4 + z**4 - 1", "x**2/3 + z**2 + x*z/4 - 1", "x**2 - z - 1")
 # Families with the range of launches.
 FAMILIES: tuple[tuple[Callable[[], Any], float, float], ...] = (
@@ -124,6 +125,9 @@ def drawn_curve(draw: random.Random) -> tuple[str, Any, float, float]:
     if which < 0.7:
         x, z = draw.choice(PATHS)
         return f"({x}, {z})", gqm.Curve.parametric(x=x, z=z, parameter="u"), -2.5, 1.2
+    if which < 0.8:
+        radius = draw.choice(RADII)
+        return f"r = {radius}", gqm.Curve.polar(radius, parameter="th"), -3.0, 1.5
     make, low, high = draw.choice(FAMILIES)
     curve = make()
     return repr(curve), curve, low, high
@@ -131,16 +135,19 @@ def drawn_curve(draw: random.Random) -> tuple[str, Any, float, float]:
 
 def drawn_force(draw: random.Random) -> tuple[str, Any, bool]:
     """Return a force with its description, and whether energy is lost."""
-    if draw.random() < 0.5:
-        said = ["gravity"]
-        force: Any = gqm.Gravity()
+    which = draw.random()
+    if which < 0.5:
+        said, force = ["gravity"], gqm.Gravity()
+    elif which < 0.6:
+        said, force = ["central force"], gqm.CentralForce(centre=(0, "-1/3"), k=4)
     else:
         said = [draw.choice(POTENTIALS)]
         force = gqm.Potential(said[0])
     added: list[tuple[str, float, Any]] = [
         ("rotating frame", 0.35, gqm.RotatingFrame(Omega=draw.choice(("3/10", "7/10")))),
-        ("friction", 0.25, gqm.CoulombFriction(mu="1/20")),
-        ("drag", 0.25, gqm.QuadraticDrag(b="1/20")),
+        ("friction", 0.25, gqm.CoulombFriction(mu=draw.choice(("1/20", "1/20", "2/5")))),
+        ("drag", 0.25, gqm.QuadraticDrag(b=draw.choice(("1/20", "1/20", "1")))),
+        ("droplet", 0.1, gqm.SurfaceTension(gamma="1/20", ell_c="1/10")),
     ]
     if draw.random() < 0.25:  # a body that rolls does not slide
         added[1] = ("radius", 1.0, gqm.Rolling(radius=draw.choice(("1/20", "1/100")), beta="2/5"))
@@ -148,7 +155,7 @@ def drawn_force(draw: random.Random) -> tuple[str, Any, bool]:
         if draw.random() < share:
             said.append(name)
             force += kernel
-    return ", ".join(said), force, "friction" in said or "drag" in said
+    return ", ".join(said), force, bool({"friction", "drag", "droplet"}.intersection(said))
 
 
 def difference(swept: Any, expected: Any) -> float:

@@ -112,7 +112,7 @@ def _refuse_turn(turn: float, row: int) -> None:
 
 
 def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
-    """Warn of a curvature that changes its sign from point to point, which the curvature of a real track does not.
+    """Warn of a curvature that rises and falls from point to point, which the curvature of a real track does not.
 
     Scatter of points at distances h contributes to the curvature divided by h**2. If it dominates the curvature, the
     sign of the curvature changes between most neighbours; the sign of the curvature's changes shows it earlier, and on
@@ -131,11 +131,10 @@ def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
         return
     felt = 2.0 * extent(places) * median(swings)
     if felt > NOTICEABLE_LOAD:
-        changes = sum(before * after < 0.0 for before, after in pairwise(bends))
         warnings.warn(
-            f"sampled: the curvature goes up and down from point to point (its sign changes between {changes} of "
-            f"{len(bends) - 1} neighbours), and loads with it, by about {felt:.2g} g where a body is fast: the points "
-            f"scatter, or are too far apart; {remedy}",
+            "sampled: the curvature goes up and down from point to point (it changes between rising and falling at "
+            f"{len(swings)} of {len(steps) - 1} places), and loads with it, by about {felt:.2g} g where a body is "
+            f"fast: the points scatter, or are too far apart; {remedy}",
             NoisyPointsWarning,
             stacklevel=5,
         )

@@ -241,7 +241,7 @@ def _symmetry(
 ) -> tuple[Symmetry | None, SymmetricOrbits | None]:
     """Return the axes of symmetry and the time of orbits about them."""
     lam, potential = curve.parameter, law.effective_potential
-    axes = symmetry(potential, law.effective_potential_slope, shape.ds, lam, curve.domain)
+    axes = symmetry(potential, law.effective_potential_slope, shape.ds, lam, curve.domain, shape.cusp)
     orbits = symmetric_orbits(2 * potential, shape.ds, lam, axes)
     if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
         axes = replace(axes, monotone=False)

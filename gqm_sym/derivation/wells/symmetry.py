@@ -38,19 +38,22 @@ def symmetry(
     ds: sp.Expr,
     lam: sp.Symbol,
     domain: tuple[sp.Expr | None, sp.Expr | None] = (None, None),
+    cusp: sp.Expr | None = None,
 ) -> Symmetry | None:
     """Return the places about which the effective potential and ds**2 are even; None if ds is even about none of them.
 
     The candidates are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines,
     0, and the centre that follows from the two highest powers of a polynomial. `Symmetry.place` is one about which ds
-    is even, inside the domain if possible. The others may be cusps, about which ds is odd and which no body passes.
+    is even, inside the domain if possible. The others may be cusps, which no body passes: ds is odd about them, or the
+    factor ``cusp`` of ds vanishes there. A cusp elsewhere needs no attention: the slope of the potential vanishes at
+    every cusp, and it vanishes nowhere on the way from a place of symmetry to a turning point.
     """
     forms = (potential, ds)
     if any(_is_longer(form, MAX_LENGTH) for form in forms):
         return None
     candidates = dict.fromkeys(_candidates(forms, lam))
     found = [place for place in candidates if all(_is_even(form, lam, place) for form in (potential, ds**2))]
-    passable = [place for place in found if _is_even(ds, lam, place)]
+    passable = [p for p in found if _is_even(ds, lam, p) and (cusp is None or cusp.xreplace({lam: p}) != 0)]
     if not passable:
         return None
     known = min(passable, key=lambda place: not _is_inside(place, domain))

@@ -332,7 +332,8 @@ def gradient(motion: Any, changes: PassageChanges, quantity: str) -> Array:
         One of `launch.kinds.QUANTITIES`.
     """
     if quantity == "turning_points":
-        return np.array([changes.turn.moves[0]] * len(motion.turning_points)).reshape(-1, changes.source.variables)
+        turns = [changes.turn.moves[0] for _ in motion.turning_points]
+        return np.array(turns).reshape(-1, changes.source.variables)
     if quantity in EXTREMES:
         return _extreme(motion, changes, quantity)
     if quantity in FINAL_QUANTITIES and not isfinite(motion.t_end):
@@ -340,7 +341,7 @@ def gradient(motion: Any, changes: PassageChanges, quantity: str) -> Array:
     if quantity != "t_end":
         raise SolutionError(f"gradient: this motion has no {quantity}; it is of kind {motion.kind!r}")
     what, state = motion.legs[-1].end, motion.state(motion.t_end)
-    if what == "horizon":
+    if what == "horizon" or motion.t_end == 0.0:
         return np.zeros(changes.source.variables)
     moved = changes.end(what, state.lam)
     return changes.time_slopes(state.lam, state.v, moved, has_turned=motion._has_turned(motion.t_end))

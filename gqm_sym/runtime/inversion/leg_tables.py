@@ -56,8 +56,9 @@ BLOCK = 64
 @Inlined
 def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
     """Return the index at which the row of the interval that contains a time begins."""
-    # If the body rests from the start, t * rate is infinite or not a number; the last slot is then read.
-    at, last = item_at(slots, np.int64(min(slots.size - 1.0, t * rate))), intervals.size - INTERVAL_COLUMNS
+    # If the motion ends where it begins the rate is infinite: the first slot is then read at the launch, else the last.
+    slot = choose(t > 0.0, min(slots.size - 1.0, t * rate), 0.0)
+    at, last = item_at(slots, np.int64(slot)), intervals.size - INTERVAL_COLUMNS
     while at < last and t >= item_at(intervals, at + UNTIL):
         at += INTERVAL_COLUMNS
     return at

@@ -128,7 +128,8 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         begin = ends[i - 1] if i > 0 else 0.0
         until = time_from_launch(ends[i] if sense > 0.0 else begin, 0.0, timing)[0]
         since = time_from_launch(begin if sense > 0.0 else ends[i], 0.0, timing)[0]
-        if not (until > timing.t_start and since < timing.t_stop) and (kept > 0 or k < count - 1):
+        # A piece that ends where it begins has the interval of its beginning.
+        if not (until > timing.t_start and (kept == 0 or since < timing.t_stop)) and (kept > 0 or k < count - 1):
             continue
         row, state, start, stop = intervals[kept], states[kept], 0.0, 0.0
         for m in range(TERMS):

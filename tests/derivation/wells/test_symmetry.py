@@ -19,6 +19,13 @@ CASES = {
     "two waves": (gqm.Curve.graph("cos(x) + cos(2*x)", parameter="x"), 0, sp.pi, False),
     "two waves out of step": (gqm.Curve.graph("sin(x) + cos(3*x)/2 + x/9", parameter="x"), None, None, False),
     "cubic": (gqm.Curve.graph("x**3", parameter="x"), None, None, False),
+    "cycloid whose wells have cusps": (
+        gqm.Curve.parametric(x="u - sin(u)", z="-cos(u)", parameter="u"),
+        -sp.pi,
+        sp.pi,
+        False,
+    ),
+    "semicubical parabola": (gqm.Curve.parametric(x="u**3", z="u**2", parameter="u"), None, None, False),
     "spiral": (gqm.Curve.polar("exp(theta/5)", parameter="theta"), None, None, False),
 }
 

@@ -166,3 +166,28 @@ def test_what_there_is_not(slope: ModuleType) -> None:
         with pytest.raises(SolutionError, match=f"has no {quantity}"):
             motion.gradient(quantity)
     assert motion.gradient("t_end", ("k", "lam0")) == {"k": 0.0, "lam0": 0.0}
+    down = slope.solve(0, 1, t_max=0.5)
+    assert down.gradient("turning_points", ("k", "lam0")) == {"k": (), "lam0": ()}
+
+
+def test_lifted_off_at_once(generated_folder: Path) -> None:
+    """A body that flies off where it is launched changes as the launch does, with losses and without, and its end at
+    t = 0 does not.
+    """
+    curve, side = gqm.Curve.graph("-x**2", parameter="x"), {"contact": "above"}
+    for law, name in ((gqm.Gravity(), "free"), (gqm.Gravity() + gqm.QuadraticDrag(b="1/20"), "dragged")):
+        module = gqm.build(gqm.derive(curve, law), name=f"passage_flies_{name}", folder=generated_folder)
+        motion, names = module.solve(0.5, 5.0, **side), ("lam0", "v0", "m")
+        assert motion.legs[-1].end == "liftoff"
+        assert motion.gradient("t_end", names) == dict.fromkeys(names, 0.0)
+        changes = motion.sensitivity(0.0, names)
+        np.testing.assert_allclose(changes.lam, [1.0, 0.0, 0.0], atol=1e-15)
+        np.testing.assert_allclose(changes.v, [0.0, 1.0, 0.0], atol=1e-14)
+        # N = m (g - 2 v**2/(1 + 4 x**2))/sqrt(1 + 4 x**2), at x = 1/2
+        by_place = 2 * (3 * 25 - 9.81) / 2**1.5
+        wanted = [by_place, -2 * 5 / 2**0.5, (9.81 - 25) / 2**0.5]
+        np.testing.assert_allclose(changes.normal_force, wanted, rtol=1e-13)
+        for quantity in ("normal_force_min", "normal_force_max"):
+            np.testing.assert_allclose(list(motion.gradient(quantity, names).values()), wanted, rtol=1e-13)
+        for quantity in ("v_min", "v_max"):
+            np.testing.assert_allclose(list(motion.gradient(quantity, names).values()), [0, 1, 0], atol=1e-14)

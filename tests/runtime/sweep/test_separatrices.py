@@ -196,3 +196,22 @@ def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[st
     motions = [modules[name].solve(*launch) for launch in zip(lam0, v0, strict=True)]
     times = [motion.half_period if motion.kind == "libration" else np.nan for motion in motions]
     assert swept.values == pytest.approx(np.array(times), rel=TWO_ULPS, abs=0.0, nan_ok=True)
+
+
+def test_wells_with_cusps(tmp_path: Path) -> None:
+    """A body that falls along an inverted arch of a cycloid ends at its cusp, after 2 arcosh(1/cos(u/2))/sqrt(g).
+
+    With p = cos(u/2), ds is 4 dp and V**2 is 4 g (p**2 - p0**2), where p0 is that of the launch.
+    """
+    curve = gqm.Curve.parametric(x="u - sin(u)", z="-cos(u)", parameter="u")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="hills_with_cusps", folder=tmp_path)
+    lam0 = np.concatenate([np.linspace(-2.9, -0.1, 40), np.linspace(0.1, 2.9, 40)])
+    with mp.workdps(30):
+        truth = np.array([float(2 * mp.acosh(1 / mp.cos(mpf(u) / 2)) / mp.sqrt(G)) for u in lam0.tolist()])
+    np.testing.assert_allclose(module.sweep("t_end", lam0).values, truth, rtol=4e-15)
+    for quantity in ("half_period", "period", "turning_points"):
+        swept = module.sweep(quantity, lam0, 0.3)
+        assert np.isnan(swept.values).all()
+        assert swept.status.all()
+    for u in lam0[::13].tolist():
+        assert module.solve(u).kind == "transit"

@@ -26,8 +26,9 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
+from gqm_sym.runtime.legs.panels.solving import is_settled
 from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
-from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, first_attempt, next_attempt
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
@@ -65,15 +66,19 @@ def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
-    """Fill the rows up to LOAD for the place at the end of a variable; return whether the body is fast there."""
-    begin_leg(blocks, work)
+    """Fill the rows up to LOAD for the place at the end of a variable, with the nodes and V**2 to begin with in the
+    rows NODES and W; return whether the body is fast there.
+    """
+    change = 0.0
     for _ in range(MAX_TRIES):
         if not sample_leg(forces, march, panel, blocks, variable, work):
             return False
+        before = change
         change, size = fill_v2_from_turn(blocks, variable.width, work)
         if not work[blocks * W + blocks * WIDE - 1] >= HIGH_V2_RATIO * size:
             return False
-        if forces.linear or change <= SETTLED * size:
+        settled = change <= SETTLED * size or is_settled(change, before, size, forces.squared_contact != 0)
+        if forces.linear or settled:
             fill_load(blocks, work)
             return True
     return False
@@ -117,12 +122,13 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
         attempt = first_attempt(blocks, branch, march, h)
+        begin_leg(1, work)
         while attempt.blocks > 0:
-            blocks = attempt.blocks
-            if not reaches(forces, march, panel, blocks, attempt.variable, work):
+            blocks, variable = attempt.blocks, attempt.variable
+            if not reaches(forces, march, panel, blocks, variable, work):
                 blocks = 0
                 break
-            fine, onwards, ratio = is_resolved(forces, panel, blocks, attempt.variable, work)
+            fine, onwards, ratio = is_resolved(forces, panel, blocks, variable, work)
             if fine:
                 what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
                 to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
@@ -131,7 +137,8 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             if onwards == 0 or attempt.plain_blocks != NOT_TRIED:
                 attempt = next_attempt(attempt, onwards, ratio, march, work)
             else:  # for a single leg, a map would take as long as more nodes
-                attempt = Attempt(onwards, attempt.variable, attempt.branch, NOT_TRIED, 1.0)
+                attempt = Attempt(onwards, variable, attempt.branch, NOT_TRIED, 1.0)
+            carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work)
             blocks = attempt.blocks
         branch = attempt.branch
     return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks, branch

@@ -1,4 +1,7 @@
-"""Branch points of ds beside a leg, and the order of attempts to resolve the leg as one polynomial."""
+"""Branch points of ds beside a leg, and the order of attempts to resolve the leg as one polynomial.
+
+If the forces are not linear in V**2, an attempt begins with V**2 from the one before.
+"""
 
 from math import fabs, inf, log, sqrt
 from typing import NamedTuple
@@ -7,11 +10,30 @@ import numpy as np
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.legs.panels.equation import DS, SERIES, product
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, to_coefficients
-from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint, LegVariable, unstretched, variable_for
-from gqm_sym.runtime.legs.runs.whole_rows import examine_row, size_of_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
+from gqm_sym.runtime.legs.panels.equation import (
+    DS,
+    EXPM1_Q,
+    MEAN,
+    NODES,
+    SERIES,
+    SPEED,
+    D,
+    W,
+    copy_row,
+    linear_row,
+    product,
+)
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, last_sum_row, next_sum_row
+from gqm_sym.runtime.legs.runs.leg_variable import (
+    BranchPoint,
+    LegVariable,
+    grown_row,
+    stretched_row,
+    unstretched,
+    variable_for,
+)
+from gqm_sym.runtime.legs.runs.whole_rows import begin_leg, examine_row, size_of_row, size_row
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
 
 # The largest number of steps of Newton's method to a branch point, and the last step as a share of its height. The map
 # need not be that of the exact place.
@@ -27,7 +49,7 @@ NOT_TRIED = -1
 # near.
 LEAST_GAIN = 1.05
 
-series_buffer = on_stack(WIDE)
+series_buffer, terms_buffer = on_stack(WIDE), on_stack(MAX_BLOCKS * WIDE)
 
 
 class Attempt(NamedTuple):
@@ -109,7 +131,7 @@ def branch_beside(march, width, work):  # type: ignore[no-untyped-def]
     x, y = first_guess(work[SERIES : SERIES + COUNT])
     if not y > 0.0:
         return none
-    to_coefficients(work, SERIES, terms, 0)
+    to_coefficients(1, work, SERIES, terms, 0)
     x, y = zero_of_series(terms, x, y)
     if not (fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT):
         return none
@@ -164,3 +186,47 @@ def next_attempt(attempt, onwards, ratio, march, work):  # type: ignore[no-untyp
         if stretched.extent > 0.0:
             return Attempt(MAX_BLOCKS, stretched, unused, NOT_TRIED, 1.0)
     return Attempt(onwards, variable, branch, NOT_TRIED, 1.0)
+
+
+@Inner
+def carry_v2(forces, known, old, blocks, new, work):  # type: ignore[no-untyped-def]
+    """Fill in the nodes, and the row W as far as it is known; return whether it is.
+
+    It is not carried into a variable that is less stretched, nor if the forces are linear in V**2.
+
+    Parameters
+    ----------
+    forces : Forces
+    known : int
+        The number of blocks with which V**2 is known.
+    old : LegVariable
+        The variable of the leg for that.
+    blocks, new
+        The same for the rows to be filled.
+    work : array
+    """
+    if blocks == 0:
+        return False
+    if forces.linear or not (old.extent == 0.0 or new.extent == old.extent):
+        begin_leg(blocks, work)
+        return False
+    terms = terms_buffer()
+    to_coefficients(known, work, known * W, terms, 0)
+    begin_leg(blocks, work)
+    for at in range(0, blocks * WIDE, WIDE):
+        # Clenshaw's recurrence at the shares of the way that belong to the new nodes.
+        twice_x, one, other = blocks * D + at, blocks * MEAN + at, blocks * SPEED + at
+        if new.extent == old.extent:
+            linear_row(work, twice_x, blocks * NODES + at, -2.0, 4.0)
+        else:
+            grown_row(work, blocks * EXPM1_Q + at, blocks * NODES + at, new.extent)
+            stretched_row(work, twice_x, blocks * EXPM1_Q + at, new.rising, new.falling)
+            linear_row(work, twice_x, twice_x, -2.0, 4.0 / new.width)
+        copy_row(work, one, 0.0)
+        copy_row(work, other, 0.0)
+        for k in range(known * WIDE - 2, 0, -2):  # each sum replaces the last but one
+            next_sum_row(work, other, twice_x, one, other, terms[k])
+            next_sum_row(work, one, twice_x, other, one, terms[k - 1])
+        last_sum_row(work, twice_x, twice_x, one, other, terms[0])
+        size_row(work, blocks * W + at, twice_x)
+    return True

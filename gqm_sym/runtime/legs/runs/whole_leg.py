@@ -54,7 +54,7 @@ from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.solving import is_settled
-from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, first_attempt, next_attempt
+from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
@@ -68,6 +68,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     is_contact_force_resolved,
     keeps_sign,
     load_sign,
+    move_v2,
     sample_leg,
     size_of_row,
     whole_buffer,
@@ -97,6 +98,14 @@ LAST_CHANGE = 1e-9
 
 # The largest step of Newton's method after which a width is close enough to begin with more nodes.
 ROUGH_STEP = 0.03
+
+# The change of V**2 found with fewer nodes, as a share of its largest value, that is the last one: its square is
+# rounding only.
+CHECKED = 1e-9
+
+# What is sought of the variable of a leg: its width, roughly or to the last digit, or whether the one found with fewer
+# nodes is right.
+ROUGH, FIND, CHECK = range(3)
 
 # The smallest and the largest factor by which the width grows if no turn is found on it.
 MIN_GROWTH, MAX_GROWTH = 1.05, 4.0
@@ -139,16 +148,16 @@ def factor_to_turn(blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work):  # type: ignore[no-untyped-def]
+def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  # type: ignore[no-untyped-def]
     """Return the variable of a leg (`leg_variable`) whose width is about that of ``variable`` and at most ``room``, and
     fill FORCE and EXPM1_Q; the width is 0 if no turn is found.
 
-    A width that ``is_rough`` is the start for one with more nodes, and the rows are those of another width. If the
-    forces are not linear in V**2, the same steps are those of Newton's method for V**2.
+    With the ``aim`` ROUGH the width is the start for one with more nodes, and the rows are those of another width. If
+    the forces are not linear in V**2, the same steps are those of Newton's method for V**2, which the row W holds to
+    begin with; it has been found with fewer nodes, as the width has, if the aim is CHECK.
     """
-    variable, last, at = lengthened(variable, 1.0, room), np.inf, blocks * TAILS
-    change, settled = 0.0, forces.linear
-    begin_leg(blocks, work)
+    variable, at = lengthened(variable, 1.0, room), blocks * TAILS
+    last, change, settled = 0.0 if aim == CHECK else np.inf, 0.0, forces.linear
     for _ in range(MAX_TRIES):
         h = variable.width
         if not sample_leg(forces, march, panel, blocks, variable, work):
@@ -157,6 +166,7 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work
             before = change
             change, size = fill_v2(blocks, h, work)
             settled = is_settled(change, before, size, forces.squared_contact != 0)
+            settled = settled or (aim == CHECK and before == 0.0 and change <= CHECKED * size)
         to_end_terms(blocks, work, blocks * FORCE, work, at)
         factor = 0.0
         if work[at + 1] < 0.0:
@@ -170,12 +180,14 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, is_rough, work
                 return variable
             last = fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
-            if is_rough and fabs(step) <= ROUGH_STEP:
+            if aim == ROUGH and fabs(step) <= (ROUGH_STEP if forces.linear else LAST_STEP):
                 return lengthened(variable, factor, room)
         if factor == 0.0:
             factor = factor_to_turn(blocks, work)
         if not factor > 0.0 or (h == room and factor > 1.0):
             break
+        if not forces.linear:
+            move_v2(forces, blocks, h, min(factor, 2.0) - 1.0, work)
         variable = lengthened(variable, factor, room)
     return unstretched(0.0)
 
@@ -212,11 +224,14 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
     width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
     attempt = first_attempt(start.blocks, branch, march, width)
     variable = attempt.variable
+    begin_leg(1, work)
     if 1 < attempt.blocks <= most:
-        variable = variable_of_leg(forces, march, panel, 1, room, variable, True, work)
+        variable = variable_of_leg(forces, march, panel, 1, room, variable, ROUGH, work)
+        carry_v2(forces, 1, variable, attempt.blocks, variable, work)
+    aim = FIND
     while 0 < attempt.blocks <= most and variable.width > 0.0:
         blocks = attempt.blocks
-        variable = variable_of_leg(forces, march, panel, blocks, room, variable, False, work)
+        variable = variable_of_leg(forces, march, panel, blocks, room, variable, aim, work)
         if not variable.width > 0.0:
             break
         fine, onwards, ratio = is_whole(forces, panel, blocks, variable, reading, work)
@@ -224,6 +239,7 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
         if fine:
             return attempt
         attempt = next_attempt(attempt, onwards, ratio, march, work)
+        aim = CHECK if carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work) else FIND
         variable = attempt.variable
     return Attempt(0, variable, attempt.branch, NOT_TRIED, 1.0)
 

@@ -80,6 +80,9 @@ square_buffer = on_stack(4 * MAX_BLOCKS * WIDE)
 # A bound on the Lebesgue constant for all numbers of nodes (`polynomials.LEBESGUE`).
 LEBESGUE = 4.0
 
+slope_row = over_rows(lambda p, q, w, step: step * (p - q * w), WIDE)
+moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
+size_row = over_rows(lambda w: abs(w), WIDE)
 quotient_row = over_rows(lambda one, other: one / other, WIDE)
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
@@ -209,6 +212,24 @@ def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
         v2_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h)
     return replace_v2(blocks, work)
+
+
+@Inner
+def move_v2(forces, blocks, h, step, work):  # type: ignore[no-untyped-def]
+    """Move the row W of a leg of the width ``h`` to the nodes of one that is wider by a share ``step`` of it.
+
+    W is known from the nearer turn on: from the start in the first half, and from where the leg ended in the second.
+    """
+    v, last = float(forces.direction), blocks * WIDE - 1
+    for at in range(0, last, WIDE):
+        slope_row(work, blocks * SPEED + at, blocks * P + at, blocks * Q + at, blocks * W + at, v * h * step)
+    at_end = work[blocks * SPEED + last]
+    for at in range(0, last, WIDE):
+        moved_row(work, blocks * W + at, blocks * W + at, blocks * NODES + at, blocks * SPEED + at)
+    for j in range(blocks * W + last // 2 + 1, blocks * W + last + 1):
+        work[j] -= at_end
+    for at in range(0, last, WIDE):
+        size_row(work, blocks * W + at, blocks * W + at)
 
 
 @Inner

@@ -10,7 +10,7 @@ from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_div
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of, fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.launch.ends import distance_to_axis
-from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
+from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CUSP_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
@@ -370,7 +370,8 @@ def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-unt
 
     V**2 is zero at both ends of a libration, and has its launch value at both ends of a lap. On the piece next to a
     zero the slope must have one sign throughout, so that the zero is simple and the only one there. For an orbit that
-    is ``mirrored`` the half up to the axis is enough.
+    is ``mirrored`` the half up to the axis is enough. Where ds is a small share of its largest value on a piece it may
+    vanish at a place that rounding has moved out of the piece.
     """
     places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
@@ -402,6 +403,6 @@ def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-unt
             # Towards the axis V**2 increases, except for rounding.
             grown = 0.5 * from_w - choose(fall > 0.0, fall, 0.0) * (hi[j] - lo[j])
             good = choose(first, -fall, choose(last, -growth, choose(half, grown, lowest - clear))) > 0.0
-            good = good & (last | half | (w > clear)) & (box[2, j] > 0.0)
+            good = good & (last | half | (w > clear)) & (box[2, j] > CUSP_SHARE * box[3, j])
             state[j] = choose(good, state[j], NOWHERE)
             behind[j], speeds[j] = places[j], w

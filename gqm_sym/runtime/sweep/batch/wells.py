@@ -19,6 +19,7 @@ from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import AXIS, PARAMETERS, PLACE_LOW, element
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS
+from gqm_sym.runtime.launch.zeros import CUSP_SHARE
 from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
@@ -133,7 +134,7 @@ def rises_up_to(fns, side, distance, inner):  # type: ignore[no-untyped-def]
     good = True
     for i in range(LANES):
         rises[i] = box[0, i] if above else -box[1, i]
-        good = good and box[2, i] > 0.0
+        good = good and box[2, i] > CUSP_SHARE * box[3, i]
     for i in range(LANES - 1):
         good = good and rises[i] > 0.0
     return good and -rises[LANES - 1] < rises[LANES - 2]

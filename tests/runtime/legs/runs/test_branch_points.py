@@ -1,4 +1,4 @@
-"""Branch points of ds are found from its values on a leg."""
+"""Branch points of ds are found from its values on a leg, and V**2 is carried from one attempt to the next."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc, mpf
 
-from gqm_sym.runtime.legs.panels.polynomials import SHARES, TO_COEFFICIENTS
-from gqm_sym.runtime.legs.runs.branch_points import first_guess, zero_of_series
+from gqm_sym.runtime.legs.panels.equation import Forces, W
+from gqm_sym.runtime.legs.panels.polynomials import SHARES, TO_COEFFICIENTS, WIDE
+from gqm_sym.runtime.legs.runs.branch_points import BranchPoint, carry_v2, first_guess, zero_of_series
+from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, unstretched, variable_for
+from gqm_sym.runtime.legs.runs.whole_rows import ROWS
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, nodes
 
 CURVES: list[tuple[Callable[[Any], Any], tuple[float, float], tuple[str, str]]] = [
     (lambda x: 1 + 4 * x * x, (-1.1, 1.0), ("0", "0.5")),
@@ -28,3 +32,41 @@ def test_branch_points(square: Any, leg: tuple[float, float], near: tuple[str, s
     assert abs(mpc(middle + half * x, abs(half) * y) - mpc(expected.real, abs(expected.imag))) <= 0.02 * abs(
         expected.imag
     )
+
+
+NONLINEAR = Forces(0, np.zeros(1), True, False, False, 1, 0)
+LINEAR = NONLINEAR._replace(linear=True)
+
+
+def _carried(forces: Forces, old: LegVariable, known: int, new: LegVariable, blocks: int) -> tuple[bool, Any]:
+    """Return whether V**2 = d (2 - d) exp(d/5) is carried to another number of blocks, and its errors there."""
+
+    def v2(variable: LegVariable, blocks: int) -> Any:
+        distances = np.array([distance_at(variable, float(y)) for y in nodes(blocks)[0]])
+        return distances * (2.0 - distances) * np.exp(0.2 * distances)
+
+    work = np.zeros(ROWS * MAX_BLOCKS * WIDE)
+    work[known * W : known * (W + WIDE)] = v2(old, known)
+    is_known = carry_v2(forces, known, old, blocks, new, work)
+    return is_known, work[blocks * W : blocks * (W + WIDE)] - (v2(new, blocks) if is_known else 0.0)
+
+
+def test_v2_of_the_last_attempt() -> None:
+    """The next attempt begins with V**2 from fewer nodes, or from a variable that is less stretched; otherwise with
+    0.
+    """
+    plain, stretched = unstretched(2.0), variable_for(BranchPoint(0.9, 0.8), (0.0, 0.0), 1, 2.0)
+    for old, known, new, blocks in (
+        (plain, 1, plain, 2),
+        (plain, 1, plain, 3),
+        (plain, 2, plain, 3),
+        (plain, 1, stretched, 1),
+        (stretched, 1, stretched, 3),
+    ):
+        is_known, errors = _carried(NONLINEAR, old, known, new, blocks)
+        assert is_known
+        assert np.abs(errors).max() <= 1e-14
+    for forces, old, new in ((LINEAR, plain, plain), (NONLINEAR, stretched, plain)):
+        is_known, v2 = _carried(forces, old, 1, new, 2)
+        assert not is_known
+        assert not v2.any()

@@ -13,7 +13,10 @@ from scipy.optimize import minimize_scalar
 
 import generated.circle_coulomb
 import gqm_sym as gqm
+from gqm_sym.runtime.legs.panels.equation import NODES, Forces, P, Q, W
+from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs import whole_tables
+from gqm_sym.runtime.legs.runs.whole_rows import ROWS, move_v2
 
 # The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
@@ -43,6 +46,25 @@ def test_tables(blocks: int) -> None:
         assert whole_tables.half_times(blocks).T @ y**n == pytest.approx([float(half) for half in halves], abs=TABLE)
         assert whole_tables.arrival_time(blocks).T @ y**n == pytest.approx([1 / (n + 0.5)], abs=TABLE)
     assert np.abs(whole_tables.coefficients(blocks).T @ np.ones(y.size) - np.eye(y.size)[0]).max() <= TABLE
+
+
+@pytest.mark.parametrize("blocks", whole_tables.BLOCKS)
+def test_v2_on_a_wider_leg(blocks: int) -> None:
+    """V**2 moves with the width of the leg up to the square of the step; its second half was counted from the end."""
+    v2, slope, y = (lambda d: np.sin(2.0 * d)), (lambda d: 2.0 * np.cos(2.0 * d)), whole_tables.nodes(blocks)[0]
+    forces, half = Forces(0, np.zeros(1), True, False, False, -1, 0), blocks * WIDE // 2
+    turn = 0.5 * np.pi
+    for step in (0.02, -0.02):
+        h, work = turn / (1.0 + step), np.zeros(ROWS * whole_tables.MAX_BLOCKS * WIDE)
+        row = {
+            name: slice(blocks * at, blocks * (at + WIDE)) for name, at in (("y", NODES), ("p", P), ("q", Q), ("w", W))
+        }
+        work[row["y"]] = y
+        work[row["w"]] = v2(h * y) - np.where(np.arange(y.size) < half, 0.0, v2(h))
+        work[row["q"]] = -0.1
+        work[row["p"]] = -slope(h * y) - 0.1 * work[row["w"]]
+        move_v2(forces, blocks, h, step, work)
+        assert np.abs(work[row["w"]] - v2(turn * y)).max() <= 4.0 * step * step
 
 
 class Pendulum:
