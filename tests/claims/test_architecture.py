@@ -106,6 +106,7 @@ TESTED_THROUGH = {
     "double_double/quadrature.py": "runtime/double_double/test_orbit_time.py",
     "gradients/charts/orbit.py": "runtime/gradients/test_charts.py",
     "gradients/charts/programs.py": "runtime/gradients/test_charts.py",
+    "gradients/charts/second_programs.py": "runtime/gradients/test_seconds.py",
     "gradients/charts/shaped_pieces.py": "runtime/gradients/test_charts.py",
     "gradients/charts/space_programs.py": "runtime/gradients/test_space_charts.py",
     "gradients/evaluation.py": "runtime/gradients/test_quantities.py",

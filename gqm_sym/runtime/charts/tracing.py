@@ -28,7 +28,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
-from gqm_sym.runtime.double_double.recording import bind, record_by_coordinates
+from gqm_sym.runtime.double_double.recording import bound_by_coordinates
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
 # The largest distance of a start point from the curve, as a share of its larger coordinate; a nearer point is moved
@@ -162,11 +162,13 @@ class Traced:
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
         """Return the curve in double-double arithmetic; None if F is too long a formula, or not smooth."""
-        formulas = bind(record_by_coordinates(self.level, len(p)), p) if self.is_exact(chart) else None
+        formulas = bound_by_coordinates(self.level, p) if self.is_exact(chart) else None
         if formulas is None:
             return None
         context = starting_context()
         x, z = Zeros(self, context, tuple(number.at(context) for number in p)).start
+        if isinstance(x, context.mpc) or isinstance(z, context.mpc):
+            return None
         given = chart.block, *formulas.operands, sample_places()
         count = chart.edges.size - 1
 
@@ -257,6 +259,9 @@ class Zeros:
             f, fx, fz = self._level(context, at_x, at_z, p)
             square = fx * fx + fz * fz
             # Newton's method across the curve; along it to the foot of the perpendicular.
+            if isinstance(square, context.mpc):  # F is not real there
+                at_x = at_z = square
+                break
             across, along = f / square, ((x - at_x) * fz - (z - at_z) * fx) / square
             at_x, at_z = at_x - across * fx + along * fz, at_z - across * fz - along * fx
             if (abs(across) + abs(along)) * context.sqrt(square) <= context.ldexp(abs(x) + abs(z), 16 - context.prec):

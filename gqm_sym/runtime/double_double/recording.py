@@ -131,6 +131,8 @@ class TapeNumber:
 
     def __pow__(self, other: Any) -> "TapeNumber":
         exponent = self._tape.number(other)
+        if exponent.known is None:
+            self._tape.exponents |= self._tape.parameters_of(exponent.register)
         if exponent.known is None or exponent.known.denominator > 2:
             return self._tape.exp(exponent * self._tape.log(self))
         base = self if exponent.known.denominator == 1 else self._tape.sqrt(self)
@@ -149,16 +151,33 @@ class TapeNumber:
 
 
 class _Recorder:
-    """The namespace of operations with which formulas are recorded. Its functions have the names that mpmath uses."""
+    """The namespace of operations with which formulas are recorded. Its functions have the names that mpmath uses.
 
-    def __init__(self, parameters: int, coordinates: int = 1) -> None:
+    Parameters
+    ----------
+    parameters, coordinates : int
+        The numbers of run-time parameters and of coordinates of a place.
+    known : sequence of (int, Fraction)
+        Run-time parameters whose values belong to the formulas.
+
+    Attributes
+    ----------
+    exponents : set of int
+        The run-time parameters on which exponents depend.
+    """
+
+    def __init__(self, parameters: int, coordinates: int = 1, known: Sequence[tuple[int, Fraction]] = ()) -> None:
+        self.exponents: set[int] = set()
         # Each entry is an operation and the registers of its operands. The entry of a constant has its doubles.
         self.entries: list[tuple[Any, ...]] = [
             *(("parameter", k) for k in range(parameters)),
             *(("place", k) for k in range(coordinates)),
         ]
         self._known: dict[tuple[Any, ...], int] = {entry: k for k, entry in enumerate(self.entries)}
-        self.values = tuple(TapeNumber(self, k) for k in range(parameters))
+        given = dict(known)
+        self.values = tuple(
+            TapeNumber(self, known=given[k]) if k in given else TapeNumber(self, k) for k in range(parameters)
+        )
         self.places = tuple(TapeNumber(self, parameters + k) for k in range(coordinates))
         self.place = self.places[0]
         self.pi, self.e = self._constant(PI), self._constant(E)
@@ -241,6 +260,11 @@ class _Recorder:
             is_operation = not isinstance(code, str) or code == "cosine"
             depends.append(any(depends[k] for k in operands) if is_operation else code == "place")
         return depends
+
+    def parameters_of(self, register: int) -> set[int]:
+        """Return the run-time parameters on which a register depends."""
+        entries = [self.entries[k] for k in self.needed_by([register])]
+        return {entry[1] for entry in entries if entry[0] == "parameter"}
 
     def needed_by(self, registers: Sequence[int]) -> set[int]:
         """Return the given registers and all entries that they are computed from."""
@@ -341,16 +365,39 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
 
 
 @lru_cache(maxsize=64)
-def record_by_coordinates(function: Callable[..., Any], parameters: int, dimension: int = 2) -> Recorded | None:
+def record_by_coordinates(
+    function: Callable[..., Any], parameters: int, dimension: int = 2, known: tuple[tuple[int, Fraction], ...] = ()
+) -> Recorded | None:
     """Return the tape of a function ``f(op, x, z, p)``, or ``f(op, x, y, z, p)`` in space, that gives a value and its
     derivatives with respect to the coordinates.
 
-    It is None if it is too long.
+    It is None if it is too long. ``known`` are run-time parameters whose values belong to it.
     """
-    op = _Recorder(parameters, dimension)
+    op = _Recorder(parameters, dimension, known)
     value, *slopes = map(op.register, function(op, *_in_order(op.places), op.values))
     by_x, by_z, *by_y = _in_order(slopes)
     return op.finished((value,), (by_x, by_z), *by_y)
+
+
+@lru_cache(maxsize=64)
+def exponents_of(function: Callable[..., Any], parameters: int, dimension: int = 2) -> frozenset[int]:
+    """Return the run-time parameters on which exponents depend in a function of coordinates."""
+    op = _Recorder(parameters, dimension)
+    function(op, *_in_order(op.places), op.values)
+    return frozenset(op.exponents)
+
+
+def bound_by_coordinates(
+    function: Callable[..., Any], parameters: Sequence[Number], dimension: int = 2
+) -> BoundTape | None:
+    """Return the tape of `record_by_coordinates` with values of its parameters; None if it is too long.
+
+    Exponents belong to the tape if they are rational: powers with integer exponents are products, which are real for
+    negative numbers too.
+    """
+    found = ((k, parameters[k].fraction) for k in sorted(exponents_of(function, len(parameters), dimension)))
+    known = tuple((k, value) for k, value in found if value is not None)
+    return bind(record_by_coordinates(function, len(parameters), dimension, known), parameters)
 
 
 def _in_order(coordinates: Sequence[Any]) -> Sequence[Any]:

@@ -307,6 +307,7 @@ class DissipativeMotion(FollowedMotion):
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
         found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        self._check_known("sensitivity", rows, found)
         return found
 
     def _march_points(self, t: Any) -> tuple[MarchPoints, tuple[int, ...]]:

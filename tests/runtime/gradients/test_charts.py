@@ -178,3 +178,137 @@ def test_unknown_names(ring: ModuleType) -> None:
     """Unknown names are refused."""
     with pytest.raises(gqm.errors.InputError, match="there is no parameter 'L'"):
         ring.solve(lam0=1.0).gradient("period", "L")
+
+
+@pytest.fixture(scope="module")
+def oval(generated_folder: Path) -> ModuleType:
+    """Return a superellipse, whose exponent is a parameter, in arc length from the bottom."""
+    curve = gqm.Curve.implicit("(x/a)**n + (z/b)**n - 1", start=(0, "-b"), parameters={"a": "7/5", "b": "9/10", "n": 4})
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_oval", folder=generated_folder)
+
+
+def from_rest(z: Any, arc: Any, g: Any, width: Any) -> Any:
+    """Return the half period on a graph z(x) that is even, from rest at an arc length from the middle."""
+
+    def speed(x: Any) -> Any:
+        return mp.sqrt(1 + mp.diff(z, x) ** 2)
+
+    end = mp.findroot(lambda x: mp.quad(speed, [0, x]) - arc, arc * width)
+    top = z(end)
+
+    def rate(phi: Any) -> Any:
+        x = end * mp.sin(phi)
+        return end * mp.cos(phi) * speed(x) / mp.sqrt(2 * g * (top - z(x)))
+
+    return 2 * mp.quad(rate, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
+
+
+def quotient(duration: Any, given: dict[str, Any], name: str) -> float:
+    """Return the difference quotient of a duration by one of its arguments."""
+    step = mpf(10) ** -8
+    ends = [duration(**(given | {name: given[name] + k * step})) for k in (-2, -1, 1, 2)]
+    return float((ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step))
+
+
+def test_an_exponent_of_negative_numbers(oval: ModuleType) -> None:
+    """A curve with an integer exponent has all derivatives but that by the exponent, which alone is refused."""
+    motion = oval.solve(lam0="9/10")
+    with mp.workdps(40):
+        given = {"a": mpf("1.4"), "b": mpf("0.9"), "arc": mpf("0.9"), "g": mpf("9.81")}
+
+        def duration(a: Any, b: Any, arc: Any, g: Any) -> Any:
+            return from_rest(lambda x: -b * (1 - (x / a) ** 4) ** mpf("0.25"), arc, g, 1)
+
+        assert motion.half_period == pytest.approx(float(duration(**given)), rel=1e-15)
+        for name in ("a", "b", "arc"):
+            wanted = quotient(duration, given, name)
+            found = motion.gradient("half_period", "lam0" if name == "arc" else name)
+            assert [*found.values()] == [pytest.approx(wanted, rel=2e-15)], name
+    assert motion.gradient("half_period", ("m", "v0")) == {"m": 0.0, "v0": 0.0}
+    assert np.isfinite(motion.sensitivity([0.3, 2.0], ("a", "g")).lam).all()
+    for wrt in ("n", None, ("a", "n")):
+        with pytest.raises(gqm.errors.SolutionError, match="no derivative with respect to n, because"):
+            motion.gradient("half_period", wrt)
+        with pytest.raises(gqm.errors.SolutionError, match="sensitivity: there is no derivative with respect to n,"):
+            motion.sensitivity(0.3, wrt)
+
+
+def test_an_arc_between_cusps(generated_folder: Path) -> None:
+    """A part of a bicorn has all digits, although the curve has cusps farther on."""
+    bicorn = "z**2*(a**2 - x**2) - (x**2 - 2*a*z - a**2)**2"
+    curve = gqm.Curve.implicit(bicorn, start=(0, "-a"), domain=(-0.9, 0.9), parameters={"a": 1})
+    motion = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_bicorn", folder=generated_folder).solve(
+        lam0="3/4", a="11/10"
+    )
+    with mp.workdps(40):
+        given = {"a": mpf("1.1"), "arc": mpf("0.75"), "g": mpf("9.81")}
+
+        def duration(a: Any, arc: Any, g: Any) -> Any:
+            return from_rest(lambda x: -(a**2 - x**2) / (2 * a - mp.sqrt(a**2 - x**2)), arc, g, 1)
+
+        for name, key in (("a", "a"), ("arc", "lam0")):
+            assert motion.gradient("half_period", key)[key] == pytest.approx(quotient(duration, given, name), rel=2e-15)
+
+
+def test_an_exponent_with_losses(generated_folder: Path) -> None:
+    """With friction, too, an exponent of negative numbers alone is refused."""
+    curve = gqm.Curve.implicit("(x/a)**n + (z/b)**n - 1", start=(0, "-b"), parameters={"a": 1, "b": 1, "n": 2})
+    ring = gqm.Curve.implicit("x**2 + z**2 - a**2", start=(0, "-a"), parameters={"a": 1})
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="1/10")
+    one, other = (
+        gqm.build(gqm.derive(shape, force), name=f"gradient_rough_{name}", folder=generated_folder)
+        for shape, name in ((curve, "oval"), (ring, "ring"))
+    )
+    found, wanted = (module.solve(lam0="9/10").gradient("turning_points", ("mu", "lam0")) for module in (one, other))
+    for name, row in wanted.items():
+        assert found[name] == pytest.approx(row, rel=1e-12, abs=1e-13)
+    with pytest.raises(gqm.errors.SolutionError, match="no derivative with respect to n, because"):
+        one.solve(lam0="9/10").gradient("turning_points")
+
+
+def test_an_exponent_of_positive_numbers(generated_folder: Path) -> None:
+    """A curve has a derivative by an exponent of numbers that are positive on it, whether it is an integer or not."""
+    curve = gqm.Curve.implicit("(-z)**n + x**2 - 1", start=(0, -1), domain=(-1, 1), parameters={"n": "5/2"})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_arch", folder=generated_folder)
+    with mp.workdps(40):
+
+        def duration(n: Any) -> Any:
+            return from_rest(lambda x: -((1 - x**2) ** (1 / n)), mpf("0.5"), mpf("9.81"), 1)
+
+        for n in (mpf("2.5"), mpf(3), mpf("2.7")):
+            found = module.solve(lam0="1/2", n=str(n)).gradient("half_period", "n")["n"]
+            assert found == pytest.approx(quotient(duration, {"n": n}, "n"), rel=4e-15), n
+
+
+def test_a_launch_at_rest_where_two_pieces_meet(generated_folder: Path) -> None:
+    """A launch by a point that is a rounding away from the edge of two pieces has derivatives; the curve is a right
+    strophoid.
+    """
+    start = "-0.51961524227066318805823390245176171008284157614311", "-0.9"
+    curve = gqm.Curve.implicit("x**2*(a - z) - z**2*(a + z)", start=start, parameters={"a": "1.8"})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_strophoid", folder=generated_folder)
+    motion = module.solve(point=start, direction=1)
+    with mp.workdps(40):
+        a, g, phi = mpf("1.8"), mpf("9.81"), -mp.pi / 6
+
+        def duration(end: Any) -> Any:
+            """Return the half period on ``x = a cos(2 phi) tan(phi), z = -a cos(2 phi)``."""
+
+            def rate(u: Any) -> Any:
+                at = end * mp.sin(u)
+                dx = a * (-2 * mp.sin(2 * at) * mp.tan(at) + mp.cos(2 * at) / mp.cos(at) ** 2)
+                fall = 2 * g * a * 2 * mp.sin(end - at) * mp.sin(end + at)
+                return -end * mp.cos(u) * mp.hypot(dx, 2 * a * mp.sin(2 * at)) / mp.sqrt(fall)
+
+            return 2 * mp.quad(rate, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
+
+        tau, by_phi = duration(phi), mp.diff(duration, phi, h=mpf(10) ** -12)
+        rate = [mp.diff(lambda u, f=f: a * mp.cos(2 * u) * f(u), phi) for f in (mp.tan, lambda u: -1)]
+        speed = mp.hypot(*rate)
+        # The start point, which is fixed, is moved to the nearest point of the curve.
+        point = mp.cos(2 * phi) * mp.tan(phi), -mp.cos(2 * phi)
+        foot = -(point[0] * rate[0] + point[1] * rate[1]) / speed**2
+        wanted = {"g": -tau / (2 * g), "lam0": by_phi / speed, "a": tau / (2 * a) + by_phi * foot}
+    found = motion.gradient("half_period", tuple(wanted))
+    for name, value in wanted.items():
+        assert abs(found[name]) == pytest.approx(abs(float(value)), rel=2e-15), name

@@ -97,6 +97,47 @@ def test_an_asymmetric_well(generated_folder: Path) -> None:
             assert found[name][other] == pytest.approx(quotient, rel=1e-8, abs=1e-9), (name, other)
 
 
+@pytest.mark.parametrize("launch", [("6/5", "0"), ("1/10", "1/2"), ("-2", "3"), ("3", "0"), ("1", "9")])
+def test_along_a_chart(launch: tuple[str, str], generated_folder: Path) -> None:
+    """A circle without formulas has the second derivatives of the pendulum, whose angle is arc length over radius."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="second_ring", folder=generated_folder)
+    motion, names = module.solve(lam0=launch[0], v0=launch[1], R="5/4", g="9.81"), ("lam0", "v0", "g")
+    found = motion.gradient("period", names, order=2)
+    with mp.workdps(60):
+        law, share = (lap, 1) if motion.kind == "circulation" else (swing, 4)
+        numbers = [Fraction(text) for text in (*launch, "9.81")]
+        at = {name: mpf(x.numerator) / x.denominator for name, x in zip(names, numbers, strict=True)}
+        radius = mpf("1.25")
+
+        def function(lam0: Any, v0: Any, g: Any) -> Any:
+            return share * law(lam0 / radius, v0, radius, g)
+
+        for one, other in combinations_with_replacement(names, 2):
+            wanted = second(function, at, one, other)
+            size = abs(wanted) + abs(function(**at)) * 1e-3
+            assert abs(found[one][other] - wanted) <= 4 * ULP * size, (one, other)
+            assert found[one][other] == found[other][one]
+
+
+def test_along_points_in_space(generated_folder: Path) -> None:
+    """Along points, second derivatives agree with differences of first derivatives, which are exact."""
+    turns = [0.4 * k for k in range(-8, 9)]
+    points = [(mp.sin(u) * 2, mp.cos(u), 0.3 * u * u + 0.05 * mp.sin(3 * u)) for u in turns]
+    curve = gqm.Curve.sampled([[float(x) for x in point] for point in points])
+    force = gqm.Gravity() + gqm.Rolling(beta="2/5") + gqm.Potential("k*(x**2 + z**2)/2", parameters={"k": "3/2"})
+    module = gqm.build(gqm.derive(curve, force), name="second_points", folder=generated_folder)
+    at = {"lam0": 5.5, "v0": 0.75, "k": 1.5, "g": 9.81, "m": 1.25, "beta": 0.4}
+    found = module.solve(**at).gradient("half_period", tuple(at), order=2)
+    for name in at:
+        step = 2.0**-14
+        slopes = [module.solve(**{**at, name: at[name] + k * step}).gradient("half_period") for k in (-2, -1, 1, 2)]
+        for other in at:
+            rows = [row[other] for row in slopes]
+            quotient = (rows[0] - 8 * rows[1] + 8 * rows[2] - rows[3]) / (12 * step)
+            assert found[name][other] == pytest.approx(quotient, rel=1e-9, abs=1e-10), (name, other)
+
+
 def test_what_is_not_there(circle: ModuleType) -> None:
     """Each second derivative that does not exist gives one clear error."""
     motion = circle.solve(lam0=1.0)
@@ -106,7 +147,7 @@ def test_what_is_not_there(circle: ModuleType) -> None:
         motion.gradient("v_max", order=2)
     with pytest.raises(SolutionError, match="only a libration has half_period"):
         circle.solve(lam0=1.0, v0=9.0).gradient("half_period", order=2)
-    with pytest.raises(SolutionError, match="second derivatives along curves without formulas"):
+    with pytest.raises(SolutionError, match="no second derivatives with respect to parameters that shape a curve"):
         load(str(ROOT / "generated" / "superellipse.py"), "superellipse").solve(lam0=0.5).gradient("period", order=2)
     with pytest.raises(SolutionError, match="only periodic motions have second derivatives; this one is 'dissipative'"):
         load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag").solve(lam0=1.0).gradient("t_end", order=2)

@@ -4,7 +4,7 @@ from math import fabs, nan
 
 from numba import types
 
-from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, arc_between, foot, place_at, unshared
+from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, arc_between, foot, place_at, speed_at, unshared
 from gqm_sym.runtime.charts.double_double.potential import Path, energy_at, position
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
@@ -40,10 +40,11 @@ def find_turn(path, number, place, inward):  # type: ignore[no-untyped-def]
         half, half_low = add(path.level[0], path.level[1], -value, -value_low)
         step, step_low = divide(half, half_low, slope[0], slope[1])
         place = add(place[0], place[1], step, step_low)
-        over = side * place[0] - 1.0 + side * place[1]
-        if fabs(step) < 0.5 and moves < MAX_MOVES and (over >= -AT_EDGE or over < -2.0 - AT_EDGE):
+        over = (side * place[0] - 1.0) + side * place[1] >= -AT_EDGE
+        under = (side * place[0] + 1.0) + side * place[1] < -AT_EDGE
+        if fabs(step) < 0.5 and moves < MAX_MOVES and (over or under):
             # The turning point lies on a neighbouring piece, or on the edge between the two pieces.
-            direction = inward if over >= -AT_EDGE else -inward
+            direction = inward if over else -inward
             if path.curve.period > 0.0 or 0 <= number + direction < path.curve.counts.shape[0]:
                 number, place, before, moves = number + direction, (-float(direction), 0.0), 0.0, moves + 1
                 continue
@@ -135,9 +136,23 @@ def arc_from(curve, start, number, place):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def move_launch(curve, found, first, last):  # type: ignore[no-untyped-def]
+    """Move a launch on the edge of two pieces to that piece of the motion which it is not on."""
+    number = int(found[LAUNCH, 0])
+    edge = 1.0 if number == first - 1 else -1.0 if number == last + 1 else 0.0
+    beyond = (found[LAUNCH, 1] - edge) + found[LAUNCH, 2]
+    if edge != 0.0 and edge * beyond >= -AT_EDGE:
+        other = number + int(edge)
+        beyond *= speed_at(curve, number, (edge, 0.0)) / speed_at(curve, other, (-edge, 0.0))
+        found[LAUNCH, 0], found[LAUNCH, 1], found[LAUNCH, 2] = other, -edge, beyond
+
+
+@Inner
 def fill_middle(curve, found):  # type: ignore[no-untyped-def]
     """Fill the arc lengths between launch and turning points, and a place between these."""
-    first, last, number = int(found[LOWER, 0]), int(found[UPPER, 0]), int(found[LAUNCH, 0])
+    first, last = int(found[LOWER, 0]), int(found[UPPER, 0])
+    move_launch(curve, found, first, last)
+    number = int(found[LAUNCH, 0])
     low, high = (found[LOWER, 1], found[LOWER, 2]), (found[UPPER, 1], found[UPPER, 2])
     place = found[LAUNCH, 1], found[LAUNCH, 2]
     if not (low[0] == low[0] and high[0] == high[0] and first <= number <= last):

@@ -4,6 +4,7 @@ Displacements of the curve's points come from neighbouring curves (`shaped_piece
 formulas (`programs`).
 """
 
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property
 
@@ -30,6 +31,11 @@ from gqm_sym.runtime.gradients.charts.programs import (
     chart_circulation_program,
     chart_path_program,
     speed_program,
+)
+from gqm_sym.runtime.gradients.charts.second_programs import (
+    chart_circulation_seconds,
+    chart_libration_seconds,
+    chart_turn_seconds,
 )
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_path_program
@@ -197,6 +203,16 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return chart_circulation_program(self.source) if self.direction else libration_program(self.source)
 
     @cached_property
+    def _wanted(self) -> NDArray[np.intp]:
+        """The results of the program that must be resolved: those of all variables whose displacement is known."""
+        n, first, last = self.source.variables, 0, len(self._shape.pieces.curve.counts) - 1
+        if not self.direction:
+            first, last = int(self._found[LOWER, 0]), int(self._found[UPPER, 0])
+        begin = self._shape.pieces.begin
+        unknown = [self.source.shaping[i] for i in self._shape.unknown(min(first, begin), max(last, begin))]
+        return np.setdiff1d(np.arange(2 + 2 * n), [row + k for k in unknown for row in (1, 2 + n)])
+
+    @cached_property
     def _panels(self) -> tuple[Array, Array, Array]:
         """The edges of panels on which all integrands are resolved, their values there, and the integrals.
 
@@ -205,18 +221,35 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         SolutionError
             If there are no such panels, or digits are lost.
         """
-        curve, found, n = self._shape.pieces.curve, self._found, self.source.variables
-        row, kind = (LAUNCH, CIRCULATION) if self.direction else (LOWER, LIBRATION)
+        inputs = np.hstack([self._inputs, self._range(self._end_rows if not self.direction else None)])
+        return self._resolved(lambda *places: self._values(self._program, inputs, *places), self._wanted)
+
+    @cached_property
+    def _width(self) -> Array:
+        """The width of the orbit in arc length, with the sign of a lap, as two doubles."""
         if self.direction:
-            length = curve.lengths[:, :2].sum(axis=0)
-            width = self.direction * length
-            inputs = np.hstack([self._inputs, pairs((abs(width[0]), abs(width[1]), 0.0))])
-        else:
-            both = found[[BEHIND, AHEAD], :2]
-            width = np.array(_sum(both[0], both[1]))
-            ends = self._end_rows
-            wide = pairs((0.0, 0.0, 0.0), (*width, UNIT * width[0]))
-            inputs = np.hstack([self._inputs, wide, ends[:, :, 0].T, ends[:, :, 1].T])
+            lap: Array = self.direction * self._shape.pieces.curve.lengths[:, :2].sum(axis=0)
+            return lap
+        both = self._found[[BEHIND, AHEAD], :2]
+        return np.array(_sum(both[0], both[1]))
+
+    def _range(self, ends: Array | None) -> Array:
+        """Return the inputs of programs by which they know the range of the phase: the length of a lap, or both turning
+        points as distances from the lower one, followed by their derivatives.
+        """
+        high, low = self._width
+        if ends is None:
+            return pairs((abs(high), abs(low), 0.0))
+        return np.hstack([pairs((0.0, 0.0, 0.0), (high, low, UNIT * high)), ends[:, :, 0].T, ends[:, :, 1].T])
+
+    def _resolved(
+        self, evaluate: Callable[[Array, Array], Array], wanted: NDArray[np.intp]
+    ) -> tuple[Array, Array, Array]:
+        """Return `_panels` of integrands, of which the ``wanted`` are resolved, given their values as two doubles each
+        and bounds on the errors for shares of the orbit's width and places.
+        """
+        curve, found, width = self._shape.pieces.curve, self._found, self._width
+        row, kind = (LAUNCH, CIRCULATION) if self.direction else (LOWER, LIBRATION)
         rule, tail_factors = panel_rule(), to_legendre()[:, -2:]
         pending, done, sizes = np.stack([self._edges[:-1], np.diff(self._edges)], axis=1), [], NOWHERE
         for _ in range(MAX_HALVINGS):
@@ -224,15 +257,15 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             shares, places = np.empty((2, RULE * len(panels))), np.empty((PLACE, RULE * len(panels)))
             places[:, 0] = found[row, :PLACE]
             fill_nodes(curve, kind, panels, (width[0], width[1], found[row, 0], 0.0), shares, places)
-            got = self._values(self._program, inputs, shares, places).reshape(-1, 3, len(panels), RULE)
-            high, widths = got[: 2 + 2 * n, 0], pending[:, 1]
+            got = evaluate(shares, places).reshape(-1, 3, len(panels), RULE)
+            high, widths = got[wanted, 0], pending[:, 1]
             if not np.isfinite(high).all():
                 break
             here = (np.abs(got[:, 0]) @ rule[2]) @ widths
             sizes = sizes if sizes.size else here
-            scale = np.where(sizes > 0.0, sizes, 1.0)[: 2 + 2 * n, None]
+            scale = np.where(sizes > 0.0, sizes, 1.0)[wanted, None]
             tails = np.abs(high @ tail_factors).sum(axis=-1) * widths / scale
-            noise = (got[: 2 + 2 * n, 2] @ rule[2]) * widths / scale
+            noise = (got[wanted, 2] @ rule[2]) * widths / scale
             resolved = (tails <= np.maximum(MAX_TAIL, noise)).all(axis=0)
             done.append((pending[resolved], got[:, :, resolved]))
             left, width_left = pending[~resolved].T
@@ -249,7 +282,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         panels, samples = panels[order], samples[:, :, order]
         weights = rule[2] * panels[:, 1:]
         errors = np.einsum("kmj,mj->k", samples[:, 2], weights)
-        if not (errors[: 2 + 2 * n] <= MAX_ROUNDING * sizes[: 2 + 2 * n]).all():
+        if not (errors[wanted] <= MAX_ROUNDING * sizes[wanted]).all():
             raise SolutionError(UNDECIDED)
         integrals = np.array([_total(r[0] * weights, r[1] * weights) for r in samples])
         integrals[np.abs(integrals) <= errors] = 0.0
@@ -257,6 +290,38 @@ class ChartOrbitDerivatives(OrbitDerivatives):
 
     def _integrals(self, first: int, count: int) -> Array:
         return self._panels[2][first : first + count]
+
+    def second_durations(self, rows: tuple[int, ...]) -> Array:
+        """Return the derivatives that `OrbitDerivatives.second_durations` describes.
+
+        Raises
+        ------
+        SolutionError
+            If one of the variables shapes the curve.
+        """
+        source, shape = self.source, self._shape
+        if set(rows) & set(source.shaping):
+            raise SolutionError(
+                "gradient: there are no second derivatives with respect to parameters that shape a curve without "
+                "formulas yet; name the others in wrt"
+            )
+        start = np.ascontiguousarray(self._found[[LAUNCH], :PLACE].T)
+        given = [(high, low, UNIT * abs(high)) for high, low in shape.bends(start)[:, 0].reshape(-1, 2).tolist()]
+        inputs = np.hstack([self.variables, pairs(*given)])
+
+        def along(program: Program, inputs: Array, shares: Array, places: Array) -> Array:
+            coordinates = np.ascontiguousarray(np.concatenate([shares, shape.bends(places)]))
+            found = np.empty((program.outputs.size, 3, places.shape[1]))
+            fill_values(program.operands, program.work, np.ascontiguousarray(inputs), coordinates, found)
+            return found
+
+        if self.direction:
+            program, ends = chart_circulation_seconds(source, rows), None
+        else:
+            program = chart_libration_seconds(source, rows)
+            ends = along(chart_turn_seconds(source, rows), inputs, np.zeros((2, 2)), self._turns)
+        inputs = np.hstack([inputs, self._range(ends)])
+        return self._resolved(lambda *places: along(program, inputs, *places), np.arange(program.outputs.size))[2][1:]
 
     @property
     def series(self) -> tuple[SeriesOf, Array]:

@@ -12,8 +12,8 @@ import numpy as np
 from numba import types
 from numpy.polynomial.chebyshev import cheb2poly
 
-from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
 from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
@@ -41,7 +41,6 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, multiply
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.gradients.charts.programs import size_of_point
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.launch.formulas import Formulas, true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
 
@@ -121,7 +120,8 @@ class ShapedPieces:
     pieces : TruePieces
         The curve.
     shaping : tuple of int
-        The parameters.
+        The parameters. The displacement by a parameter is NaN where neighbouring curves do not exist: an exponent of a
+        negative number may be an integer only.
     """
 
     def __init__(self, problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> None:
@@ -147,6 +147,18 @@ class ShapedPieces:
         for side in (self.pieces, *(side for _, *sides in self._beside for side in sides)):
             side.make(first, last)
 
+    def unknown(self, first: int, last: int) -> list[int]:
+        """Return the indices of those of the parameters whose displacement is not known on all pieces from one number
+        to another.
+        """
+        self._make(first, last)
+        numbers = np.arange(first, last + 1) % len(self.pieces.curve.counts)
+        return [
+            i
+            for i, (_, *sides) in enumerate(self._beside)
+            if not sides or any(np.isnan(side.curve.lengths[numbers, 0]).any() for side in sides)
+        ]
+
     def coordinates(self, places: Array) -> Array:
         """Return the points at places with their displacements, two doubles each, which are the coordinates that
         programs take.
@@ -159,11 +171,32 @@ class ShapedPieces:
             curvature[::2] = _curvature(_derivatives(self._terms, places, 3)[d:])
         rows.append(curvature)
         for step, *sides in self._beside:
+            if not sides:
+                rows.append(np.full((2 * d, places.shape[1]), np.nan))
+                continue
             before, after = np.empty((2, *rows[0].shape))
             fill_coordinates(sides[0].curve, places, before)
             fill_coordinates(sides[1].curve, places, after)
             rows.append(_quotient(before[: 2 * d], after[: 2 * d], step))
         return np.concatenate(rows)
+
+    def bends(self, places: Array) -> Array:
+        """Return the points at places, two doubles each: the coordinates, and their first two derivatives with respect
+        to u.
+        """
+        self.pieces.make(int(places[0].min()), int(places[0].max()))
+        curve, d = self.pieces.curve, self.dimension
+        high, low = curve.terms[:, ::2], curve.terms[:, 1::2]
+        # The terms of the derivatives.
+        orders = np.arange(NODES, dtype=float)
+        steeper, rounding = two_product.py_func(high, orders)
+        terms = np.zeros_like(curve.terms)
+        terms[:, ::2, :-1], terms[:, 1::2, :-1] = steeper[..., 1:], (rounding + low * orders)[..., 1:]
+        counts = np.repeat(curve.counts[:, 1:], 2, axis=1)
+        rows, rates = np.empty((2, 4 * d, places.shape[1]))
+        fill_coordinates(curve, places, rows)
+        fill_coordinates(curve._replace(terms=terms, counts=counts), places, rates)
+        return np.concatenate([rows, rates[2 * d :]])
 
     def places(self, high: Array, low: Array | float = 0.0) -> Array:
         """Return the places (PLACE rows) at arc lengths from the start point."""
@@ -181,11 +214,16 @@ class ShapedPieces:
         self._make(int(places[0].min()), int(places[0].max()))
         found = []
         for step, *sides in self._beside:
+            if not sides:
+                found.append(np.full(places.shape[1], np.nan))
+                continue
             before, after = np.empty((2, 2, places.shape[1]))
             for side, arcs in zip(sides, (before, after), strict=True):
                 side.make(min(int(places[0].min()), side.begin), max(int(places[0].max()), side.begin))
                 fill_arcs(side.curve, side.begin, places, arcs)
-                arcs -= np.array(side.start_length)[:, None]
+                start, start_low = side.start_length
+                total, rounding = two_sum.py_func(arcs[0], -start)
+                arcs[0], arcs[1] = total, arcs[1] + (rounding - start_low)
             found.append(_quotient(before, after, step)[0])
         return np.array(found).reshape(-1, places.shape[1])
 
@@ -234,13 +272,18 @@ class ShapedPieces:
         powers = np.zeros_like(series)
         for row, terms in zip(powers, series, strict=True):
             is_large = np.abs(terms) > MAX_NOISE * np.abs(terms).max()
+            if np.isnan(terms).any():
+                row[:] = np.nan
+                continue
             used = next((k for k in range(NODES) if not is_large[k : k + TERMS_IN_A_ROW].any()), NODES)
             row[:used] = cheb2poly(np.append(terms[:used], 0.0))[:used]
         return powers
 
 
-def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, TruePieces, TruePieces]:
-    """Return the step of a parameter, and the curve for its values one step below and above."""
+def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, *tuple[TruePieces, ...]]:
+    """Return the step of a parameter, and the curve for its values one step below and above; the step alone if there
+    are no such curves.
+    """
     size = abs(p[k].value) or 1.0
     step = STEP * 2.0 ** np.floor(np.log2(size))
     sides = []
@@ -250,9 +293,7 @@ def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tup
         numbers = list(p)
         numbers[k] = read_number(moved + sign * Fraction(step), where="p")
         sides.append(true_pieces_of(maker, tuple(numbers), chart))
-    if None in sides:
-        raise SolutionError(UNDECIDED)
-    return step, *sides
+    return (step,) if None in sides else (step, *sides)
 
 
 def _quotient(before: Array, after: Array, step: float) -> Array:

@@ -1,5 +1,6 @@
 """Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,27 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         check_force(self.problem.formulas, quantity)
-        return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
+        found = self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
+        self._check_known(f"gradient of {quantity}", found, found.values())
+        return found
+
+    def _check_known(self, what: str, names: Iterable[str], values: Iterable[Any]) -> None:
+        """Refuse derivatives along a charted curve with respect to parameters near which there is no such curve.
+
+        Raises
+        ------
+        SolutionError
+            If there are such parameters.
+        """
+        if self.problem.formulas.chart is None:
+            return
+        unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
+        if unknown:
+            raise SolutionError(
+                f"{what}: there is no derivative with respect to {', '.join(unknown)}, because the curve does not "
+                "exist for neighbouring values (an exponent of a negative number must be an integer); name the others "
+                "in wrt"
+            )
 
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         raise self._without_gradients()
@@ -114,7 +135,9 @@ class Derivatives(Positions):
             If motions of this kind, or on such a curve, have no gradients.
         """
         check_force(self.problem.formulas, "sensitivity")
-        return self._sensitivity(t, wrt)
+        found = self._sensitivity(t, wrt)
+        self._check_known("sensitivity", found.wrt, found.lam)
+        return found
 
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         """Return `sensitivity`, whose contact force is right only if that has a sign."""
@@ -133,7 +156,9 @@ class Derivatives(Positions):
         ndarray
             The row ``lam`` of `sensitivity`.
         """
-        return self._sensitivity(t, wrt).lam
+        found = self._sensitivity(t, wrt)
+        self._check_known("sensitivity", found.wrt, found.lam)
+        return found.lam
 
     @property
     def action(self) -> float:
