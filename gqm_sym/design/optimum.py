@@ -14,11 +14,11 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
+from gqm_sym.design.charted_limits import along_chart, along_shaped_chart
 from gqm_sym.design.limits import (
     LIMITS,
     Limit,
     Limited,
-    along_chart,
     along_formulas,
     along_spline,
     end_slopes,
@@ -101,9 +101,10 @@ def minimise(
     Notes
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
-    curve with formulas they are those of ``motion.gradient`` and of all limits. For a track through points they are
-    those of all limits by all its points together, if the body loses no energy, and those of the time to its end, if
-    the body is also launched from the first point, which does not move. The result is a local minimum.
+    curve with parameters they are those of ``motion.gradient`` and of all limits; on a curve without formulas not those
+    of the contact force with losses. For a track through points they are those of all limits by all its points
+    together, if the body loses no energy, and those of the time to its end, if the body is also launched from the first
+    point, which does not move. The result is a local minimum.
 
     Examples
     --------
@@ -321,10 +322,11 @@ class _Family(_Tracks):
         return slopes
 
     def _limited(self, x: Array, between: Any) -> Limited:
-        """Return the quantities along a curve, with their derivatives if it has formulas."""
+        """Return the quantities along a curve, with their derivatives where they are known."""
         model, request, parameters, _ = self._launch(x)
         if not isinstance(model.exact, ExactFormulas | ExactLaw):
-            return super()._limited(x, between)
+            found = along_shaped_chart(model, request, parameters, self._names, between, from_end=self._from_end)
+            return super()._limited(x, between) if found is None else found
         return along_formulas(model, request, parameters, self._names, between, from_end=self._from_end)
 
     def track(self, x: Array) -> Curve:

@@ -38,8 +38,9 @@ class SweptCurve(NamedTuple):
     signed : bool
         Whether the contact force has a sign.
     path_in_space : int
-        The address of the function with the contact force as a vector, if it depends on the direction of motion; 0
-        otherwise.
+        The address of the function with the contact force as a vector; 0 for curves in a plane.
+    directed : bool
+        Whether that vector depends on the direction of motion.
     """
 
     fns: Any
@@ -56,6 +57,7 @@ class SweptCurve(NamedTuple):
     exact: Any
     signed: Any
     path_in_space: Any
+    directed: Any
 
 
 class Orbit(NamedTuple):

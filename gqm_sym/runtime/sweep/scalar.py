@@ -101,7 +101,7 @@ class GivenCurve(NamedTuple):
         The last time in s, infinite if there is none; only END_TIME depends on it.
     exact : RecordedFormulas
         The formulas as a tape; empty at first, because few launches need it.
-    signed, path_in_space : bool, int
+    signed, path_in_space, directed : bool, int, bool
         As in `SweptCurve`.
     """
 
@@ -119,13 +119,14 @@ class GivenCurve(NamedTuple):
     exact: RecordedFormulas
     signed: bool
     path_in_space: int
+    directed: bool
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
 GIVEN = types.NamedTuple(
     (
         *(VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL, EXACT),
-        *(types.boolean, types.int64),
+        *(types.boolean, types.int64, types.boolean),
     ),
     GivenCurve,
 )
@@ -229,12 +230,16 @@ def extreme_on(curve, orbit, passage, half_v2_at_edges, quantity):  # type: igno
     """
     force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
     function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
-    if function == FORCE_SQUARED and curve.path_in_space != 0:
-        # Next to a turning point the force then changes with V, which is no smooth function of the place on a panel.
-        return extreme(curve, orbit, (function, orbit.direction), sign) if passage.panels == orbit.leaves == 0 else nan
-    if passage.panels > 0:
-        return passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, 0), sign)
-    return extreme(curve, orbit, (function, 0), sign)
+    direction = orbit.direction if function == FORCE_SQUARED and curve.directed else 0
+    if direction != 0 and orbit.leaves != 0 and (orbit.leaves != direction or passage.panels == 0):
+        return nan
+    if passage.panels == 0:
+        return extreme(curve, orbit, (function, direction), sign)
+    value = passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, direction), sign)
+    if direction != 0 and orbit.leaves == 0 and not orbit.circulates:
+        back = passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, -direction), sign)
+        value = sign * max(sign * value, sign * back)
+    return value
 
 
 @Inner
@@ -386,7 +391,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         period = element(columns, DOMAIN_PERIOD, k)
         v0 = element(columns, V0, k)
         made = fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels
-        curve = SweptCurve(*made, v0, exact, given.signed, given.path_in_space)
+        curve = SweptCurve(*made, v0, exact, given.signed, given.path_in_space, given.directed)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

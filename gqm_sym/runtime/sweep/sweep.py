@@ -199,8 +199,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        directed = formulas.path_in_space.address if formulas.path_in_space and formulas.directed else 0
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, formulas.signed, directed)
+        of_force = formulas.signed, formulas.path_in_space.address if formulas.path_in_space else 0, formulas.directed
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, *of_force)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
         if code in ANSWERED_BY_BATCHES and exact.work.size:

@@ -49,6 +49,31 @@ def test_on_a_wire_about_a_level_axis(build: Build) -> None:
         assert abs(found[1].values[k] - largest) <= 4e-15 * largest
 
 
+SURVEY = gqm.Curve.sampled([[u, 0.3 * np.sin(u), 0.5 * u * u] for u in np.linspace(-2.0, 2.0, 41).tolist()])
+HALF_PIPE = gqm.Curve.piecewise(
+    [
+        gqm.transition(length="1"),
+        gqm.transition(length="4", yaw="0.1", pitch="pi/8"),
+        gqm.transition(length="4", yaw="-0.1", pitch="pi/8"),
+        gqm.transition(length="1"),
+    ],
+    start=("0", "0", "4"),
+    heading=("0", "-pi/2"),
+)
+
+
+def test_at_a_joint_both_sides_count(build: Build) -> None:
+    """An arc in an inclined plane ends where the body is fastest; the straight piece behind it does not hide the force
+    at its end.
+    """
+    pieces, slope = [gqm.transition(length="3", yaw="0.5"), gqm.transition(length="2")], np.sin(0.25)
+    curve = gqm.Curve.piecewise(pieces, start=("0", "0", "4"), heading=("0", "-1/4"))
+    module, g, v0 = build("inclined_arc", curve, gqm.Potential("0")), 9.81, np.array([0.0, 0.5, 2.0])
+    bend = 0.5 * (v0 * v0 + 4.0 * g * slope * (np.sin(1.5) - np.sin(0.25)))
+    square = bend**2 + 2.0 * bend * g * slope * np.sin(1.5) + g * g * (1.0 - (slope * np.cos(1.5)) ** 2)
+    assert module.sweep("normal_force_max", 0.5, v0).values == pytest.approx(np.sqrt(square), rel=4e-15)
+
+
 @pytest.mark.parametrize(
     ("name", "curve", "force", "low", "high"),
     [
@@ -66,29 +91,10 @@ def test_on_a_wire_about_a_level_axis(build: Build) -> None:
             -0.45,
             -0.2,
         ),
-        (
-            "surveyed",
-            gqm.Curve.sampled([[u, 0.3 * np.sin(u), 0.5 * u * u] for u in np.linspace(-2.0, 2.0, 41).tolist()]),
-            gqm.Potential("0"),
-            3.3,
-            4.6,
-        ),
-        (
-            "half_pipe_in_space",
-            gqm.Curve.piecewise(
-                [
-                    gqm.transition(length="1"),
-                    gqm.transition(length="4", yaw="0.1", pitch="pi/8"),
-                    gqm.transition(length="4", yaw="-0.1", pitch="pi/8"),
-                    gqm.transition(length="1"),
-                ],
-                start=("0", "0", "4"),
-                heading=("0", "-pi/2"),
-            ),
-            gqm.Potential("0"),
-            0.5,
-            2.5,
-        ),
+        ("surveyed", SURVEY, gqm.Potential("0"), 3.3, 4.6),
+        ("surveyed_turning", SURVEY, gqm.RotatingFrame(Omega="7/10"), 3.3, 4.6),
+        ("half_pipe_in_space", HALF_PIPE, gqm.Potential("0"), 0.5, 2.5),
+        ("turning_half_pipe", HALF_PIPE, gqm.RotatingFrame(Omega="7/10"), 0.5, 2.5),
     ],
 )
 def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low: float, high: float) -> None:
@@ -109,8 +115,7 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
 @pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
 def test_with_friction_as_solved_motions(build: Build, name: str) -> None:
     """Bodies that slide to rest have the extremes of solved motions within roundings of the largest force."""
-    surveyed = gqm.Curve.sampled([[u, 0.3 * np.sin(u), 0.5 * u * u] for u in np.linspace(-2.0, 2.0, 41).tolist()])
-    curve, given, low, high = (WIRE, {"a": 0.4}, 0.2, 2.0) if name == "rough_wire" else (surveyed, {}, 3.3, 4.6)
+    curve, given, low, high = (WIRE, {"a": 0.4}, 0.2, 2.0) if name == "rough_wire" else (SURVEY, {}, 3.3, 4.6)
     module = build(f"{name}_extremes", curve, gqm.CoulombFriction(mu="1/20"))
     places = np.random.default_rng(4).uniform(low, high, 6)
     for t_max in (None, 1.7):

@@ -131,7 +131,7 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
 @Inner
 def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
     """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise END_NONE."""
-    if change.first == change.touch and not forces.linear:
+    if change.first == change.touch <= 1.0 and not forces.linear:
         what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
         if what == END_TURN:
             return what, turn, v2

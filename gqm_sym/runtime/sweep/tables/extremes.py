@@ -1,7 +1,9 @@
 """The smallest and largest speed or contact force on a tabulated curve: the best sample, refined on its panel."""
 
-from math import fabs, inf, sqrt
+from math import asin, fabs, inf, pi, sqrt
 
+from gqm_sym.runtime.arithmetic.elementary import sin
+from gqm_sym.runtime.compiled.calls import call_path_in_space
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.sweep.orbit_extremes import (
     FORCE,
@@ -12,6 +14,7 @@ from gqm_sym.runtime.sweep.orbit_extremes import (
     frame_buffer,
     line_buffer,
     point_buffer,
+    vector_buffer,
 )
 from gqm_sym.runtime.sweep.tables.layout import (
     HALF,
@@ -25,7 +28,7 @@ from gqm_sym.runtime.sweep.tables.layout import (
     SAMPLE_POINTS,
     SAMPLES,
 )
-from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
+from gqm_sym.runtime.sweep.tables.panel_forces import AT_REST, FAR, LOAD, MOVING, NEAR, TURNING, VECTORS, prepare
 from gqm_sym.runtime.sweep.tables.places import locate
 from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
 
@@ -33,7 +36,10 @@ from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
 # largest number of parabolas. One whose vertex is far away is followed by one of the same width there.
 FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
-# The last step for the square of a force. The square may almost vanish, and then the force is not flat at its extreme.
+# The distance from the end of a panel at which formulas are evaluated, as a share of the places there.
+CLEARANCE = 4e-16
+
+# The last step for the smallest square of a force. It may almost vanish, and then the force is not flat there.
 LAST_STEP_OF_SQUARE = 1e-8
 
 
@@ -51,9 +57,13 @@ def level_on(passage, half_v2_at_edges, j):  # type: ignore[no-untyped-def]
 
 @Inlined
 def place_on(curve, k, x):  # type: ignore[no-untyped-def]
-    """Return the place in lam of x on panel k."""
-    half = curve.table.paths[k, HALF]
-    return curve.table.edges[k] + half * (x + 1.0) if x <= 0.0 else curve.table.edges[k + 1] + half * (x - 1.0)
+    """Return the place in lam of x on panel k.
+
+    The last place is a little before the next panel, because at a joint formulas are those of the piece that begins.
+    """
+    half, first, last = curve.table.paths[k, HALF], curve.table.edges[k], curve.table.edges[k + 1]
+    place = first + half * (x + 1.0) if x <= 0.0 else last + half * (x - 1.0)
+    return min(place, max(last - CLEARANCE * max(fabs(first), fabs(last)), first))
 
 
 @Inner
@@ -75,45 +85,85 @@ def load_on(curve, k, level, sought, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
-    """Fill the same as `load_on` at the samples of panel k, for V**2/2 at its left edge."""
-    places, frame = line_buffer(), frame_buffer()
+def prepare_vectors(curve, k):  # type: ignore[no-untyped-def]
+    """Fill the vectors at the samples of panel k that the contact force per unit mass is made of, if still missing."""
+    if curve.levels[k] & VECTORS:
+        return
+    curve.levels[k] |= VECTORS
+    places, v2, ahead, back, row = line_buffer(), line_buffer(), vector_buffer(), vector_buffer(), curve.rows[k]
     for i in range(SAMPLES):
-        out[i] = 2.0 * (slack - curve.rows[k, POTENTIAL_SAMPLES + i])
-        if sought[0] == FORCE:
-            out[i] = curve.table.paths[k, KAPPA_SAMPLES + i] * out[i] + curve.rows[k, LOAD_SAMPLES + i]
-    if sought[0] == FORCE_SQUARED:
-        for i in range(SAMPLES):
-            places[i], out[i] = place_on(curve, k, SAMPLE_POINTS[i]), max(out[i], 0.0)
-        fill_force(curve, sought, SAMPLES, places, out, frame, out)
-        for i in range(SAMPLES):
-            out[i] /= curve.mass**2
+        places[i], v2[i] = place_on(curve, k, SAMPLE_POINTS[i]), 0.0
+    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, 1.0, curve.p, ahead)
+    for j in range(3 * SAMPLES):
+        row[AT_REST + j] = ahead[SAMPLES + j] / curve.mass
+    for i in range(SAMPLES):
+        v2[i] = 1.0
+    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, 1.0, curve.p, ahead)
+    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, -1.0, curve.p, back)
+    for j in range(3 * SAMPLES):
+        one, other = ahead[SAMPLES + j] / curve.mass, back[SAMPLES + j] / curve.mass
+        row[TURNING + j], row[MOVING + j] = 0.5 * (one + other) - row[AT_REST + j], 0.5 * (one - other)
 
 
 @Inner
-def refined(curve, k, level, sought, sign, x, ends):  # type: ignore[no-untyped-def]
-    """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by parabolas."""
+def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
+    """Fill the same as `load_on` at the samples of panel k, for V**2/2 at its left edge; the square of a length loses
+    digits.
+    """
+    row, direction = curve.rows[k], float(sought[1])
+    for i in range(SAMPLES):
+        out[i] = 2.0 * (slack - row[POTENTIAL_SAMPLES + i])
+        if sought[0] == FORCE:
+            out[i] = curve.table.paths[k, KAPPA_SAMPLES + i] * out[i] + row[LOAD_SAMPLES + i]
+    if sought[0] == FORCE_SQUARED:
+        prepare_vectors(curve, k)
+        for i in range(SAMPLES):
+            v2, square = max(out[i], 0.0), 0.0
+            v = direction * sqrt(v2)
+            for j in range(i, 3 * SAMPLES, SAMPLES):
+                part = row[AT_REST + j] + v2 * row[TURNING + j] + v * row[MOVING + j]
+                square += part * part
+            out[i] = square
+
+
+@Inlined
+def place_at(u, ends, is_angle):  # type: ignore[no-untyped-def]
+    """Return the place on a panel for the variable of `refined`."""
+    return ends[0] + (ends[1] - ends[0]) * sin(0.5 * pi * u) ** 2 if is_angle else u
+
+
+@Inner
+def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[no-untyped-def]
+    """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by parabolas.
+
+    If one of the ends is a turning point next to which the force changes with V, the variable ``is_angle``, the phase
+    angle between the ends as a share of pi, in which V is smooth.
+    """
     prepare(curve, k, NEAR)
     low, high = ends
-    best, step = load_on(curve, k, level, sought, x), FIRST_STEP
-    last = LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED else LAST_STEP
+    u, step = x, FIRST_STEP
+    if is_angle:
+        share = min(max((x - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+        u, low, high, step = 2.0 / pi * asin(sqrt(share)), 0.0, 1.0, 0.5 * FIRST_STEP
+    best = load_on(curve, k, level, sought, x)
+    last = LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED and sign < 0.0 else LAST_STEP
     for _ in range(MAX_PARABOLAS):
-        x_before = x
-        left, right = max(x - step, low), min(x + step, high)
-        if not left < x < right:
-            x = 0.5 * (left + right)
-        f0 = load_on(curve, k, level, sought, left)
-        f1 = load_on(curve, k, level, sought, x)
-        f2 = load_on(curve, k, level, sought, right)
-        before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
+        before_step = u
+        left, right = max(u - step, low), min(u + step, high)
+        if not left < u < right:
+            u = 0.5 * (left + right)
+        f0 = load_on(curve, k, level, sought, place_at(left, ends, is_angle))
+        f1 = load_on(curve, k, level, sought, place_at(u, ends, is_angle))
+        f2 = load_on(curve, k, level, sought, place_at(right, ends, is_angle))
+        before, after = (u - left) * (f1 - f2), (u - right) * (f1 - f0)
         if before != after:
-            vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
-            x = min(max(vertex, left), right)
-        found = load_on(curve, k, level, sought, x)
+            vertex = u - 0.5 * ((u - left) * before - (u - right) * after) / (before - after)
+            u = min(max(vertex, left), right)
+        found = load_on(curve, k, level, sought, place_at(u, ends, is_angle))
         best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
         if step <= last:
             break
-        step = min(step, max(step / STEP_RATIO, fabs(x - x_before)))
+        step = min(step, max(step / STEP_RATIO, fabs(u - before_step)))
     return best
 
 
@@ -122,22 +172,23 @@ def best_sample(curve, path, passage, half_v2_at_edges, sought, sign):  # type: 
     """Return the largest value of ``sign`` times what `load_on` returns at the samples, its panel, and its place
     there.
     """
-    samples, count = line_buffer(), curve.levels.size
+    samples, count, squared = line_buffer(), curve.levels.size, sought[0] == FORCE_SQUARED
     best, best_j, best_x = -inf, 0, 0.0
     (first, low_x), (last, high_x) = path
     for j in range(first, last + 1):
-        k, slack = (passage.first + j) % count, half_v2_at_edges[j]
+        k, slack, inside = (passage.first + j) % count, half_v2_at_edges[j], first < j < last
         low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
-        prepare(curve, k, (FAR | LOAD if sought[0] == FORCE else FAR) | (0 if first < j < last else NEAR))
-        if first < j < last:
+        prepare(curve, k, (FAR | LOAD if sought[0] == FORCE else FAR) | (0 if inside else NEAR))
+        if inside or squared:
             fill_samples(curve, k, slack, sought, samples)
         for i in range(SAMPLES):
             x, value = SAMPLE_POINTS[i], samples[i]
-            if not first < j < last:
+            is_end = i == SAMPLES - 1 or (squared and i == 0)
+            if not inside and (is_end or not squared):
                 # The end itself is sampled, because the next panel shares it.
                 x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
                 value = load_on(curve, k, level_on(passage, half_v2_at_edges, j), sought, x)
-            if sign * value > best:
+            if sign * value > best and low <= x <= high:
                 best, best_j, best_x = sign * value, j, x
     return best, best_j, best_x
 
@@ -150,6 +201,7 @@ def passage_extreme(curve, orbit, passage, half_v2_at_edges, sought, sign):  # t
     At a joint the values on both sides are compared.
     """
     count, last, force = curve.levels.size, passage.panels - 1, sought[0] != V2
+    turns = sought[1] != 0 and not orbit.circulates
     path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
     if orbit.leaves == orbit.direction:  # a body whose turning point is not ahead does not reach it
         index, x, _ = locate(curve.table, curve.period, orbit.lam0)
@@ -159,6 +211,8 @@ def passage_extreme(curve, orbit, passage, half_v2_at_edges, sought, sign):  # t
     if meets_turn and not (force or sign > 0.0):
         return 0.0
     best, best_j, best_x = best_sample(curve, path, passage, half_v2_at_edges, sought, sign)
+    if sought[0] == FORCE_SQUARED:
+        best = -inf  # the sample is computed once more, to the last digits
     if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
         return sqrt(orbit.v2)
     for step in range(-1, 2):
@@ -171,7 +225,8 @@ def passage_extreme(curve, orbit, passage, half_v2_at_edges, sought, sign):  # t
         if shared:
             ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
             k = (passage.first + j) % count
-            best = max(best, sign * refined(curve, k, level_on(passage, half_v2_at_edges, j), sought, sign, x, ends))
+            level, is_angle = level_on(passage, half_v2_at_edges, j), turns and j in (path[0][0], path[1][0])
+            best = max(best, sign * refined(curve, k, level, sought, sign, x, ends, is_angle))
     value = sign * best
     if sought[0] == V2:
         return sqrt(max(value, 0.0))

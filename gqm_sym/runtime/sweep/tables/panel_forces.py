@@ -32,17 +32,21 @@ from gqm_sym.runtime.sweep.tables.layout import (
     SPREAD,
 )
 
-# Flags for the contents of a panel's row: numbers that suffice far from turning points, its polynomials, the load.
-FAR, NEAR, LOAD = 1, 2, 4
+# Flags for the contents of a panel's row: numbers that suffice far from turning points, its polynomials, the load, and
+# the contact force as a vector.
+FAR, NEAR, LOAD, VECTORS = 1, 2, 4, 8
 
 # The largest number of times that a panel is halved towards an edge to find a part on which the potential is convex.
 HALVINGS = 20
 
 # A row has the numbers that `layout` lists for one part; then an upper bound of the potential on the panel relative to
 # the reference, infinite if ds may vanish; a better bound; 1 if the potential rises throughout, -1 if it falls, 0 if
-# neither is certain; and the level above which it is certainly convex.
+# neither is certain; and the level above which it is certainly convex. For curves in space it ends with the vectors at
+# the samples of which the contact force per unit mass is the sum, each component by itself: the first, V**2 times the
+# second, and V times the third.
 HIGHEST, TOP, SLOPE_SIGN, CONVEX_FROM = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)
-ROW = CONVEX_FROM + 1
+AT_REST, TURNING, MOVING = (CONVEX_FROM + 1 + 3 * k * SAMPLES for k in range(3))
+ROW = MOVING + 3 * SAMPLES
 
 
 @Inner
