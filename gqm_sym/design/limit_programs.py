@@ -35,7 +35,7 @@ def track_program(source: ChartSource) -> Program:
     """Return the program of height, slope, curvature and contact force at a point of a track.
 
     The inputs are the run-time parameters, and V**2 + 2 U, which is the same at all places. Each quantity is followed
-    by its derivatives with respect to the coordinates of the point, and to that sum.
+    by its derivatives with respect to the coordinates of the point, to that sum, and to the run-time parameters.
     """
     op = Recorder(source.parameters + 1, POINT)
     (x, z, dx, dz, bend_x, bend_z), p, energy = op.places, op.values[:-1], op.values[-1]
@@ -45,7 +45,7 @@ def track_program(source: ChartSource) -> Program:
     value, by_x, by_z = map(op.number, source.potential(op, x, z, p))
     load = source.one_plus_beta(op) * (by_z * dx - by_x * dz) / speed
     force = p[source.mass] * (curvature * (energy - 2 * value) + load)
-    return with_derivatives(op, [z, dz / dx, curvature, force], [*op.places, energy])
+    return with_derivatives(op, [z, dz / dx, curvature, force], [*op.places, energy, *p])
 
 
 def rows_at(program: Program, inputs: Array, places: Array) -> Array:

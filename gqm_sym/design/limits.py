@@ -143,7 +143,7 @@ def along_spline(
     energy, by_energy = v0 * v0 + 2.0 * potential, 2.0 * (by_x * moves[0, -1] + by_z * moves[1, -1])
     inputs = pairs(*((number, 0.0, 0.0) for number in (*p, energy)))
     rows = rows_at(track_program(source), inputs, at[:, :-1])
-    slopes = np.einsum("qci,cik->qik", rows[:, 1 : 1 + POINT], moves[:, :-1]) + rows[:, -1, :, None] * by_energy
+    slopes = np.einsum("qci,cik->qik", rows[:, 1 : 1 + POINT], moves[:, :-1]) + rows[:, 1 + POINT, :, None] * by_energy
     return Limited(*(dict(zip(LIMITS, part, strict=True)) for part in (rows[:, 0], slopes)))
 
 
@@ -230,25 +230,6 @@ def _force_slopes(
     rows = results(extreme_program(source_of(model), of_speed=False), variables_of(problem), places)[:, 0]
     found[0], found[1:] = rows[1], rows[3:-1]
     return found
-
-
-def along_chart(
-    model: CompiledModel,
-    request: LaunchRequest,
-    parameters: tuple[Any, ...],
-    ends: tuple[float, float],
-    between: Any,
-) -> Limited:
-    """Return the quantities along a curve without formulas, without their derivatives."""
-    from scipy.interpolate import CubicSpline
-
-    places = places_between(ends, between)
-    found = model.pass1(request, parameters, places)
-    rise, across = (CubicSpline(places, row)(places, 1) for row in (found.z, found.x))
-    with np.errstate(divide="ignore"):
-        slope = rise / across
-    rows = found.z, slope, found.kappa, found.normal_force
-    return Limited(dict(zip(LIMITS, rows, strict=True)), {})
 
 
 def margins_of(held: list[Limit], found: Limited | None) -> list[Array]:

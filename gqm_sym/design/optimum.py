@@ -14,11 +14,11 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
+from gqm_sym.design.charted_limits import along_chart, along_shaped_chart
 from gqm_sym.design.limits import (
     LIMITS,
     Limit,
     Limited,
-    along_chart,
     along_formulas,
     along_spline,
     end_slopes,
@@ -31,7 +31,8 @@ from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, Solut
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
-from gqm_sym.runtime.charts.sampled import MIN_POINTS, Sampled
+from gqm_sym.runtime.charts.interpolation import MIN_POINTS
+from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
@@ -100,9 +101,10 @@ def minimise(
     Notes
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
-    curve with formulas they are those of ``motion.gradient`` and of all limits. For a track through points they are
-    those of all limits by all its points together, if the body loses no energy, and those of the time to its end, if
-    the body is also launched from the first point, which does not move. The result is a local minimum.
+    curve with parameters they are those of ``motion.gradient`` and of all limits; on a curve without formulas not those
+    of the contact force with losses. For a track through points they are those of all limits by all its points
+    together, if the body loses no energy, and those of the time to its end, if the body is also launched from the first
+    point, which does not move. The result is a local minimum.
 
     Examples
     --------
@@ -320,10 +322,11 @@ class _Family(_Tracks):
         return slopes
 
     def _limited(self, x: Array, between: Any) -> Limited:
-        """Return the quantities along a curve, with their derivatives if it has formulas."""
+        """Return the quantities along a curve, with their derivatives where they are known."""
         model, request, parameters, _ = self._launch(x)
         if not isinstance(model.exact, ExactFormulas | ExactLaw):
-            return super()._limited(x, between)
+            found = along_shaped_chart(model, request, parameters, self._names, between, from_end=self._from_end)
+            return super()._limited(x, between) if found is None else found
         return along_formulas(model, request, parameters, self._names, between, from_end=self._from_end)
 
     def track(self, x: Array) -> Curve:

@@ -169,6 +169,13 @@ def periodic(
     return {"quantity": "half_period" if swings else "period", "by": {name: value for name, (value,) in found.items()}}
 
 
+def arc(lam: Any, numbers: Numbers) -> Any:
+    """Return the arc length at a place on a circle or an ellipse, the only curves here with drag."""
+    if "L" in numbers:
+        return numbers["L"] * lam
+    return numbers["b_"] * mp.ellipe(lam, 1 - (numbers["a"] / numbers["b_"]) ** 2)
+
+
 def turns(path: Path2D, events: list[Numbers]) -> Callable[[Numbers], list[Any]]:
     """Return the function that finds the turning points of a motion with losses, and at last its place of rest.
 
@@ -191,8 +198,8 @@ def turns(path: Path2D, events: list[Numbers]) -> Callable[[Numbers], list[Any]]
         def after(lam: Any, nu: Any) -> Any:
             """Return W at a place ahead."""
 
-            def exponent(at: Any) -> Any:  # s is L lam on a circle, the only curve here with drag
-                return 2 * heading * (nu * mu * angle(at) + (drag / numbers["m"] * numbers["L"] * at if drag else 0))
+            def exponent(at: Any) -> Any:
+                return 2 * heading * (nu * mu * angle(at) + (drag / numbers["m"] * arc(at, numbers) if drag else 0))
 
             def pull(at: Any) -> Any:
                 across, rise = path.slopes(at, numbers)
@@ -224,6 +231,7 @@ LOSSES = {
     "table2_3b_coulomb_parabola_backward": 20,
     "table2_3c_coulomb_circle_N_negative": 6,
     "table2_4a_drag_circle": 6,
+    "table2_4b_drag_ellipse_backward": 4,
     "table2_5a_droplet_circle": 5,
     "table2_5b_droplet_parabola": 5,
 }
@@ -245,7 +253,8 @@ def losses() -> dict[str, Any]:
         for place, event in zip(answer(given), [e for e in events if e["kind"] != "N_zero_crossing"], strict=True):
             if abs(place - mpf(event["lam"])) > mpf(10) ** -30:
                 raise AssertionError(f"{case['id']}: {place} is not {event['lam']}")
-        by = [name for name in given if name not in ("heading", "m") and not (name == "v0" and given["v0"] == 0)]
+        unused = "heading", *(() if "b" in force else ("m",)), *(() if given["v0"] else ("v0",))
+        by = [name for name in given if name not in unused]
         made[case["id"]] = {"quantity": "turning_points", "rests": case["expected"]["comes_to_rest"]}
         made[case["id"]] |= {"by": derivatives(answer, given, by)}
         print(case["id"], flush=True)

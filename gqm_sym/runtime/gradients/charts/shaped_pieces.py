@@ -125,7 +125,8 @@ class ShapedPieces:
     """
 
     def __init__(self, problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> None:
-        self.pieces, maker, chart = pieces, problem.formulas.chart, problem.formulas.charted(problem.p)
+        self.pieces, self.numbers = pieces, problem.p
+        maker, chart = problem.formulas.chart, problem.formulas.charted(problem.p)
         assert maker is not None
         self._smoothed: dict[int, Array] = {}
         self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]

@@ -78,7 +78,7 @@ def assemble(
 ) -> LaneProgram:
     """Return the program of results, and of the variances of the ``measured`` ones, for nodes at ``places``."""
     outputs, uncertain = ([op.register(result) for result in some] for some in (results, measured))
-    noise = [op.register(v) for v in rounding.variances(op, _live(op, uncertain), uncertain)] if uncertain else []
+    noise = [op.register(v) for v in rounding.variances(op, uncertain)] if uncertain else []
     live = _live(op, outputs) | _live(op, noise)
     pairs = [k for k in sorted(live | set(range(len(op.values)))) if not op.depends(k)]
     slots = {k: ROW * slot for slot, k in enumerate(pairs)}

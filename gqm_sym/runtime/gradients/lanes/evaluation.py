@@ -1,10 +1,12 @@
 """Compiled code for gradients of many half periods: turning points, then the trapezoidal rule, in batches of orbits."""
 
-from math import fabs, inf, pi
+from math import fabs, inf
 
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
+from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add
@@ -41,6 +43,17 @@ NOISE_NODES = (0, MIN_INTERVALS // 2, MIN_INTERVALS)
 # The states of an orbit.
 OPEN, ANSWERED, LEFT = range(3)
 
+# The rows of numbers for the orbits of a batch: the state; the changes by the last level, or -1 once the rule has
+# converged, and by this one; the number of nodes that rounding errors need; the smallest and the largest regular factor
+# of V**2; whether the orbit is a mirror image of itself; the weight of a node; whether this level has answered it.
+STATE, BEFORE, CHANGE, SPREAD, SMALLEST, LARGEST, MIRRORED, WEIGHT, NEW, ROWS = range(10)
+
+# The share of orbits of a batch up to which those that are open are left to another call.
+MAX_OPEN = 0.375
+
+# Pi as two doubles.
+PI_HIGH, PI_LOW = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
+
 # The number of intervals from which on means are known well enough to leave an orbit to other arithmetic.
 MIN_HOPE = 16
 
@@ -52,11 +65,32 @@ LANE_PROGRAM = types.Tuple((types.UniTuple(INTEGER, 3), CODES, CODES, CODES, POS
 
 
 @Inner
-def fill_input(work, register, launches, column, size, lanes):  # type: ignore[no-untyped-def]
-    """Fill a register with a column of the launches; the last launch is repeated."""
+def rows_of(work, position):  # type: ignore[no-untyped-def]
+    """Return the rows of a register: high doubles, low doubles and bounds on the errors.
+
+    Loops over rows are vectorised; those over indices that are sums are not, because these could be negative.
+    """
+    low, error = position + LOW, position + ERROR
+    return work[position : position + BLOCK], work[low : low + BLOCK], work[error : error + BLOCK]
+
+
+@Inner
+def fill_column(row, launches, column, lanes):  # type: ignore[no-untyped-def]
+    """Fill a row with a column of the launches; the last launch is repeated."""
+    size = launches.shape[0]
+    for i in range(size):
+        row[i] = launches[i, column]
+    for i in range(size, lanes):
+        row[i] = launches[size - 1, column]
+
+
+@Inner
+def fill_input(work, register, launches, column, lanes):  # type: ignore[no-untyped-def]
+    """Fill a register with a column of the launches."""
+    high, low, error = rows_of(work, register * ROW)
+    fill_column(high, launches, column, lanes)
     for i in range(lanes):
-        at = register * ROW + i
-        work[at], work[at + LOW], work[at + ERROR] = launches[min(i, size - 1), column], 0.0, 0.0
+        low[i], error[i] = 0.0, 0.0
 
 
 @Inner
@@ -66,10 +100,25 @@ def fill_place(program, work, places, lanes):  # type: ignore[no-untyped-def]
     The rows of ``places`` are two doubles and a bound on the error.
     """
     address, operations, first, count, _ = program
+    high, low, error = rows_of(work, count * ROW)
     for i in range(lanes):
-        at = count * ROW + i
-        work[at], work[at + LOW], work[at + ERROR] = places[0, i], places[1, i], places[2, i]
+        high[i], low[i], error[i] = places[0, i], places[1, i], places[2, i]
     call_interpreter(address, operations, first, operations.shape[0], work, lanes)
+
+
+@Inner
+def take_step(work, position, is_last, lanes, places, found):  # type: ignore[no-untyped-def]
+    """Move places by a Newton step in a register, and fill the rows of another one with them.
+
+    The first step is far larger than what remains; a later one is a bound on that.
+    """
+    step, rest, error = rows_of(work, position)
+    high, low, bound = found
+    for i in range(lanes):
+        places[0, i], places[1, i] = add(places[0, i], places[1, i], step[i], rest[i])
+        last = fabs(step[i]) if is_last else 0.0
+        high[i], low[i] = places[0, i], places[1, i]
+        bound[i] = error[i] + UNIT * fabs(places[0, i]) + last
 
 
 @Inner
@@ -78,32 +127,26 @@ def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: igno
 
     The turning points of the launches are improved by some steps of Newton's method.
     """
-    size, places = launches.shape[0], np.empty((3, BLOCK))
+    places = np.empty((3, BLOCK))
     for program, work in ((ends[0], works[0]), (ends[1], works[1])):
         for k in range(program[3]):
-            fill_input(work, k, launches, k, size, lanes)
+            fill_input(work, k, launches, k, lanes)
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
     (step, moves), count = ends, launches.shape[1] - 2
     wanted = moves[4].size
     for end in range(2):
-        for i in range(lanes):
-            places[0, i], places[1, i], places[2, i] = launches[min(i, size - 1), count + end], 0.0, 0.0
+        fill_column(places[0], launches, count + end, lanes)
+        places[1:, :] = 0.0
+        found = rows_of(target, (first + end) * ROW)
         for number in range(steps):
             fill_place(step, works[0], places, lanes)
-            for i in range(lanes):
-                at, to = step[4][0] + i, (first + end) * ROW + i
-                places[0, i], places[1, i] = add(places[0, i], places[1, i], works[0][at], works[0][at + LOW])
-                last = fabs(works[0][at]) if number > 0 else 0.0  # the first step is far larger than what remains
-                target[to], target[to + LOW] = places[0, i], places[1, i]
-                target[to + ERROR] = works[0][at + ERROR] + UNIT * fabs(places[0, i]) + last
+            take_step(works[0], step[4][0], number > 0, lanes, places, found)
         for i in range(lanes):  # the slope at a turning point of a small swing is small, and changes much
-            places[2, i] = target[(first + end) * ROW + i + ERROR]
+            places[2, i] = found[2][i]
         fill_place(moves, works[1], places, lanes)
         for j in range(wanted):
             source, to = moves[4][j], (first + 2 + end * wanted + j) * ROW
-            for i in range(lanes):
-                for part in range(0, ROW, BLOCK):
-                    target[to + part + i] = works[1][source + part + i]
+            target[to : to + ROW] = works[1][source : source + ROW]
 
 
 @Inner
@@ -113,7 +156,7 @@ def fill_inputs(ends, works, launches, count, steps, lanes, target):  # type: ig
     If ``ends`` has no results, the program does not depend on the turning points.
     """
     for k in range(count):
-        fill_input(target, k, launches, k, launches.shape[0], lanes)
+        fill_input(target, k, launches, k, lanes)
     if ends[0][4].size > 0:
         fill_ends(ends, works, launches, steps, lanes, count, target)
 
@@ -122,44 +165,52 @@ def fill_inputs(ends, works, launches, count, steps, lanes, target):  # type: ig
 def carry_out(program, address, operations, node, work, lanes):  # type: ignore[no-untyped-def]
     """Carry out operations of the orbits' program at one node of the trapezoidal rule."""
     coordinates, places = program[4], program[7]
-    share, rest = coordinates[0], coordinates[1]
+    share, rest = rows_of(work, coordinates[0])[0], rows_of(work, coordinates[1])[0]
     for i in range(lanes):
-        work[share + i], work[rest + i] = places[0, node], places[1, node]
+        share[i], rest[i] = places[0, node], places[1, node]
     call_interpreter(address, operations, 0, operations.shape[0], work, lanes)
 
 
 @Inner
-def fill_variances(program, mirrored, whole, work, lanes, found):  # type: ignore[no-untyped-def]
-    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES.
-
-    Of an orbit that is a mirror image of itself, nodes come in pairs with the same errors.
+def fill_weights(state, edge, share, lanes):  # type: ignore[no-untyped-def]
+    """Fill the weights of a node at a share of the orbit: nodes of an orbit that is its own mirror image come in pairs,
+    of which the second has no weight.
     """
-    positions = program[6]
-    found[:, :] = 0.0
-    for number in range(2 if whole else 3):
-        node = NOISE_NODES[number]
-        carry_out(program, program[0][2], program[3], node, work, lanes)
-        for k in range(positions.size):
-            at = positions[k]
-            for i in range(lanes):
-                weight = 0.25 if number == 0 else (0.5 if number == 1 else 0.25)
-                if mirrored[i]:
-                    weight = 1.0 if number < 2 else 0.0
-                found[k, i] += weight * work[at + i]
+    weights, mirrored = state[WEIGHT], state[MIRRORED]
+    paired = 1.0 if share == 0.5 else (2.0 if share < 0.5 else 0.0)
+    for i in range(lanes):
+        weights[i] = edge * choose(mirrored[i] == 1.0, paired, 1.0)
 
 
 @Inner
-def add_node(program, work, weights, lanes, sums, factors):  # type: ignore[no-untyped-def]
+def fill_variances(program, is_mirrored, work, lanes, state, found):  # type: ignore[no-untyped-def]
+    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES.
+
+    Both nodes of a pair have the same errors, so that these average out half as well.
+    """
+    positions, mirrored = program[6], state[MIRRORED]
+    found[:, :] = 0.0
+    for number in range(2 if is_mirrored else 3):
+        single, paired = (0.25, 0.5, 0.25)[number], (1.0, 1.0, 0.0)[number]
+        carry_out(program, program[0][2], program[3], NOISE_NODES[number], work, lanes)
+        for k in range(positions.size):
+            values, total = rows_of(work, positions[k])[0], found[k]
+            for i in range(lanes):
+                total[i] += choose(mirrored[i] == 1.0, paired, single) * values[i]
+
+
+@Inner
+def add_node(program, work, lanes, state, sums):  # type: ignore[no-untyped-def]
     """Add the results at one node to the sums: these, what rounding took from them, and the sums of absolute values."""
-    outputs = program[5]
+    outputs, weights, smallest, largest = program[5], state[WEIGHT], state[SMALLEST], state[LARGEST]
+    factors = rows_of(work, outputs[0])[0]
     for i in range(lanes):
-        factor = work[outputs[0] + i]
-        low, high = factors[0, i], factors[1, i]
-        factors[0, i], factors[1, i] = low if factor >= low else factor, factor if factor > high else high
+        factor, low, high = factors[i], smallest[i], largest[i]
+        smallest[i], largest[i] = choose(factor >= low, low, factor), choose(factor > high, factor, high)
     for k in range(outputs.size - 1):
-        at, total, lost, size = outputs[1 + k], sums[0, k], sums[1, k], sums[2, k]
+        values, total, lost, size = rows_of(work, outputs[1 + k])[0], sums[0, k], sums[1, k], sums[2, k]
         for i in range(lanes):
-            value = weights[i] * work[at + i]
+            value = weights[i] * values[i]
             term = value - lost[i]
             more = total[i] + term
             lost[i] = (more - total[i]) - term
@@ -168,9 +219,28 @@ def add_node(program, work, weights, lanes, sums, factors):  # type: ignore[no-u
 
 
 @Inner
-def judge(rule, lanes, sums, means, changes, factors, variances, answers):  # type: ignore[no-untyped-def]
-    """Fill the answers of orbits for which the rule has converged, and their states; return whether further nodes
-    would help none of them in this call.
+def compare_levels(nodes, lanes, sums, means, variances, state):  # type: ignore[no-untyped-def]
+    """Fill the means of a level, their largest relative change, and the number of nodes over which rounding errors
+    average out.
+    """
+    change, spread = state[CHANGE], state[SPREAD]
+    change[:lanes], spread[:lanes], share = 0.0, 0.0, 1.0 / nodes
+    for k in range(sums.shape[1]):
+        total, sizes, before, variance = sums[0, k], sums[2, k], means[k], variances[k]
+        for i in range(lanes):
+            mean, size = share * total[i], share * sizes[i]
+            bound = MAX_CONDITION * fabs(mean)
+            bound = choose(size < bound, size, bound)
+            step, ratio = fabs(mean - before[i]) / size, variance[i] / (MAX_VARIANCE * bound * bound)
+            change[i] = choose((size == 0.0) | (step <= change[i]), change[i], step)
+            spread[i] = choose((size == 0.0) | (ratio <= spread[i]), spread[i], ratio)
+            before[i] = mean
+
+
+@Inner
+def judge(rule, lanes, sums, means, state, found):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of orbits for which the rule has converged, and the states of all; return the numbers of
+    orbits that are open, and of those among them for which this call would suffice.
 
     Further nodes are needed while rounding errors do not average out.
 
@@ -178,70 +248,65 @@ def judge(rule, lanes, sums, means, changes, factors, variances, answers):  # ty
     ----------
     rule : (int, int, int)
         The number of nodes, and the largest numbers of them in this call and in any call.
-    changes : array
-        The relative changes by the last level; -1 once the rule has converged.
-    answers : tuple of arrays
-        The derivatives and the states.
     """
-    (nodes, limit, most), (found, states), count, is_done = rule, answers, sums.shape[1], True
+    nodes, limit, most = rule
+    kinds, before, change, spread = state[STATE], state[BEFORE], state[CHANGE], state[SPREAD]
+    smallest, largest, is_new = state[SMALLEST], state[LARGEST], state[NEW]
+    some, soon = 0, 0
     for i in range(lanes):
-        change, spread = 0.0, 0.0
-        for k in range(count):
-            mean, size = sums[0, k, i] / nodes, sums[2, k, i] / nodes
-            if size != 0.0:
-                step = fabs(mean - means[k, i]) / size
-                change = step if not step <= change else change
-                largest = min(size, MAX_CONDITION * fabs(mean))
-                ratio = variances[k, i] / (MAX_VARIANCE * largest * largest)
-                spread = ratio if not ratio <= spread else spread
-            means[k, i] = mean
-        if states[i] == OPEN:
-            converged = changes[i] < 0.0 or has_converged(changes[i], change)
-            if converged and spread <= nodes and factors[0, i] >= MIN_FACTOR_RATIO * factors[1, i]:
-                states[i] = ANSWERED
-                for k in range(count):
-                    found[i, k] = pi * means[k, i]
-            elif nodes >= MIN_HOPE and not (spread <= 2.0 * most and factors[0, i] > 0.0):
-                states[i] = LEFT
-            changes[i] = -1.0 if converged else change
+        kind, is_clear = kinds[i], smallest[i] >= MIN_FACTOR_RATIO * largest[i]
+        has_settled = (before[i] < 0.0) | has_converged(before[i], change[i])
+        is_answered = (kind == OPEN) & has_settled & (spread[i] <= nodes) & is_clear
         # Means have some digits from MIN_HOPE nodes on, by which the number of nodes is known that would suffice.
-        is_done = is_done and (states[i] != OPEN or (nodes >= MIN_HOPE and spread > 2.0 * limit))
-    return is_done
+        has_hope = (nodes < MIN_HOPE) | ((nodes < most) & (spread[i] <= 2.0 * most) & (smallest[i] > 0.0))
+        kind = choose(is_answered, 1.0 * ANSWERED, choose(has_hope | (kind != OPEN), kind, 1.0 * LEFT))
+        kinds[i], is_new[i] = kind, choose(is_answered, 1.0, 0.0)
+        before[i] = choose(has_settled, -1.0, change[i])
+        some += kind == OPEN
+        soon += (kind == OPEN) & ((nodes < MIN_HOPE) | (spread[i] <= limit))
+    for k in range(found.shape[0]):
+        mean, lost, values = means[k], sums[1, k], found[k]
+        for i in range(lanes):
+            rest = mean[i] * PI_LOW - (PI_HIGH / nodes) * lost[i]
+            values[i] = choose(is_new[i] == 1.0, fma(mean[i], PI_HIGH, rest), values[i])
+    return some, soon
 
 
 @Inner
-def fill_batch(program, mirrored, limits, work, lanes, sums, answers):  # type: ignore[no-untyped-def]
+def begin_means(program, work, lanes, state, means):  # type: ignore[no-untyped-def]
+    """Add the results at every other node of the first level to means, which give a first change."""
+    weights = state[WEIGHT]
+    for k in range(means.shape[0]):
+        values, mean = rows_of(work, program[5][1 + k])[0], means[k]
+        for i in range(lanes):
+            mean[i] += 2.0 * weights[i] * values[i] / MIN_INTERVALS
+
+
+@Inner
+def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type: ignore[no-untyped-def]
     """Fill the derivatives of a batch by the trapezoidal rule, whose number of nodes is doubled until it converges.
 
-    Of orbits that are mirror images of themselves, only nodes up to the middle count.
+    If all orbits of the batch are mirror images of themselves, only nodes up to the middle are evaluated. Beyond the
+    limit of this call the rule goes on while many orbits are open, for which beginning again would take longer.
     """
-    count = program[5].size - 1
-    means, variances = np.zeros((count, BLOCK)), np.empty((count, BLOCK))
-    changes, weights, factors = np.full(BLOCK, inf), np.zeros(BLOCK), np.zeros((2, BLOCK))
-    whole = True
-    for i in range(lanes):
-        whole = whole and mirrored[i]
-    fill_variances(program, mirrored, whole, work, lanes, variances)
-    sums[:, :, :], factors[0, :], factors[1, :] = 0.0, inf, 0.0
+    sums, means, variances, found = rows
+    fill_variances(program, is_mirrored, work, lanes, state, variances)
+    sums[:, :, :], means[:, :] = 0.0, 0.0
+    state[STATE, :], state[BEFORE, :], state[SMALLEST, :], state[LARGEST, :] = OPEN, inf, inf, 0.0
     first, nodes = 0, MIN_INTERVALS
     while True:
         for node in range(first, nodes + 1):
             share = NODE_SHARES[node]
-            if whole and share > 0.5:
+            if is_mirrored and share > 0.5:
                 continue
-            edge = 0.5 if share == 0.0 or share == 1.0 else 1.0
-            for i in range(lanes):
-                side = 1.0 if share == 0.5 or not mirrored[i] else (2.0 if share < 0.5 else 0.0)
-                weights[i] = edge * side
+            fill_weights(state, 0.5 if share == 0.0 or share == 1.0 else 1.0, share, lanes)
             carry_out(program, program[0][1], program[2], node, work, lanes)
-            add_node(program, work, weights, lanes, sums, factors)
+            add_node(program, work, lanes, state, sums)
             if first == 0 and node % 2 == 0:
-                for k in range(count):
-                    at = program[5][1 + k]
-                    for i in range(lanes):
-                        means[k, i] += 2.0 * weights[i] * work[at + i] / MIN_INTERVALS
-        rule = (nodes, limits[0], limits[1])
-        if judge(rule, lanes, sums, means, changes, factors, variances, answers) or nodes == limits[0]:
+                begin_means(program, work, lanes, state, means)
+        compare_levels(nodes, lanes, sums, means, variances, state)
+        some, soon = judge((nodes, limits[0], limits[1]), lanes, sums, means, state, found)
+        if some == 0 or (some <= MAX_OPEN * lanes and (nodes >= limits[0] or soon == 0)):
             return
         first, nodes = nodes + 1, 2 * nodes
 
@@ -275,20 +340,24 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
         The derivatives, and the states: OPEN where more intervals are needed, and LEFT where digits are lost.
     """
     found, states = answers
-    count, inputs = found.shape[1], limits[0]
-    sums, values, even = np.empty((3, count, BLOCK)), np.empty((BLOCK, count)), np.zeros(BLOCK, np.bool_)
-    kinds = np.zeros(BLOCK, np.int8)
+    count, inputs, state = found.shape[1], limits[0], np.empty((ROWS, BLOCK))
+    shape = (count, BLOCK)
+    rows = (np.empty((3, count, BLOCK)), np.empty(shape), np.empty(shape), np.empty(shape))
     for start in range(0, launches.shape[0], BLOCK):
         stop = min(start + BLOCK, launches.shape[0])
         size, some = stop - start, launches[start:stop]
-        lanes = -(-size // WIDTH) * WIDTH
+        lanes, is_mirrored = -(-size // WIDTH) * WIDTH, True
         for i in range(lanes):
-            even[i], kinds[i] = mirrored[start + min(i, size - 1)], OPEN
+            even = mirrored[start + min(i, size - 1)]
+            state[MIRRORED, i], is_mirrored = 1.0 if even else 0.0, is_mirrored and even
         fill_inputs(ends, works, some, inputs, 1, lanes, work)
         call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
-        fill_batch(program, even, limits[1:], work, lanes, sums, (values, kinds))
+        fill_batch(program, is_mirrored, limits[1:], work, lanes, state, rows)
+        values = rows[3]
         for i in range(size):
-            found[start + i], states[start + i] = values[i], kinds[i]
+            states[start + i] = int(state[STATE, i])
+            for k in range(count):
+                found[start + i, k] = values[k, i]
 
 
 @entry(
@@ -311,10 +380,14 @@ def fill_mean_gradients(ends, works, program, work, inputs, launches, answers): 
         some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
         fill_inputs(ends, works, some, inputs, 1, lanes, work)
         call_interpreter(address, operations, 0, operations.shape[0], work, lanes)
+        known = rows_of(work, outputs[0])[0]
+        for i in range(lanes):
+            known[i] = choose(fabs(known[i]) <= MAX_DIFFERENCE, 1.0, 0.0)
+        for j in range(found.shape[1]):
+            high, _, error = rows_of(work, outputs[1 + j])
+            for i in range(lanes):
+                known[i] = choose(error[i] <= MAX_ERROR * fabs(high[i]), known[i], 0.0)
+            for i in range(stop - start):
+                found[start + i, j] = high[i]
         for i in range(stop - start):
-            is_known = fabs(work[outputs[0] + i]) <= MAX_DIFFERENCE
-            for j in range(found.shape[1]):
-                at = outputs[1 + j] + i
-                found[start + i, j] = work[at]
-                is_known &= work[at + ERROR] <= MAX_ERROR * fabs(work[at])
-            states[start + i] = ANSWERED if is_known else OPEN
+            states[start + i] = ANSWERED if known[i] == 1.0 else OPEN

@@ -38,7 +38,7 @@ from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, ROUNDING, SI
 PLUS_PAIR, MINUS_PAIR, PAIR_MINUS, TIMES_PAIR, PAIR_OVER, SCALE, FROM_PAIR = range(ERROR_BOUND + 1, ERROR_BOUND + 8)
 
 # The power series of S(p) = sin(sqrt(p))/sqrt(p), highest power first, and the range of p in which it has all digits.
-TERMS, MIN_SQUARE, MAX_SQUARE = 15, -8.0, 8.0
+TERMS, MIN_SQUARE, MAX_SQUARE = 18, -16.0, 16.0
 SERIES = tuple((-1.0) ** k / factorial(2 * k + 1) for k in reversed(range(TERMS)))
 
 

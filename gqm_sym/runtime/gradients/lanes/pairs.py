@@ -5,10 +5,11 @@ from math import fabs, inf, nan
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
-from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS
 from gqm_sym.runtime.gradients.evaluation import (
     MAX_NEXT_CHANGE,
@@ -19,7 +20,7 @@ from gqm_sym.runtime.gradients.evaluation import (
     is_significant,
     rounding_of,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs
+from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
 
 # The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
@@ -30,33 +31,41 @@ CHANGE, DONE = range(2)
 
 
 @Inner
-def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[no-untyped-def]
-    """Fill the means of each result over n midpoints (`evaluation.add_midpoints`).
+def add_node(program, work, mirrored, is_second, lanes, sums):  # type: ignore[no-untyped-def]
+    """Add the results at one node to the sums: both doubles, the bounds on errors, and the sums of absolute values.
 
     Of orbits that are mirror images of themselves only the first half counts, whoever their neighbours are.
     """
-    (address, operations, first, count, outputs), halved = program, True
-    place = count * ROW
-    for i in range(lanes):
-        halved = halved and mirrored[i]
-    sums[:, :, :] = 0.0
-    for node in range(n, n + n // 2 if halved else 2 * n):
+    for j in range(program[4].size):
+        values, rests, errors = rows_of(work, program[4][j])
+        high, low, error, size = sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3]
         for i in range(lanes):
-            work[place + i], work[place + LOW + i] = nodes[0, node], nodes[1, node]
-            work[place + ERROR + i] = UNIT * nodes[0, node]
+            side = choose((mirrored[i] == 1.0) & is_second, 0.0, 1.0)
+            total, rest = add(high[i], low[i], side * values[i], side * rests[i])
+            high[i], low[i] = total, rest
+            error[i] += side * (errors[i] + UNIT * fabs(total))
+            size[i] += side * fabs(values[i])
+
+
+@Inner
+def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[no-untyped-def]
+    """Fill the means of each result over n midpoints (`evaluation.add_midpoints`)."""
+    address, operations, first, count, outputs = program
+    share, rest, error = rows_of(work, count * ROW)
+    halved = 1.0
+    for i in range(lanes):
+        halved = choose(mirrored[i] == 1.0, halved, 0.0)
+    sums[:, :, :] = 0.0
+    for node in range(n, n + n // 2 if halved == 1.0 else 2 * n):
+        for i in range(lanes):
+            share[i], rest[i], error[i] = nodes[0, node], nodes[1, node], UNIT * nodes[0, node]
         call_interpreter(address, operations, first, operations.shape[0], work, lanes)
-        is_second = node >= n + n // 2
-        for j in range(outputs.size):
-            at, high, low, error, size = outputs[j], sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3]
-            for i in range(lanes):
-                side = 0.0 if is_second and mirrored[i] else 1.0
-                high[i], low[i] = add(high[i], low[i], side * work[at + i], side * work[at + LOW + i])
-                error[i] += side * (work[at + ERROR + i] + UNIT * fabs(high[i]))
-                size[i] += side * fabs(work[at + i])
+        add_node(program, work, mirrored, node >= n + n // 2, lanes, sums)
     for j in range(outputs.size):
         for part in range(MEAN):
+            values = sums[j, part]
             for i in range(lanes):
-                sums[j, part, i] *= (2.0 if mirrored[i] else 1.0) / n
+                values[i] *= choose(mirrored[i] == 1.0, 2.0, 1.0) / n
 
 
 @Inner
@@ -124,14 +133,14 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
     found : (m, k) array
         Filled with the derivatives.
     """
-    count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK, np.bool_)
+    count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK)
     # The time itself is never zero, so that its rounding shows where all digits of derivatives are lost.
     sums, means, states = np.empty((1 + count, MEAN, BLOCK)), np.empty((1 + count, 3, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[0], BLOCK):
         stop = min(start + BLOCK, launches.shape[0])
         some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
         for i in range(lanes):
-            even[i] = mirrored[start + min(i, stop - start - 1)]
+            even[i] = 1.0 if mirrored[start + min(i, stop - start - 1)] else 0.0
         fill_inputs(ends, works, some, inputs, NEWTON_STEPS, lanes, work)
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
         means[:, :, :], states[CHANGE, :], states[DONE, :] = 0.0, inf, 0.0

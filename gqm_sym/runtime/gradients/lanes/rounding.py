@@ -1,11 +1,12 @@
 """How large the rounding errors of a tape in doubles are: their variances, recorded as formulas on the same tape.
 
-Each operation has a rounding error of its own and passes on those of its operands by its partial derivatives. Errors
-count as independent, and those of what does not depend on the place count as zero, except where digits may have
-cancelled. Variances are in units of the square of a typical rounding error (`operations.ROUNDING`).
+Each operation has a rounding error of its own, and a result changes by it times its derivative with respect to the
+operation's result, whichever ways lead from one to the other: errors that numerator and denominator have in common
+cancel. Roundings count as independent, and those of what does not depend on the place count as zero, except where
+digits may have cancelled. Variances are in units of the square of a typical rounding error (`operations.ROUNDING`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 
 from gqm_sym.runtime.double_double import interpreter
@@ -13,10 +14,10 @@ from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import partials
 from gqm_sym.runtime.gradients.lanes.operations import SINC, SINC_PAIR, LaneRecorder
 
-# The squares of the second derivative of S(p) at 0, and of the derivatives of S[p, p, q], by the operations and the
-# numbers of the results whose derivatives they are. These derivatives are not on the tape.
-SECOND, THIRD = Fraction(1, 60) ** 2, Fraction(1, 2520) ** 2
-BOUNDS = {
+# The second derivative of S(p) at 0, and the derivatives of S[p, p, q], by the operations and the numbers of the
+# results whose derivatives they are. These derivatives are not on the tape.
+SECOND, THIRD = Fraction(1, 60), Fraction(1, 2520)
+SLOPES = {
     (SINC, 1): SECOND,
     (SINC_PAIR, 2): SECOND,
     (SINC_PAIR, 3): SECOND,
@@ -28,48 +29,61 @@ BOUNDS = {
 POWERS = {Fraction(2) ** k for k in range(-6, 7)}
 
 
-def variances(op: LaneRecorder, live: Iterable[int], wanted: Sequence[int]) -> list[TapeNumber]:
+def variances(op: LaneRecorder, wanted: Sequence[int]) -> list[TapeNumber]:
     """Return the variances of the rounding errors of some registers.
 
     Parameters
     ----------
     op : LaneRecorder
         The tape, to which the variances are added.
-    live : iterable of int
-        The registers from which the wanted ones are computed.
     wanted : sequence of int
         The registers.
     """
-    bounds = {k: op.error_bound(k) for k in op.uncertain}
-    found = {k: bound * bound for k, bound in bounds.items()}
-    for k in sorted(live):
-        if op.depends(k):
-            found[k] = _variance(op, k, found)
-    return [found.get(k, op.number(0)) for k in wanted]
+    return [_variance(op, k) for k in wanted]
 
 
-def _variance(op: LaneRecorder, k: int, known: dict[int, TapeNumber]) -> TapeNumber:
-    """Return the variance of one register, from those of its operands."""
-    out, (base, which) = op.at(k), op.base(k)
-    total = op.number(0) if _is_exact(op, k) else out * out
-    if (op.entries[base][0], which) in BOUNDS:
-        bound = op.number(BOUNDS[op.entries[base][0], which])
-        return sum((bound * known[operand] for operand in op.entries[base][1:] if operand in known), total)
-    joined: dict[int, TapeNumber] = {}
-    for operand, partial in partials(op, k):
-        joined[operand] = joined[operand] + partial if operand in joined else partial
-    for operand, partial in joined.items():
-        if operand in known:
-            square = partial * partial
-            part = known[operand] if square.known == 1 else square * known[operand]
-            total = part if total.known == 0 else total + part
+def _variance(op: LaneRecorder, wanted: int) -> TapeNumber:
+    """Return the variance of one register: the sum of the squares of the changes by all roundings on the way to it."""
+    total, adjoints = op.number(0), {wanted: op.number(1)}
+    for k in range(wanted, -1, -1):
+        if k not in adjoints:
+            continue
+        adjoint = adjoints[k]
+        if not op.depends(k):
+            if k in op.uncertain:
+                total = _with_square(total, adjoint * op.error_bound(k))
+            continue
+        if not _is_exact(op, k):
+            total = _with_square(total, adjoint * op.at(k))
+        for operand, partial in _partials(op, k):
+            part = adjoint * partial
+            adjoints[operand] = adjoints[operand] + part if operand in adjoints else part
     return total
 
 
+def _with_square(total: TapeNumber, change: TapeNumber) -> TapeNumber:
+    """Return a sum with the square of one more change."""
+    return change * change if total.known == 0 else total + change * change
+
+
+def _partials(op: LaneRecorder, k: int) -> list[tuple[int, TapeNumber]]:
+    """Return the operands of an entry, each with the entry's partial derivative by it; of those that are not on the
+    tape, with the absolute value of that at 0.
+    """
+    base, which = op.base(k)
+    code, *operands = op.entries[base]
+    if (code, which) in SLOPES:
+        return [(operand, op.number(SLOPES[code, which])) for operand in operands]
+    return list(partials(op, k))
+
+
 def _is_exact(op: LaneRecorder, k: int) -> bool:
-    """Return whether an operation is a product with a power of two or an absolute value, which is not rounded."""
+    """Return whether a number is a coordinate, a product with a power of two or an absolute value.
+
+    These have no rounding error of their own.
+    """
     code, *operands = op.entries[k]
-    if code == interpreter.ABSOLUTE:
+    if code == "place" or code == interpreter.ABSOLUTE:
         return True
     if code != interpreter.MULTIPLY:
         return False

@@ -26,7 +26,10 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "roots": lambda op, u, p: op.sqrt(1 + p[0] * u**2) + (1 + u) ** (op.mpf(-3) / 2) + op.sqrt(p[0]) * u**2,
     "waves of waves": lambda op, u, p: op.sin(p[0] * op.cos(u)) + op.tan(u / 4) + op.pi * u**2,
 }
-P, WIDTHS = 0.7, (1e-6, 0.01, 0.5, 1.9)
+P = 0.7
+
+# Widths of orbits and phase angles. The widest reaches over more than half a wave of 3*u.
+ORBITS = ((1e-6, 1.1), (0.01, 1.1), (0.5, 1.1), (1.9, 1.1), (2.6, 2.9))
 
 
 def carried_out(program: LaneProgram, run: Callable[..., None], p: float, ends: tuple[float, float], phi: float) -> Any:
@@ -55,8 +58,8 @@ def recorded(name: str) -> LaneProgram:
 def test_differences_of_formulas(name: str) -> None:
     """Second divided differences and their derivatives keep their digits, however near to each other the places are."""
     program = recorded(name)
-    for width in WIDTHS:
-        ends, phi = (0.35, 0.35 + width), 1.1
+    for width, phi in ORBITS:
+        ends = (0.35, 0.35 + width)
         found = carried_out(program, LANES_INTERPRETER.call, P, ends, phi)
         with mp.workdps(60):
 
