@@ -157,7 +157,7 @@ def may_pause(forces, march, route, run_length, speeds, panel, work):  # type: i
 
 
 @Inner
-def what_after(change, at_limit, is_long, pauses):  # type: ignore[no-untyped-def]
+def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
     """Return the code of the end of a run after a panel, or END_NONE."""
     if change.first <= 1.0:
         if change.first == change.turn:
@@ -165,7 +165,7 @@ def what_after(change, at_limit, is_long, pauses):  # type: ignore[no-untyped-de
         return END_ASYMPTOTE if change.first == change.touch else END_NONE
     if at_limit:
         return END_LIMIT
-    return END_PAUSE if is_long or pauses else END_NONE
+    return END_PAUSE if pauses else END_NONE
 
 
 @Inner

@@ -111,8 +111,13 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
                 break
         late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
         ahead, at_end, stop = pass_break(march, route, off, v2, ahead, run_length)
-        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
-        what = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
+        what = what_before(
+            nu,
+            route.only_sign,
+            has_space(record, HEAD + recorded * COLUMNS, change_count),
+            searching and not late,
+            stop <= run_length,
+        )
         if what != END_NONE:
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
@@ -161,17 +166,17 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             timed if searching else LastTimed(run_length, v2, nu, change_count),
         )
         what = what_after(
-            *(change, at_stop and at_end, panel_count >= PANELS_PER_RUN),
-            may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work),
+            change,
+            at_stop and at_end,
+            panel_count >= PANELS_PER_RUN
+            or may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work),
         )
         if what != END_NONE:
             v2 = 0.0 if ends_here else v2
             break
         if ends_here:
             change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
+    what, half_c = END_TOO_MANY_PANELS if what == END_NONE else what, 0.5 * march.c if march.g > 0.0 else inf
     onwards = step * (slope_at(left, march) + march.g * step)
-    end = End(
-        *(END_TOO_MANY_PANELS if what == END_NONE else what, march.origin, v2, nu, onwards, start.no_turn_until),
-        *(march.origin, 0.5 * march.c if march.g > 0.0 else inf, change_count, recorded, ahead.upcoming),
-    )
-    return conclude(forces, route, march, end, timed, searching, run_length)
+    end = (what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin, half_c, change_count, recorded)
+    return conclude(forces, route, march, End(*end, ahead.upcoming), timed, searching, run_length)
