@@ -31,7 +31,8 @@ from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, Solut
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
-from gqm_sym.runtime.charts.sampled import MIN_POINTS, Sampled
+from gqm_sym.runtime.charts.interpolation import MIN_POINTS
+from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.runtime.charts.sampled import DEGREE, arc_length_knots
+from gqm_sym.runtime.charts.interpolation import DEGREE, Ends, arc_length_knots, interpolated
 from gqm_sym.runtime.compiled.types import Array
 
 # The number of Gauss-Legendre nodes between two points. The lengths between points change by this many iterations, each
@@ -49,10 +49,8 @@ class SplineChanges:
     """
 
     def __init__(self, points: Array, moved: list[int]) -> None:
-        from scipy.interpolate import make_interp_spline
-
-        self.knots = knots = arc_length_knots(points, closed=False)
-        self.spline = make_interp_spline(knots, points, k=DEGREE)
+        self.knots, ends = arc_length_knots(points, closed=False)
+        knots, self.spline = self.knots, interpolated(points, self.knots, ends)
         nodes, weights = leggauss(NODES)
         # The distance from the launch is the square of a variable, in which the time of a body from rest is smooth.
         roots = np.sqrt(knots - knots[0])
@@ -61,7 +59,7 @@ class SplineChanges:
         place, weight = knots[0] + root * root, 2.0 * root * halves * weights
         self.place = np.hstack([place, knots[1:, None]])
         self.weight = np.hstack([weight, np.zeros((len(weight), 1))])
-        self._cardinal = make_interp_spline(knots, np.eye(len(points))[:, moved], k=DEGREE)
+        self._cardinal = interpolated(np.eye(len(points))[:, moved], knots, ends)
         # A spline changes by a power of the distance behind each knot that moves: its fifth derivative jumps there.
         pieces = self.spline(0.5 * (knots[1:] + knots[:-1]), DEGREE)
         jumps = np.zeros_like(points)
@@ -72,15 +70,24 @@ class SplineChanges:
         shifts = np.zeros((len(points), len(moved)))
         for _ in range(1 + ITERATIONS):
             self._kicks = [-jumps[:, axis, None] * shifts for axis in range(2)]
-            self._filled = [
-                make_interp_spline(knots, -at_knots[:, axis, None] * shifts - self._behind(knots, 0) @ kicks, k=DEGREE)
-                for axis, kicks in enumerate(self._kicks)
-            ]
+            self._filled = [self._passing(axis, shifts, ends) for axis in range(2)]
             moves = np.einsum("nia,anik,ni->nk", tangent, self.at(self.place, 1), self.weight)
             # The length between two knots also changes because they move.
             moves += np.diff(speed * shifts, axis=0)
             shifts = np.vstack([np.zeros(len(moved)), np.cumsum(moves, axis=0)])
         self.lengthening = shifts[-1]
+
+    def _passing(self, axis: int, shifts: Array, ends: Ends) -> Any:
+        """Return the change of a coordinate, less the powers behind its knots, if the knots move by ``shifts``.
+
+        It makes up for the shifts at the points, and at the last one, which moves, for those of the derivatives that
+        vanish there on a natural spline.
+        """
+        kicks, knots = self._kicks[axis], self.knots
+        third, fourth = ((self._behind(knots[-1:], order) @ kicks)[0] for order in (3, 4))
+        at_end = -third, -fourth - self.spline(knots[-1], DEGREE)[axis] * shifts[-1]
+        heights = -self.spline(knots, 1)[:, axis, None] * shifts - self._behind(knots, 0) @ kicks
+        return interpolated(heights, knots, ends, at_end)
 
     def _behind(self, place: Array, order: int) -> Array:
         """Return the powers of the distances behind all knots, divided by the factorial, or a derivative of them."""

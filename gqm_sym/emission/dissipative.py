@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import sympy
 from sympy import Expr, Symbol
 
+from gqm_sym.derivation import Model
 from gqm_sym.derivation.forces.dissipation import (
     CORIOLIS,
     LOAD,
@@ -24,7 +25,7 @@ from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
-from gqm_sym.sympy_charts import chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import AXES, SPACE_ROWS, chart_alpha, chart_kappa, chart_x, chart_z
 
 _NAMES = {
     **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
@@ -34,6 +35,9 @@ _NAMES = {
     **{symbol: f"coriolis_{axis}" for symbol, axis in zip(CORIOLIS, "xyz", strict=True)},
 }
 """The names in emitted code of the geometric forms in a force law."""
+
+# The description of a scalar product that the square of a contact force in space is made of.
+ALONG_CURVATURE = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
 
 
 @dataclass(frozen=True)
@@ -109,25 +113,43 @@ def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
     return lowering.exact_function("speed_slope", doc, (form,), (lowering.place, w, v, nu))
 
 
+def load_along_curvature(model: Model) -> Expr:
+    """Return the scalar product of the vectors whose lengths are kappa and n0, for a curve in no vertical plane."""
+    return sympy.Add(*(bend * load for bend, load in zip(model.curvature_binormal, model.loads, strict=True)))
+
+
+def _planar_point(place: Symbol) -> tuple[Expr, ...]:
+    """Return the coordinates, the direction and the curvature at a place of a charted curve in a plane."""
+    angle = chart_alpha(place)
+    return chart_x(place), chart_z(place), sympy.cos(angle), sympy.sin(angle), chart_kappa(place)
+
+
 def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
     """Return contact force and law along a charted curve in terms of the chart's values at a point; nothing if they
     depend on more.
     """
     model, place = lowering.model, lowering.place
-    point = tuple(lowering.names.symbol(name) for name in ("x", "z", "dxds", "dzds", "kappa"))
-    angle = chart_alpha(place)
-    forms = (chart_x(place), chart_z(place), sympy.cos(angle), sympy.sin(angle), chart_kappa(place))
+    names: tuple[str, ...] = ("x", "z", "dxds", "dzds", "kappa")
+    forms = _planar_point(place)
+    if model.curve.in_space:
+        names = tuple(f"{d}{axis}{per}" for d, per in (("", ""), ("d", "ds"), ("dd", "ds2")) for axis in AXES)
+        forms = tuple(SPACE_ROWS[axis][order](place) for order in range(3) for axis in AXES)
+    point = tuple(map(lowering.names.symbol, names))
     w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
     known = {**dict(zip(forms, point, strict=True)), W: w, DIRECTION: v, CONTACT_SIGN: nu}
     load = model.static_normal_load.xreplace(known)
     slope = loss.along(2 * SIGMA * loss.acceleration).xreplace(known)
-    if model.curve.in_space or model.ds != 1 or place in load.free_symbols | slope.free_symbols:
+    if model.ds != 1 or place in load.free_symbols | slope.free_symbols:
         return ()
     doc = f"dV**2/d{place} where V**2 = {w}, {v} = sgn(ds/dt) and {nu} = sgn(N) (paper, eq. 19)."
-    return (
+    found = (
         lowering.exact_function("static_normal_load", "n0 = N/m of a body at rest (paper, eq. 15).", (load,), point),
         lowering.exact_function("speed_slope", doc, (slope,), (*point, w, v, nu)),
     )
+    if not model.loads or model.coriolis:
+        return found
+    product = load_along_curvature(model).xreplace(known)
+    return (*found, lowering.exact_function("load_along_curvature", ALONG_CURVATURE, (product,), point))
 
 
 def _in_pieces(

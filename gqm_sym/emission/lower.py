@@ -1,6 +1,6 @@
 """Conversion of a model's closed forms to functions as straight-line code."""
 
-from sympy import Add, Expr, Function
+from sympy import Expr, Function
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.difference import Differences
@@ -8,7 +8,15 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import FORWARDS, Lowering
-from gqm_sym.emission.dissipative import chart_law, speed_equation, speed_slope, squared_contact, static_balance
+from gqm_sym.emission.dissipative import (
+    ALONG_CURVATURE,
+    chart_law,
+    load_along_curvature,
+    speed_equation,
+    speed_slope,
+    squared_contact,
+    static_balance,
+)
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
@@ -237,11 +245,7 @@ class _ModelLowering(Lowering):
             return ()
         found: list[tuple[str, str, tuple[Expr, ...]]] = [("y", "Second horizontal coordinate.", (model.y,))]
         if model.loads and not model.coriolis:
-            doc = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
-            product = Add(
-                *(curvature * load for curvature, load in zip(model.curvature_binormal, model.loads, strict=True))
-            )
-            found.append(("load_along_curvature", doc, (product,)))
+            found.append(("load_along_curvature", ALONG_CURVATURE, (load_along_curvature(model),)))
         return tuple(found)
 
     def exact_potential(self) -> tuple[ExactIR, ...]:

@@ -285,11 +285,14 @@ class ExactChartLaw(NamedTuple):
     """The formulas of a dissipative module along a charted curve, in terms of the chart's values at a point.
 
     ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
-    V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N).
+    V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N). In space x, y and z take the
+    place of x and z, so that there are three derivatives too, and their second derivatives that of kappa; n0 then is
+    the length |N|/m at rest, and ``load_along_curvature`` is that of `ExactFormulas`.
     """
 
     static_normal_load: Callable[..., Any]
     speed_slope: Callable[..., Any]
+    load_along_curvature: Callable[..., Any] | None = None
 
 
 class ExactFormulas(NamedTuple):

@@ -8,7 +8,8 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.building import transient
-from gqm_sym.runtime.charts.sampled import DEGREE, Sampled, _made
+from gqm_sym.runtime.charts.interpolation import DEGREE
+from gqm_sym.runtime.charts.sampled import Sampled, _made
 
 # The number of Chebyshev points on each polynomial of a spline; with 24 the reference is wrong by 2e-9 if points
 # scatter by 5 cm.

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.design.limits import LIMITS, PLACES, Limited
 from gqm_sym.design.optimum import _Family, _Points, _Tracks
-from gqm_sym.runtime.charts import sampled
+from gqm_sym.runtime.charts import interpolation
 
 # The derivatives of a track with its unknowns a and b, at every 20th place.
 SOME = slice(0, PLACES, 20)
@@ -113,8 +113,8 @@ def test_derivatives_along_a_spline(force: Any, between: Any, tmp_path: Path, mo
     """The values are those of the chart, and the derivatives by all heights agree with differences of them, as far as
     the lengths of splines are accurate.
     """
-    monkeypatch.setattr(sampled, "MAX_LAST_CHANGE", 1e-15)
-    monkeypatch.setattr(sampled, "MAX_ITERATIONS", 100)
+    monkeypatch.setattr(interpolation, "MAX_LAST_CHANGE", 1e-15)
+    monkeypatch.setattr(interpolation, "MAX_ITERATIONS", 100)
     x = np.linspace(0.0, 1.5, 9)
     points = np.column_stack([x, -0.8 * x + 0.2 * np.sin(3.0 * x)])
     tracks = _Points(points, force, range(1, 9), {"v0": 0.5, "m": 2, "lam0": 0.1}, str(tmp_path))

@@ -1,20 +1,17 @@
 """Tracks given by points: an interpolating spline, or planes stitched together (paper, eq. 1).
 
-The spline is quintic, so that its curvature has two continuous derivatives. Its knots are its own arc lengths at the
-points: the lengths of the chords at first, then those of the spline found before, until they no longer change.
+The spline is quintic (`charts.interpolation`), so that its curvature has two continuous derivatives.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
+from functools import lru_cache
 from math import sqrt
 from typing import Any
 
 import numpy as np
 from numba import types
 
-from gqm_sym.budgets import check_budget
-from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, divided, rectify, summed, unwrapped
@@ -22,23 +19,13 @@ from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, asse
 from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
+from gqm_sym.runtime.charts.interpolation import DEGREE, arc_length_knots, interpolated, polynomials, thinned
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 
-DEGREE = 5
-
 # The column of points in space that has the roll angle.
 ROLL = 3
-
-# The lengths between points have converged when their relative change is below this; each iteration gains some digits.
-MAX_LAST_CHANGE = 1e-9
-MAX_ITERATIONS = 10
-
-# A spline whose distance from a point is below this share of the track's length passes through it to rounding. No
-# points are left out any more when only MIN_POINTS remain.
-MAX_FIT_ERROR = 8.0 * 2.0**-52
-MIN_POINTS = 64
 
 # A turn between two lines that is smaller than this, relative to the rounding of the points, does not count as a
 # corner.
@@ -214,29 +201,16 @@ def _planes(points: Array, closed: bool) -> Chart:
     return _assembled(pieces, np.arange(lengths.size), edges, turn, closed, corners, corners)
 
 
-def arc_length_knots(points: Array, closed: bool) -> Array:
-    """Return the arc lengths of the interpolating spline at its points, which are its knots."""
-    knots = summed(reduce(np.hypot, np.diff(points, axis=0).T))
-    for _ in range(MAX_ITERATIONS):
-        check_budget()
-        lengths = _lengths(knots, _polynomials(points, knots, closed))
-        change = np.abs(lengths / np.diff(knots) - 1.0).max()
-        knots = summed(lengths)
-        if change <= MAX_LAST_CHANGE:
-            break
-    return knots
-
-
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
-    knots = arc_length_knots(points[:, :ROLL], closed)
+    knots, ends = arc_length_knots(points[:, :ROLL], closed)
     # The increase of the roll angle over a lap is taken as linear, and the rest is periodic.
     rates = (points[-1] - points[0]) / knots[-1] if closed else np.zeros(points.shape[1])
-    points, knots = _thinned(points - rates * knots[:, None], knots, closed)
-    terms = _polynomials(points, knots, closed)
+    points, knots = thinned(points - rates * knots[:, None], knots, ends)
+    spline = interpolated(points, knots, ends)
+    terms = polynomials(spline, knots)
     terms[:, :, 0] += rates * knots[:-1, None]
     terms[:, :, 1] += rates
-    spline = _interpolated(points, knots, closed)
     if points.shape[1] > 2:
         return _in_space(knots, terms, spline, closed), spline
     pieces = rectify(lambda left, offsets: _evaluate(knots, terms, left, offsets), knots, where="sampled")
@@ -296,21 +270,6 @@ def _in_space(knots: Array, terms: Array, spline: Any, closed: bool) -> Chart:
     return replace(chart, from_points=True)
 
 
-def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
-    """Omit every second point as long as the spline through the others passes through all points to rounding.
-
-    The rounding error of a spline's curvature is that of its points divided by the square of their distance. So points
-    that are closer than necessary make it less accurate.
-    """
-    while len(knots) > MIN_POINTS:
-        used = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
-        spline = _interpolated(points[used], knots[used], closed)
-        if np.abs(spline(knots) - points).max() > MAX_FIT_ERROR * knots[-1]:
-            break
-        points, knots = points[used], knots[used]
-    return points, knots
-
-
 def _assembled(
     pieces: Pieces, parts: Indices, edges: Array, turn: float, closed: bool, breaks: object, corners: object
 ) -> Chart:
@@ -324,62 +283,6 @@ def _assembled(
         origins=np.column_stack([parts, pieces.places]),
     )
     return replace(chart, from_points=True)
-
-
-def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
-    """Return the interpolating spline as a function."""
-    from scipy.interpolate import make_interp_spline
-
-    try:
-        return make_interp_spline(knots, points, k=DEGREE, bc_type="periodic" if closed else None)
-    except (np.linalg.LinAlgError, ValueError):
-        raise SolutionError(
-            "sampled: no smooth track through these points was found; give more of them where the track bends most, or "
-            "declare planes (kind 'linear')"
-        ) from None
-
-
-def _polynomials(points: Array, knots: Array, closed: bool) -> Array:
-    """Return the coefficients of all coordinates between the points, in powers of the distance from the point
-    before.
-    """
-    spline = _interpolated(points, knots, closed)
-    terms = np.empty((knots.size - 1, points.shape[1], DEGREE + 1))
-    share = 1.0
-    for power in range(DEGREE + 1):
-        terms[:, :, power] = share * spline(knots[:-1], power)
-        share /= power + 1.0
-    return terms
-
-
-@Inner
-def velocity(terms, t):  # type: ignore[no-untyped-def]
-    """Return the first derivative of a polynomial."""
-    total = 0.0
-    for power in range(DEGREE, 0, -1):
-        total = total * t + power * terms[power]
-    return total
-
-
-@entry(types.float64[::1](types.float64[::1], types.float64[:, :, ::1]))
-def _measure(knots, terms):  # type: ignore[no-untyped-def]
-    """Return the length of each polynomial, by Simpson's rule with one step of Richardson's extrapolation."""
-    out = np.empty(knots.size - 1)
-    for k in range(out.size):
-        width = knots[k + 1] - knots[k]
-        speeds = np.empty(9)
-        for i in range(9):
-            square = 0.0
-            for row in range(terms.shape[1]):
-                rate = velocity(terms[k, row], i * width / 8.0)
-                square += rate * rate
-            speeds[i] = sqrt(square)
-        coarse = speeds[0] + 4.0 * (speeds[2] + speeds[6]) + 2.0 * speeds[4] + speeds[8]
-        odd = speeds[1] + speeds[3] + speeds[5] + speeds[7]
-        fine = speeds[0] + 4.0 * odd + 2.0 * (speeds[2] + speeds[4] + speeds[6]) + speeds[8]
-        coarse, fine = coarse * width / 12.0, fine * width / 24.0
-        out[k] = fine + (fine - coarse) / 15.0
-    return out
 
 
 @Inner
@@ -414,8 +317,3 @@ def _evaluate(knots, terms, left, offsets):  # type: ignore[no-untyped-def]
             out[3, k, i], out[4, k, i] = dx / speed, dz / speed
             out[5, k, i] = (dx * ddz - dz * ddx) / speed**3
     return out
-
-
-def _lengths(knots: Array, terms: Array) -> Array:
-    lengths: Array = _measure(knots, terms)
-    return lengths

@@ -28,9 +28,8 @@ def requested_quantity(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
-        "gradients: there are none along tracks of rolling bodies with a radius or of trains, with losses along "
-        "tracks in space without formulas, and along curves that are known in doubles only; declare the curve by "
-        "formulas"
+        "gradients: there are none along tracks of rolling bodies with a radius or of trains, and along curves that "
+        "are known in doubles only; declare the curve by formulas"
     )
 
 
@@ -47,7 +46,7 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
             f"gradients: there are none of {quantity}, because the contact force has no known derivatives on a space "
-            "curve in a rotating frame, nor with losses along points and pieces in space"
+            "curve in a rotating frame"
         )
 
 

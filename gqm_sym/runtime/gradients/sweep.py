@@ -186,8 +186,10 @@ def launch_gradients(
         Of shape (m, k), or (m, 2, k) for turning points.
     """
     if quantity in PERIODS:
-        shares = np.where(launches.circulates, 1.0, PERIODS[quantity])
-        return shares[:, np.newaxis] * period_gradients(formulas, launches, rows)
+        slopes = period_gradients(formulas, launches, rows)
+        if PERIODS[quantity] != 1.0:
+            slopes *= np.where(launches.circulates, 1.0, PERIODS[quantity])[:, np.newaxis]
+        return slopes
     if quantity == "turning_points":
         turns, table = turning_point_program(source_of(formulas)), launches.table
         ends = np.empty((len(table), 2, table.shape[1] - 2))

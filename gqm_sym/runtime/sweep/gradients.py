@@ -9,8 +9,10 @@ from math import nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError
+from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.lanes.launches import launches_of
 from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
@@ -51,27 +53,25 @@ def sweep_with_gradient(
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
-    columns = [
-        np.broadcast_to(as_doubles(v, n), found.status.shape).reshape(-1) for v, n in zip(given, names, strict=True)
-    ]
+    size, shape = found.status.size, (*found.values.shape[found.status.ndim :], len(rows))  # two turning points
+    table = np.empty((size, len(names)))
+    by_launch = table.reshape(*found.status.shape, len(names))
+    for column, (value, name) in enumerate(zip(given, names, strict=True)):
+        by_launch[..., column] = as_doubles(value, name)
     answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
-    shape = (*found.values.shape[found.status.ndim :], len(rows))  # turning points have one more axis
-    gradient, route = np.full((found.status.size, *shape), nan), found.route.reshape(-1)
+    gradient, route = np.full((size, *shape), nan), found.route.reshape(-1)
     is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
     if quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None:
         spans = sweep(formulas, "turning_points", launches, parameters, None, solve)
         periods = found if quantity in PERIODS else sweep(formulas, "period", launches, parameters, None, solve)
         which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
-        table, ends = np.stack(columns[:-1], axis=1), spans.values.reshape(-1, 2)
-        if which.size < len(table):
-            table, ends = table[which], ends[which]
-        several = launches_of(formulas, table[:, :-1], table[:, -1], ends)
-        values = found.values.reshape(found.status.size, *shape[:-1])[which]
+        some: Any = slice(None) if which.size == size else which
+        ends, values = spans.values.reshape(-1, 2)[some], found.values.reshape(size, *shape[:-1])[some]
+        several = launches_of(formulas, table[some, :-2], table[some, -2], ends)
         if which.size:
-            gradient[which] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
-    is_open = np.isnan(gradient[answered]).any(axis=tuple(range(1, gradient.ndim)))
-    for k in answered[is_open].tolist():
-        *p, lam0, v0, direction, place = (column[k].item() for column in columns)
+            gradient[some] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
+    for k in answered[_are_open(gradient, answered)].tolist():
+        *p, lam0, v0, direction, place = table[k].tolist()
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
         route[k] = SOLVE
         with suppress(GQMError):
@@ -82,3 +82,11 @@ def sweep_with_gradient(
     found.route[...] = route.reshape(found.status.shape)
     found.gradient = gradient.reshape(*found.status.shape, *shape)
     return found
+
+
+def _are_open(gradient: Array, answered: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return which of the answered launches lack a derivative."""
+    if answered.size == len(gradient) and not np.isnan(gradient.sum()):  # one sum is much faster than one for each
+        return np.zeros(answered.size, dtype=np.bool_)
+    missing: NDArray[np.bool_] = np.isnan(gradient[answered]).reshape(answered.size, -1)
+    return np.asarray(missing.any(axis=1))

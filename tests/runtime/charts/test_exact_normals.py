@@ -231,7 +231,8 @@ def test_spline(generated_folder: Path) -> None:
     knots = np.array([place for _, place, _ in chart.origins] + [chart.origins[-1, 2]])
     knots = knots[[bool(np.abs(chart.points([s])[:2, 0] - points).max(axis=1).min() < 1e-12) for s in chart.edges]]
     assert len(knots) == len(points)
-    spline = make_interp_spline(knots, points, k=5)
+    vanishing = [(order, np.zeros(2)) for order in (3, 4)]
+    spline = make_interp_spline(knots, points, k=5, bc_type=(vanishing, vanishing))
     motion = module.solve(lam0=0.25)
     with mp.workdps(40):
         # Each polynomial between breaks is found from six places by de Boor's algorithm in extended precision.

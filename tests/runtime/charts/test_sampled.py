@@ -76,6 +76,22 @@ def test_a_spline_converges_to_the_curve() -> None:
     assert np.all(orders[:, 1] > 3.8)
 
 
+@pytest.mark.parametrize("count", [8, 9, 10, 11])
+def test_a_spline_through_few_points(count: int) -> None:
+    """Few points of a smooth valley have a spline near it, at order four."""
+
+    def valley(x: np.ndarray) -> np.ndarray:
+        return 0.4 * x**2 + 0.55 * np.sin(2.0 * x + 0.15)
+
+    x = np.linspace(-2.0, 2.0, count)
+    points = np.column_stack([x, valley(x)])
+    chart = charted(points)
+    found = chart.points(chart.edges)[:2].T
+    assert max(np.abs(found - point).max(axis=1).min() for point in points) <= 8 * ULP * 6.0
+    x, z = chart.points(np.linspace(chart.edges[0], chart.edges[-1], 2001))[:2]
+    assert np.abs(z - valley(x)).max() <= 4.0 * (4.0 / (count - 1)) ** 4
+
+
 def test_a_motion_on_a_spline_converges(tmp_path: Path) -> None:
     """Half period and contact force converge to those of the curve at the spline's orders."""
     curve = gqm.Curve.parametric(x=f"{A}*cos(u)", z=f"{B}*sin(u)", parameter="u", period="2*pi")

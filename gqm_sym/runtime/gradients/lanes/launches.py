@@ -56,13 +56,13 @@ def launches_of(formulas: Formulas, given: Array, directions: Array, spans: Arra
     even, axes = np.full(len(spans), UNEVEN, dtype=np.int8), np.zeros((len(spans), 2))
     place, step = formulas.axes(ARRAYS, tuple(given[:, :-2].T))
     if place is not None:
-        middle = 0.5 * (spans[:, 0] + spans[:, 1]) - place
+        low, high = spans.T
+        middle = 0.5 * (low + high) - place
         if step is not None:
             axes[:, 0] = np.nan_to_num(np.rint(middle / step))
         axis = 0.0 if step is None else step * axes[:, 0]
-        rounding = EVEN_TOLERANCE * (np.abs(spans).sum(axis=1) + np.abs(place))
-        is_alone = True if step is None else spans[:, 1] - spans[:, 0] < 2.0 * np.abs(step)
-        even[np.abs(middle - axis) <= rounding] = EVEN
-        even[(even == EVEN) & is_alone] = ABOUT_ONE_AXIS
+        is_even = np.abs(middle - axis) <= EVEN_TOLERANCE * (np.abs(low) + np.abs(high) + np.abs(place))
+        is_alone = True if step is None else high - low < 2.0 * np.abs(step)
+        even = np.where(is_even, np.where(is_alone, ABOUT_ONE_AXIS, EVEN), UNEVEN).astype(np.int8)
         axes[:, 1] = np.where(given[:, -2] >= place + axis, 1.0, -1.0)
     return Launches(given, directions, spans, even, axes)

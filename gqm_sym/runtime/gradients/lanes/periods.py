@@ -43,9 +43,9 @@ from gqm_sym.runtime.gradients.programs import Program, Source, circulation_prog
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
-# The number of launches from which on a thread is worth starting, and that from which on machine code is worth making
-# for a program, which takes up to 0.2 s.
-MIN_LAUNCHES_PER_THREAD, MIN_LAUNCHES_FOR_CODE = 64, 2000
+# The number of launches from which on a thread is worth starting. Machine code for a program takes up to 0.2 s, and is
+# worth making for so many launches of one call, or of all calls so far.
+MIN_LAUNCHES_PER_THREAD, MIN_LAUNCHES_FOR_CODE, MIN_LAUNCHES_IN_ALL = 64, 2000, 20_000
 
 # The number of programs whose machine code is kept, which is up to 1 MB each. A sweep needs three of them.
 MAX_CODED = 48
@@ -95,6 +95,12 @@ def machine_code(make: Callable[..., Program | LaneProgram], *given: Any) -> Cod
     return coded(make(*given))
 
 
+@lru_cache(maxsize=MAX_CODED)
+def launches_so_far(make: Callable[..., Program | LaneProgram], *given: Any) -> list[int]:
+    """Return the number of launches for which a program has been carried out, as a list so that it can be changed."""
+    return [0]
+
+
 def end_program(end: int, source: Source, rows: tuple[int, ...]) -> Program:
     """Return one of `end_programs`."""
     return end_programs(source, rows)[end]
@@ -124,6 +130,8 @@ def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ..
                 out, states = carried_out(stage, program, rows, (chosen, launches.even[chosen] != UNEVEN), most)
                 is_answered = states == ANSWERED
                 if is_answered.all():
+                    if chosen.size == len(found):
+                        return out
                     found[chosen], is_open[chosen] = out, False
                     break
                 found[chosen[is_answered]], is_open[chosen[is_answered]] = out[is_answered], False
@@ -133,7 +141,7 @@ def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ..
 
 def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
     """Yield the programs for half periods and laps, the fastest first."""
-    source, table, swings = source_of(formulas), launches.table, ~launches.circulates
+    source, swings = source_of(formulas), ~launches.circulates
     n, about_axis = source.parameters, launches.even == ABOUT_ONE_AXIS
     has_form = source.formulas.agm_arguments is not None or source.formulas.time_integrand is not None
     if has_form and formulas.axes_of is not None:
@@ -142,9 +150,10 @@ def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Ite
             if not chosen.any():
                 continue
             orbits = Orbits(source, formulas.axes_of, are_at_rest, rows)
-            launched = np.hstack([table[:, : n + 1], launches.axes]) if are_at_rest else table
+            launched = np.hstack([launches.given[:, : n + 1], launches.axes]) if are_at_rest else launches.table
             for make in (mean_program, axis_program, exact_axis_program):
                 yield Stage(chosen, make, (orbits,), launched, n + 3 if are_at_rest else n, not are_at_rest)
+    table = launches.table
     uneven = swings if source.formulas.time_integrand is None else swings & ~about_axis
     yield Stage(uneven, swing_program, (source, rows), table, n, True)
     yield Stage(swings, libration_program, (source, rows), table, source.variables, True)
@@ -180,7 +189,9 @@ def carried_out(
     turns = [(end_program, end, getattr(source, "source", source), rows) for end in range(2)] if stage.has_turns else []
     makers = [*turns, (stage.make, *stage.given)]
     programs = [make(*given) for make, *given in makers]
-    if chosen.size >= MIN_LAUNCHES_FOR_CODE:
+    so_far = launches_so_far(*makers[-1])
+    so_far[0] += chosen.size
+    if chosen.size >= MIN_LAUNCHES_FOR_CODE or so_far[0] >= MIN_LAUNCHES_IN_ALL:
         programs_in_code = [machine_code(*maker) for maker in makers]  # the code lives as long as this list
         addressed = [one.operands for one in programs_in_code]
     else:

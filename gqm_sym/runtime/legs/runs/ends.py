@@ -130,8 +130,11 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
 
 @Inner
 def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
-    """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise END_NONE."""
-    if change.first == change.touch <= 1.0 and not forces.linear:
+    """Return `end_at_once` if V**2 is below its noise because the panel begins next to a turn; otherwise END_NONE.
+
+    Laws that contain the root of V**2 have no values beyond a turn, so that no change may be found there.
+    """
+    if change.first == change.touch and not forces.linear and (change.first <= 1.0 or forces.squared_contact == 0):
         what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
         if what == END_TURN:
             return what, turn, v2

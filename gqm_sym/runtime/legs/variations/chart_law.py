@@ -49,9 +49,11 @@ class ChartLaw(Law):
         pieces = true_pieces_of(maker, problem.p, chart)
         if not isinstance(formulas.exact, ExactChartLaw) or pieces is None:
             raise without_formulas()
-        self._forces = ChartForces(
-            formulas.exact, self.count, self.mass, shaping_of(formulas) if shaping is None else shaping
+        varied, dimension = (
+            shaping_of(formulas) if shaping is None else shaping,
+            2 if formulas.path_in_space is None else 3,
         )
+        self._forces = ChartForces(formulas.exact, self.count, self.mass, varied, dimension)
         self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
         self._launch = problem.launch.lam0
 
@@ -99,7 +101,7 @@ class ChartLaw(Law):
         program, places = chart_path_program(self._forces), self._coordinates(high, low)
         found = np.empty((program.outputs.size, 1, high.size))
         fill_values(program.operands, program.work, self.parameters, places, found)
-        return PathRows(found.reshape(6, self.count + 2, high.size))
+        return PathRows(found.reshape(-1, self.count + 2, high.size))
 
 
 def law_of(problem: Problem) -> Law:

@@ -58,7 +58,7 @@ class ChartAtRest(ChartLaw):
     def coordinates(self, states: Array) -> Array:
         """See `Law`."""
         places = self._shape.places(*states[:2])
-        rows, exact = super().coordinates(states), self._shape.coordinates(places)[:8]
+        rows, exact = super().coordinates(states), self._shape.coordinates(places)[: 4 * self._shape.dimension]
         rows[: len(exact)] = exact
         return rows
 

@@ -88,17 +88,31 @@ class ChartForces(NamedTuple):
         The number of run-time parameters, and the index of the mass among them.
     shaping : tuple of int
         The parameters that shape the curve.
+    dimension : int
+        The number of coordinates of a point.
     """
 
     law: ExactChartLaw
     parameters: int
     mass: int
     shaping: tuple[int, ...]
+    dimension: int = 2
 
 
-# The number of derivatives of x and z with respect to u, from order 0 on, that describe a point of a chart, and the
-# number of those that its curvature needs; each displacement has as many of the latter.
+# The number of derivatives of the coordinates with respect to u, from order 0 on, that describe a point of a chart, and
+# the number of those that its curvature needs; each displacement has as many of the latter.
 ORDERS, CURVED = 5, 3
+
+# A number that keeps the square of a length that vanishes from being zero.
+LEAST_SQUARE = 1e-300
+
+
+def _dot(a: Sequence[TapeNumber], b: Sequence[TapeNumber]) -> TapeNumber:
+    """Return the scalar product of two vectors."""
+    total = a[0] * b[0]
+    for one, other in zip(a[1:], b[1:], strict=True):
+        total = total + one * other
+    return total
 
 
 class _ChartPoint:
@@ -108,36 +122,54 @@ class _ChartPoint:
     """
 
     def __init__(self, forces: ChartForces) -> None:
-        coordinates = 2 * ORDERS + 2 * CURVED * len(forces.shaping) + 1
-        op = Recorder(forces.parameters + 2, coordinates)
+        d = forces.dimension
+        op = Recorder(forces.parameters + 2, d * (ORDERS + CURVED * len(forces.shaping)) + 1)
         self.op, self._forces, self.w = op, forces, op.places[-1]
         self.p, signs = op.values[: forces.parameters], op.values[forces.parameters :]
-        x, z, dx, dz, bend_x, bend_z = op.places[: 2 * CURVED]
-        square = dx * dx + dz * dz
+        place, rates, bends = (op.places[k * d : k * d + d] for k in range(CURVED))
+        square = _dot(rates, rates)
         self._speed = op.sqrt(square)
-        self.curvature = (dx * bend_z - dz * bend_x) / (square * self._speed)
-        point = (x, z, dx / self._speed, dz / self._speed, self.curvature)
-        self.x, self.z = x, z
-        self.load = op.number(forces.law.static_normal_load(op, *point, self.p))
+        if d == 2:
+            self.curvature = (rates[0] * bends[1] - rates[1] * bends[0]) / (square * self._speed)
+            curved = [self.curvature]
+        else:
+            share = _dot(rates, bends) / square
+            curved = [(bend - share * rate) / square for bend, rate in zip(bends, rates, strict=True)]
+            self.curvature = op.sqrt(_dot(curved, curved) + LEAST_SQUARE)
+        point = (*place, *(rate / self._speed for rate in rates), *curved)
+        self.place = place
+        self.load, product = op.number(forces.law.static_normal_load(op, *point, self.p)), None
+        if forces.law.load_along_curvature is not None:
+            product = op.number(forces.law.load_along_curvature(op, *point, self.p))
+        self.product = product
         self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
         self.strains = [op.number(0)] * forces.parameters
         for k, moved in self._displacements():
-            self.strains[k] = (dx * moved[2] + dz * moved[3]) / square
+            self.strains[k] = _dot(rates, moved[d : 2 * d]) / square
 
     def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
         """Return, for each parameter that shapes the curve, the displacement with its derivatives with respect to u."""
-        first, count = 2 * ORDERS, 2 * CURVED
+        first, count = self._forces.dimension * ORDERS, self._forces.dimension * CURVED
         starts = range(first, first + count * len(self._forces.shaping), count)
         return [(k, self.op.places[i : i + count]) for k, i in zip(self._forces.shaping, starts, strict=True)]
+
+    @property
+    def contact(self) -> TapeNumber:
+        """N/m, or |N|/m in space."""
+        op, curvature, load, w = self.op, self.curvature, self.load, self.w
+        if self.product is None:
+            return curvature * w + load
+        return op.sqrt(curvature * curvature * w * w + 2 * self.product * w + load * load)
 
     def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
         """Return the derivatives of a quantity of a point with respect to arc length, V**2, and the run-time
         parameters.
         """
-        op, count = self.op, 2 * (ORDERS - 1)
+        op, d = self.op, self._forces.dimension
+        count = d * (ORDERS - 1)
         *by_places, by_w = gradient(op, quantity, [*op.places[:count], self.w])
         by_parameters = gradient(op, quantity, self.p)
-        along = sum((a * b for a, b in zip(by_places, op.places[2:], strict=False)), op.number(0)) / self._speed
+        along = sum((a * b for a, b in zip(by_places, op.places[d:], strict=False)), op.number(0)) / self._speed
         for k, moved in self._displacements():
             for a, b in zip(by_places, moved, strict=False):
                 by_parameters[k] = by_parameters[k] + a * b
@@ -173,7 +205,7 @@ def chart_load_program(forces: ChartForces) -> Program:
     to the place and W.
     """
     chart_point = _ChartPoint(forces)
-    along, by_w, _ = chart_point.partials(chart_point.curvature * chart_point.w + chart_point.load)
+    along, by_w, _ = chart_point.partials(chart_point.contact)
     load_slope = along + by_w * chart_point.slope
     return assemble(chart_point.op, [load_slope, *chart_point.partials(load_slope)[:2]])
 
@@ -182,8 +214,11 @@ def chart_load_program(forces: ChartForces) -> Program:
 def chart_path_program(forces: ChartForces) -> Program:
     """Return the program of states at a point, as `gradients.programs.path_program`."""
     chart_point = _ChartPoint(forces)
-    op, m, outputs = chart_point.op, chart_point.p[forces.mass], list[TapeNumber]()
-    for quantity in (chart_point.x, chart_point.z, None, m * chart_point.curvature, m * chart_point.load, op.number(0)):
+    op, m, outputs, place = chart_point.op, chart_point.p[forces.mass], list[TapeNumber](), chart_point.place
+    quantities = [place[0], place[-1], None, m * chart_point.curvature, m * chart_point.load, op.number(0)]
+    quantities += [place[1]] if forces.dimension > 2 else []
+    quantities += [m * m * chart_point.product] if chart_point.product is not None else []
+    for quantity in quantities:
         if quantity is None:
             outputs += [op.number(1), *chart_point.strains, op.number(0)]
         else:

@@ -123,6 +123,19 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(*found)
 
 
+def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that have served enough launches in all become machine code, which gives the same bits."""
+    monkeypatch.setattr(periods, "MIN_LAUNCHES_IN_ALL", 250)
+    made, machine_code = [], periods.machine_code
+    monkeypatch.setattr(periods, "machine_code", lambda *maker: made.append(maker[0]) or machine_code(*maker))
+    periods.launches_so_far.cache_clear()
+    module, lam0, found = generated("circle"), np.linspace(0.3, 1.2, 100), []
+    for sweeps in range(1, 5):
+        found.append(module.sweep("half_period", lam0=lam0, gradient=("lam0", "L")).gradient)
+        assert len(made) == max(0, sweeps - 2)
+        np.testing.assert_array_equal(found[0], found[-1])
+
+
 def test_machine_code_that_is_not_used_any_more() -> None:
     """Machine code is removed from memory with its program, and is made again when it is needed."""
     source = source_of(generated("circle").MODEL)

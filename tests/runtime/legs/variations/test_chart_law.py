@@ -13,7 +13,6 @@ from mpmath import mp, mpf
 from paths import ROOT
 
 import gqm_sym as gqm
-from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 
 # The tolerance of derivatives over several legs, relative to the largest of an array.
@@ -158,10 +157,68 @@ def test_a_track_through_points(generated_folder: Path) -> None:
         assert abs(slopes["lam0"] + 1 / mp.sqrt(exact["v0"] ** 2 - up)) <= TOLERANCE
 
 
-def test_points_in_space_have_none(generated_folder: Path) -> None:
-    """Points in space are known in doubles only, which one error says."""
-    points = [(float(k), 3.0 * np.sin(k / 3.0), 8.0 - 0.4 * k) for k in range(8)]
-    model = gqm.derive(gqm.Curve.sampled(points), gqm.Gravity() + gqm.QuadraticDrag(b="1/100"))
-    slide = gqm.build(model, name="chute_in_space", folder=generated_folder).solve(0, v0=3)
-    with pytest.raises(SolutionError, match="known in doubles only"):
-        slide.gradient("t_end", "b")
+def test_a_rail_in_space_is_the_planar_one(generated_folder: Path) -> None:
+    """A rail of transitions in a vertical plane has the derivatives of the planar rail of lines and arcs."""
+    force, given = gqm.Gravity() + gqm.CoulombFriction(mu="1/10") + gqm.QuadraticDrag(b="1/50"), {"r": "3/2"}
+    flat = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius="r", angle="2"), gqm.line(length=3)], heading="-1")
+    pieces = [gqm.transition(length=2), gqm.transition(length="2*r", pitch="1/r"), gqm.transition(length=3)]
+    rail = gqm.Curve.piecewise(pieces, heading=("1/2", "-1"))
+    one, other = (
+        gqm.build(gqm.derive(curve, force), name=f"varied_{name}", folder=generated_folder).solve(
+            0.75, 0.5, t_max=4, **given
+        )
+        for name, curve in (("flat", flat), ("turned", rail))
+    )
+    for quantity in ("v_max", "normal_force_max", "normal_force_min", "turning_points"):
+        wanted, found = one.gradient(quantity), other.gradient(quantity)
+        for name, value in wanted.items():
+            assert np.asarray(found[name]) == pytest.approx(np.asarray(value), rel=TOLERANCE, abs=TOLERANCE), quantity
+    wanted, found = (motion.gradient("time_at", lam=4.25) for motion in (one, other))
+    assert list(found.values()) == pytest.approx(list(wanted.values()), rel=TOLERANCE, abs=TOLERANCE)
+    times = np.array([0.25, 1.0, 2.5, 3.75])
+    here, there = one.sensitivity(times), other.sensitivity(times)
+    assert here.wrt == there.wrt
+    for field, share, by in (("x", np.cos(0.5), "x"), ("y", np.sin(0.5), "x"), ("z", 1.0, "z"), ("v", 1.0, "v")):
+        expected = share * getattr(here, by)
+        assert np.abs(getattr(there, field) - expected).max() <= TOLERANCE * np.abs(expected).max()
+    assert np.abs(there.normal_force - here.normal_force).max() <= 4 * TOLERANCE * np.abs(here.normal_force).max()
+
+
+@pytest.mark.parametrize("name", ["points", "rail"])
+def test_in_space_as_differences(name: str, generated_folder: Path) -> None:
+    """Derivatives along points and rails in space are those of differences of answers, also by a shape."""
+    u = np.linspace(-2.0, 2.0, 41)
+    pieces = [
+        gqm.transition(length="1"),
+        gqm.transition(length="4", yaw="q", pitch="pi/8"),
+        gqm.transition(length="4", yaw="-1/10", pitch="pi/8"),
+        gqm.transition(length="2"),
+    ]
+    rail = gqm.Curve.piecewise(pieces, start=("0", "0", "4"), heading=("0", "-pi/2"))
+    points = gqm.Curve.sampled(np.column_stack([u, 0.3 * np.sin(u), 0.5 * u * u]))
+    curve, start, given = (points, 4.0, {}) if name == "points" else (rail, 2.0, {"q": 0.125})
+    force = gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag(b="c")
+    module = gqm.build(gqm.derive(curve, force), name=f"varied_{name}", folder=generated_folder)
+    known = {"lam0": start, "mu": 0.0625, "c": 0.03125, "g": 9.8125, **given}
+    fields, step = ("lam", "x", "y", "z", "v", "normal_force"), 2.0**-13
+
+    def moved(**changed: float) -> Any:
+        return module.solve(v0=0.0, direction=1, t_max=3.0, **{**known, **changed})
+
+    def answers(motion: Any) -> Any:
+        state, turns = motion.state(2.375), motion.turning_points
+        numbers = [motion.time_at(3.0), motion.v_max.value, motion.normal_force_max.value, turns[0]]
+        return np.array([*numbers, *(getattr(state, field) for field in fields)])
+
+    motion = moved()
+    gradients = [motion.gradient("time_at", lam=3.0), *map(motion.gradient, ("v_max", "normal_force_max"))]
+    turns, changes = motion.gradient("turning_points"), motion.sensitivity(2.375)
+    for key, value in known.items():
+        at = changes.wrt.index(key)
+        found = [*(gradient[key] for gradient in gradients), turns[key][0]]
+        found += [getattr(changes, field)[at] for field in fields]
+        near, far = (
+            (answers(moved(**{key: value + k * step})) - answers(moved(**{key: value - k * step}))) / (2.0 * k * step)
+            for k in (1, 2)
+        )
+        assert found == pytest.approx((4.0 * near - far) / 3.0, rel=2e-8, abs=2e-8), key
