@@ -90,6 +90,7 @@ TESTED_THROUGH = {
     "charts/double_double/turning_points.py": "runtime/charts/double_double/test_passage.py",
     "charts/evaluate.py": "runtime/charts/test_chart.py",
     "charts/exact_parts.py": "runtime/charts/test_exact_normals.py",
+    "charts/interpolation.py": "runtime/charts/test_sampled.py",
     "charts/level_pieces.py": "runtime/charts/test_tracing.py",
     "charts/train.py": "claims/test_trains.py",
     "charts/train_load.py": "claims/test_trains.py",

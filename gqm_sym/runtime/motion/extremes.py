@@ -202,17 +202,20 @@ def _on_segment(
     values = signed(phi)
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
-    found = []
+    found, size = [], _size(values)
     for k in sorted(peaks.tolist(), key=lambda k: -float(values[k]))[:MAX_PEAKS]:
         angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
-        # Since a peak at an end of the segment may be flat, it may be found next to the end within rounding.
+        value = float(signed(np.array([angle]))[0])
+        # Since a peak at an end of the segment may be flat, it may be found next to the end within rounding. At a joint
+        # the quantity may jump, and what is found next to it is then the limit from the segment's side.
         near = min((start, stop), key=lambda end: abs(end - angle))
         if abs(near - angle) < END_SHARE * (high - low):
-            angle = near
+            angle, at_end = near, float(signed(np.array([near]))[0])
+            value = value if value - at_end > EQUAL_ROUNDINGS * ULP * size else at_end
         at_turn = quantity is SPEED and timed.end == "turn" and angle == timed.phi_stop
-        value = 0.0 if at_turn else sign * float(signed(np.array([angle]))[0])
+        value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))
-    return _size(values), sorted(found, key=lambda peak: peak.t)
+    return size, sorted(found, key=lambda peak: peak.t)
 
 
 def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:

@@ -29,7 +29,7 @@ from gqm_sym.runtime.compiled.strided import (
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
-from gqm_sym.runtime.launch.zeros import LIMIT, TURN, SearchArrays, speed_squared
+from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, TURN, SearchArrays, speed_squared
 from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
@@ -159,10 +159,21 @@ def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignor
     return Orbit(False, False, direction, lam0, v2, min(end, turn), max(end, turn), leaves)
 
 
+@Inner
+def ends_at_cusp(curve, lam0, v2, ahead, behind):  # type: ignore[no-untyped-def]
+    """Return whether it is certain that a motion ends at a cusp, which the body reaches with a speed above zero."""
+    last = behind if ahead.what == TURN else ahead
+    if last.what != CUSP or last.near == 0.0 or not isfinite(last.near):
+        return False
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
+    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, last.near, arrays)
+    return v2_there > MIN_LEAVING_SHARE * size
+
+
 @Inlined
 def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
     """Return the status of launch k, which is ANSWERED if it has an orbit, this orbit, and the panels that it passes in
-    a table.
+    a table. The status is NOT_PERIODIC if the motion ends at a cusp.
 
     The orbit's span is taken from ``spans`` if it is ``known``.
     """
@@ -198,6 +209,8 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     kind = orbit_kind(direction, ahead, behind, v0, period)
     if kind == NO_ORBIT:
         orbit = orbit_that_leaves(curve, lam0, v2, direction, ahead, behind)
+        if orbit.leaves == 0 and direction != 0 and ends_at_cusp(curve, lam0, v2, ahead, behind):
+            return NOT_PERIODIC, orbit, nowhere
         return ANSWERED if orbit.leaves != 0 else UNDECIDED, orbit, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
@@ -399,4 +412,6 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         if status == ANSWERED:
             target = element(columns, TARGET, k)
             status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
+        elif status == NOT_PERIODIC and (quantity not in PERIODIC or side != 0):
+            status = UNDECIDED
         statuses[k], routes[k] = status, SINGLE

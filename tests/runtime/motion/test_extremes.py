@@ -140,3 +140,26 @@ def test_a_load_that_jumps_at_a_joint(tmp_path: Path) -> None:
     peak = motion.normal_force_max
     assert peak.value == pytest.approx(9.81 * (1 + 2 * 3.8 / 3), rel=1e-13)
     assert peak.lam == pytest.approx(1 + 1.5 * pi, rel=1e-12)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05])
+def test_a_load_that_jumps_where_a_joint_is_passed_backwards(mu: float, tmp_path: Path) -> None:
+    """A body that slides from an arc into a narrower one, in which it turns, has its largest load where that begins.
+
+    Its V**2 on the wider arc follows from the closed form of friction on a circle: with the angle u from the lowest
+    point, V**2 = A cos(u) + B sin(u) + C exp(2 mu u).
+    """
+    radius, begin, end, g = 3.0, 0.5, -0.05, 9.81
+    pieces = [gqm.arc(radius="1", angle="6/5"), gqm.arc(radius=radius, angle="1")]
+    force = gqm.Gravity() + gqm.CoulombFriction(mu=mu) if mu else gqm.Gravity()
+    model = gqm.derive(gqm.Curve.piecewise(pieces, heading="-5/4"), force)
+    module = gqm.build(model, name=f"joint_backwards_{bool(mu)}", folder=tmp_path)
+    launch = 1.2 + radius * (begin - end)
+    b = 6 * mu * g * radius / (1 + 4 * mu * mu)
+    a = 2 * g * radius - 2 * mu * b
+    c = -(a * np.cos(begin) + b * np.sin(begin)) * np.exp(-2 * mu * begin)
+    load = g * np.cos(end) + (a * np.cos(end) + b * np.sin(end) + c * np.exp(2 * mu * end)) / 1.0
+    peak = module.solve(launch, t_max=20.0).normal_force_max
+    assert peak.value == pytest.approx(load, rel=4e-15)
+    assert peak.lam == pytest.approx(1.2, rel=4e-15)
+    assert module.sweep("normal_force_max", [launch], t_max=20.0).values[0] == pytest.approx(load, rel=4e-15)

@@ -517,3 +517,14 @@ def test_small_swings_keep_contact(module_of: ModuleOf) -> None:
     swept = module_of("circle").sweep("t_end", 10.0 ** np.linspace(-9, -1, 9), contact="above", t_max=5.0, L=1)
     assert swept.values.tolist() == [5.0] * 9
     assert swept.route_counts() == {"single": 9}
+
+
+@pytest.mark.parametrize("quantity", ["half_period", "period", "turning_points"])
+def test_motions_that_end_at_cusps_are_not_solved_one_by_one(quantity: str) -> None:
+    """On the hump of a cycloid bodies slide down to the cusp at either end, and none of their motions repeats."""
+    places, speeds = np.linspace(0.3, 6.0, 50), np.linspace(0.0, 2.0, 3)[:, np.newaxis]
+    found = cycloid.sweep(quantity, places, speeds)
+    assert found.route_counts() == {"single": found.status.size}
+    assert np.isnan(found.values).all()
+    assert found.status_counts() == {STATUS_SENTENCES[2]: found.status.size}
+    assert cycloid.solve(1.0, 0.5).kind == "transit"

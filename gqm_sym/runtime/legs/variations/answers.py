@@ -147,6 +147,13 @@ def places_at(motion: Any, changes: Changes, points: MarchPoints) -> Array:
     if changes.law.by_arc_length:  # the change of the arc length is needed too
         found: Array = states_at(changes, points).lam
         return found
+    starts = range(0, max(points.v.size, 1), BLOCK)
+    parts = [_places(motion, changes, points.part(slice(start, start + BLOCK))) for start in starts]
+    return np.concatenate(parts, axis=1)
+
+
+def _places(motion: Any, changes: Changes, points: MarchPoints) -> Array:
+    """Return what `places_at` does along a curve with formulas."""
     v, f = points.v, motion.problem.functions
     along = changes.along(points.half, points.w, v, whole=False)
     ds = path_and_force_at(f.addresses, f.p, along.states[0], v**2)[2]

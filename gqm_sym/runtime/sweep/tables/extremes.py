@@ -11,6 +11,7 @@ from gqm_sym.runtime.sweep.orbit_extremes import (
     STEP_RATIO,
     V2,
     fill_force,
+    fill_squares,
     frame_buffer,
     line_buffer,
     point_buffer,
@@ -79,7 +80,10 @@ def load_on(curve, k, level, sought, x):  # type: ignore[no-untyped-def]
     if sought[0] == FORCE_SQUARED:
         places, values, frame = point_buffer(), point_buffer(), frame_buffer()
         places[0], values[0] = place_on(curve, k, x), max(v2, 0.0)
-        fill_force(curve, sought, 1, places, values, frame, values)
+        if sought[1] != 0:
+            fill_squares(curve, sought[1], 1, places, values, values)
+        else:
+            fill_force(curve, sought, 1, places, values, frame, values)
         return values[0] / curve.mass**2
     return v2
 
