@@ -239,7 +239,7 @@ def _peak(function: Callable[[Array], Array], low: float, middle: float, high: f
         return middle
     nodes = np.cos(np.pi * (np.arange(PEAK_NODES) + 0.5) / PEAK_NODES)
     values = function(0.5 * (low + high) + 0.5 * (high - low) * nodes)
-    beside = BESIDE_JOINT * max(abs(low), abs(high))
+    beside = min(BESIDE_JOINT * max(abs(low), abs(high)), 0.5 * (high - low))
     candidates = [low + beside, high - beside, low, middle, high]
     if np.isfinite(values).all():
         terms = chebyshev.chebfit(nodes, values, PEAK_NODES - 1)

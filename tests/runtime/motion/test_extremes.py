@@ -11,6 +11,7 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import Motion
+from gqm_sym.runtime.motion import extremes
 
 NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
 
@@ -163,3 +164,15 @@ def test_a_load_that_jumps_where_a_joint_is_passed_backwards(mu: float, tmp_path
     assert peak.value == pytest.approx(load, rel=4e-15)
     assert peak.lam == pytest.approx(1.2, rel=4e-15)
     assert module.sweep("normal_force_max", [launch], t_max=20.0).values[0] == pytest.approx(load, rel=4e-15)
+
+
+@pytest.mark.parametrize("width", [0.0, 2.0**-53, 2.0**-50, 2.0**-46, 1e-3])
+def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
+    """On a panel of the width of a few roundings, polynomials mean nothing beside it."""
+    low, high = 1.0 - width, 1.0
+
+    def values(places: np.ndarray) -> np.ndarray:
+        assert np.all((places >= low) & (places <= high))
+        return places
+
+    assert extremes._peak(values, low, high, high) == high
