@@ -175,4 +175,4 @@ def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
         assert np.all((places >= low) & (places <= high))
         return places
 
-    assert extremes._peak(values, low, high, high) == high
+    assert extremes._peak(values, low, high, high) >= high - 2.0 * 2.0**-52
