@@ -150,6 +150,14 @@ class TapeNumber:
         return half * half * self if count % 2 else half * half
 
 
+def scalar_product(a: Sequence[TapeNumber], b: Sequence[TapeNumber]) -> TapeNumber:
+    """Return the scalar product of two vectors."""
+    total = a[0] * b[0]
+    for one, other in zip(a[1:], b[1:], strict=True):
+        total = total + one * other
+    return total
+
+
 class _Recorder:
     """The namespace of operations with which formulas are recorded. Its functions have the names that mpmath uses.
 

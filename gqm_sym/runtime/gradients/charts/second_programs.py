@@ -7,19 +7,11 @@ two derivatives with respect to u; from these the second derivative of the poten
 from collections.abc import Sequence
 from functools import lru_cache
 
-from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber, scalar_product
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, assemble
 from gqm_sym.runtime.gradients.second_programs import pairs_of
-
-
-def _dot(a: Sequence[TapeNumber], b: Sequence[TapeNumber]) -> TapeNumber:
-    """Return the scalar product of two vectors."""
-    total = a[0] * b[0]
-    for one, other in zip(a[1:], b[1:], strict=True):
-        total = total + one * other
-    return total
 
 
 class _PotentialAt:
@@ -30,15 +22,15 @@ class _PotentialAt:
         place, rates, bends = numbers[:d], numbers[d : 2 * d], numbers[2 * d :]
         self._op, self._p = op, op.values[: source.parameters]
         self.value, *by_place = map(op.number, source.potential(op, *place, self._p))
-        square = _dot(rates, rates)
-        speed, share = op.sqrt(square), _dot(bends, rates) / square
+        square = scalar_product(rates, rates)
+        speed, share = op.sqrt(square), scalar_product(bends, rates) / square
         tangent = [rate / speed for rate in rates]
         turn = [(bend - share * rate) / square for bend, rate in zip(bends, rates, strict=True)]
-        self.slope = _dot(by_place, tangent)
-        stiffness = [_dot(gradient(op, by, place), tangent) for by in by_place]
-        self.bend = _dot(stiffness, tangent) + _dot(by_place, turn)
+        self.slope = scalar_product(by_place, tangent)
+        stiffness = [scalar_product(gradient(op, by, place), tangent) for by in by_place]
+        self.bend = scalar_product(stiffness, tangent) + scalar_product(by_place, turn)
         self.partials = gradient(op, self.value, self._p)
-        self.partial_slopes = [_dot(gradient(op, part, place), tangent) for part in self.partials]
+        self.partial_slopes = [scalar_product(gradient(op, part, place), tangent) for part in self.partials]
 
     def seconds(self, i: int) -> list[TapeNumber]:
         """Return the derivatives of a derivative by a run-time parameter with respect to all of them."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
-from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber, scalar_product
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.programs import Program, assemble
@@ -17,17 +17,9 @@ from gqm_sym.runtime.gradients.programs import Program, assemble
 LEAST_SQUARE = 1e-300
 
 
-def _dot(a: Sequence[TapeNumber], b: Sequence[TapeNumber]) -> TapeNumber:
-    """Return the scalar product of two vectors."""
-    total = a[0] * b[0]
-    for one, other in zip(a[1:], b[1:], strict=True):
-        total = total + one * other
-    return total
-
-
 def _across(vector: Sequence[TapeNumber], along: Sequence[TapeNumber]) -> list[TapeNumber]:
     """Return the part of a vector across a direction."""
-    share = _dot(vector, along) / _dot(along, along)
+    share = scalar_product(vector, along) / scalar_product(along, along)
     return [a - share * b for a, b in zip(vector, along, strict=True)]
 
 
@@ -45,15 +37,15 @@ class SpaceSource(ChartSource):
     def _at(self, op: Recorder, numbers: Sequence[TapeNumber]) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
         place, rates, p = numbers[:3], numbers[3:6], op.values[: self.parameters]
         value, *by_place = map(op.number, self.potential(op, *place, p))
-        partials, speed = gradient(op, value, p), op.sqrt(_dot(rates, rates))
+        partials, speed = gradient(op, value, p), op.sqrt(scalar_product(rates, rates))
         for k, moved in zip(self.shaping, self._moves(numbers), strict=True):
-            partials[k] = partials[k] + _dot(by_place, _across(moved, rates))
-        return value, _dot(by_place, rates) / speed, partials
+            partials[k] = partials[k] + scalar_product(by_place, _across(moved, rates))
+        return value, scalar_product(by_place, rates) / speed, partials
 
     def _strains(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
         rates, bend = numbers[3:6], numbers[6:9]
         moves = zip(self.shaping, self._moves(numbers), strict=True)
-        return [(k, -_dot(bend, _across(moved, rates))) for k, moved in moves]
+        return [(k, -scalar_product(bend, _across(moved, rates))) for k, moved in moves]
 
 
 @lru_cache(maxsize=64)
@@ -68,25 +60,25 @@ def space_path_program(source: SpaceSource) -> Program:
     op = Recorder(p, 12 + 9 * len(source.shaping))
     values, places = op.values, op.places
     place, rates, bends, following = places[:3], places[3:6], places[6:9], places[3:12]
-    square, mass = _dot(rates, rates), values[source.mass]
+    square, mass = scalar_product(rates, rates), values[source.mass]
     speed = op.sqrt(square)
     value, *by_place = map(op.number, source.potential(op, *place, values))
     bend = [part / square for part in _across(bends, rates)]
     load = [source.one_plus_beta(op) * part for part in _across(by_place, rates)]
-    curvature, still = (op.sqrt(_dot(part, part) + LEAST_SQUARE) for part in (bend, load))
+    curvature, still = (op.sqrt(scalar_product(part, part) + LEAST_SQUARE) for part in (bend, load))
     outputs: list[Any] = []
     quantities = place[0], place[2], None, mass * curvature, mass * still, value, place[1]
-    for quantity in (*quantities, mass * mass * _dot(bend, load)):
+    for quantity in (*quantities, mass * mass * scalar_product(bend, load)):
         partials = [op.number(0)] * (p + 9) if quantity is None else gradient(op, quantity, [*values, *places[:9]])
         by_values, by_places = partials[:p], partials[p:]
         along = sum((a * b for a, b in zip(by_places, following, strict=True)), op.number(0)) / speed
         for i, k in enumerate(source.shaping):
             moved = places[12 + 9 * i : 21 + 9 * i]
             if quantity is None:
-                by_values[k] = -_dot(bend, moved[:3])
+                by_values[k] = -scalar_product(bend, moved[:3])
                 continue
             for a, b in zip(by_places, moved, strict=True):
                 by_values[k] = by_values[k] + a * b
-            by_values[k] = by_values[k] - along * _dot(moved[:3], rates) / speed
+            by_values[k] = by_values[k] - along * scalar_product(moved[:3], rates) / speed
         outputs += [op.number(1) if quantity is None else quantity, *by_values, along]
     return assemble(op, outputs)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber, scalar_product
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
 from gqm_sym.runtime.gradients.lanes.assembly import assemble as assemble_lanes
@@ -107,14 +107,6 @@ ORDERS, CURVED = 5, 3
 LEAST_SQUARE = 1e-300
 
 
-def _dot(a: Sequence[TapeNumber], b: Sequence[TapeNumber]) -> TapeNumber:
-    """Return the scalar product of two vectors."""
-    total = a[0] * b[0]
-    for one, other in zip(a[1:], b[1:], strict=True):
-        total = total + one * other
-    return total
-
-
 class _ChartPoint:
     """A tape with a point of a chart, as `ShapedPieces.path` gives it with `ORDERS`, and V**2 there.
 
@@ -127,15 +119,15 @@ class _ChartPoint:
         self.op, self._forces, self.w = op, forces, op.places[-1]
         self.p, signs = op.values[: forces.parameters], op.values[forces.parameters :]
         place, rates, bends = (op.places[k * d : k * d + d] for k in range(CURVED))
-        square = _dot(rates, rates)
+        square = scalar_product(rates, rates)
         self._speed = op.sqrt(square)
         if d == 2:
             self.curvature = (rates[0] * bends[1] - rates[1] * bends[0]) / (square * self._speed)
             curved = [self.curvature]
         else:
-            share = _dot(rates, bends) / square
+            share = scalar_product(rates, bends) / square
             curved = [(bend - share * rate) / square for bend, rate in zip(bends, rates, strict=True)]
-            self.curvature = op.sqrt(_dot(curved, curved) + LEAST_SQUARE)
+            self.curvature = op.sqrt(scalar_product(curved, curved) + LEAST_SQUARE)
         point = (*place, *(rate / self._speed for rate in rates), *curved)
         self.place = place
         self.load, product = op.number(forces.law.static_normal_load(op, *point, self.p)), None
@@ -145,7 +137,7 @@ class _ChartPoint:
         self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
         self.strains = [op.number(0)] * forces.parameters
         for k, moved in self._displacements():
-            self.strains[k] = _dot(rates, moved[d : 2 * d]) / square
+            self.strains[k] = scalar_product(rates, moved[d : 2 * d]) / square
 
     def _displacements(self) -> list[tuple[int, Sequence[TapeNumber]]]:
         """Return, for each parameter that shapes the curve, the displacement with its derivatives with respect to u."""
