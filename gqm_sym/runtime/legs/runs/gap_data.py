@@ -70,10 +70,6 @@ FILLED, REFUSED = 1.0, 2.0
 # The share of the square of the contact force in its terms below which it loses digits.
 LEAST_SHARE = 1e-2
 
-# Where the force almost vanishes along a whole gap, as where friction balances the weight, its coefficients are
-# compared with this share of n0, because a rounding of a chart's angle changes it by a rounding of n0.
-NOISE_OF_FORCE = 2.0**-5
-
 square_size_row = over_rows(lambda a, c, w: a + c * (w * w), WIDE)
 undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
 share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
@@ -123,7 +119,7 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
         return
     to_means(work, FORCE, work, MEAN)
     product(work, SPEED, OFFSET, MEAN)
-    work[size_at(FORCE)] = max(size_of(work, FORCE), NOISE_OF_FORCE * size_of(work, N0))
+    work[size_at(FORCE)] = size_of(work, FORCE)
     if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
         return
     if forces.kinked and not kink(work) > 1.0:

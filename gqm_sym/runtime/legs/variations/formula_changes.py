@@ -100,7 +100,7 @@ def law_on_panels(programs, inputs, states, marks):  # type: ignore[no-untyped-d
     parameters = inputs.shape[1] - 2
     found = np.empty((2 * parameters + 5, states.shape[1]))
     fill_in_doubles(doubles, doubles_work, inputs[:, :parameters], states, found)
-    both = exact_values(rates, rates_work, inputs, np.ascontiguousarray(states[:, :marks]))
+    both = exact_values(rates, rates_work, inputs, states[:, :marks].copy())
     found[0, :marks], found[parameters + 2, :marks] = both[0], both[1]
     return found
 
@@ -132,7 +132,7 @@ def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap
     states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
     law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0
     if v0 == 0.0 and direction != heading:
-        turned = np.ascontiguousarray(states[:, :1])
+        turned = states[:, :1].copy()
         turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
         other_force = exact_values(programs[4], programs[5], inputs, turned)[1, 0]
     laid = records, begins, first, panels
