@@ -88,5 +88,4 @@ def _are_open(gradient: Array, answered: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which of the answered launches lack a derivative."""
     if answered.size == len(gradient) and not np.isnan(gradient.sum()):  # one sum is much faster than one for each
         return np.zeros(answered.size, dtype=np.bool_)
-    missing: NDArray[np.bool_] = np.isnan(gradient[answered]).reshape(answered.size, -1)
-    return np.asarray(missing.any(axis=1))
+    return np.asarray(np.isnan(gradient[answered]).any(axis=tuple(range(1, gradient.ndim))))

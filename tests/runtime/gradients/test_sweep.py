@@ -133,6 +133,17 @@ def test_launches_without_a_value() -> None:
     assert module.sweep("half_period", lam0=[], gradient=("a", "g")).gradient.shape == (0, 2)
 
 
+@pytest.mark.parametrize("quantity", ["half_period", "period", "turning_points"])
+def test_sweeps_without_any_value(quantity: str, generated_folder: Path) -> None:
+    """Where no launch has a value, none has a derivative."""
+    plane = gqm.Curve.graph("-x", parameter="x", domain=(-3, 3))
+    module = gqm.build(gqm.derive(plane, gqm.Gravity()), name="swept_plane", folder=generated_folder)
+    swept = module.sweep(quantity, [0.1, 0.2], gradient=("lam0", "g"))
+    assert swept.gradient.shape == (*swept.values.shape, 2)
+    assert np.isnan(swept.gradient).all()
+    assert swept.status.all()
+
+
 def test_what_has_no_gradient() -> None:
     """A quantity without a gradient gives one clear error."""
     with pytest.raises(InputError, match="did you mean 'L'"):
