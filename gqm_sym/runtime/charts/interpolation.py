@@ -3,8 +3,8 @@
 The knots are the lengths of the chords at first, then the lengths of the spline found before, until they no longer
 change. A closed spline is periodic. At the ends of an open one, three neighbouring polynomials are the same
 ("not-a-knot"), which is accurate where points are close. Through few points such a spline may swing next to its ends.
-The natural spline is then taken, whose third and fourth derivatives vanish at the ends, as those of a smoothing spline
-do. The number of points decides, so that the spline changes smoothly with the points.
+The natural spline, whose third and fourth derivatives vanish at the ends as those of a smoothing spline do, is taken
+through at most FEW_POINTS points, so that it changes smoothly with them, and where the other one swings more and more.
 """
 
 from collections.abc import Sequence
@@ -79,14 +79,13 @@ def interpolated(points: Array, knots: Array, ends: Ends, at_end: Sequence[Any] 
     """
     from scipy.interpolate import make_interp_spline
 
-    conditions: Any = {"periodic": "periodic", "not-a-knot": None}
+    conditions: Any = "periodic" if ends == "periodic" else None
     if ends == "natural":
-        values = ((0.0, 0.0), at_end)
-        conditions["natural"] = tuple(
+        conditions = tuple(
             [(order, np.broadcast_to(value, points.shape[1:])) for order, value in zip((3, 4), side, strict=True)]
-            for side in values
+            for side in ((0.0, 0.0), at_end)
         )
-    return make_interp_spline(knots, points, k=DEGREE, bc_type=conditions[ends])
+    return make_interp_spline(knots, points, k=DEGREE, bc_type=conditions)
 
 
 def polynomials(spline: Any, knots: Array) -> Array:

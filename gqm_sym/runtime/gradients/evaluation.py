@@ -49,13 +49,19 @@ CUBE = types.float64[:, :, ::1]
 
 
 @Inner
-def begin(program, work, inputs, lanes=BLOCK):  # type: ignore[no-untyped-def]
-    """Fill the registers of the inputs, and all that do not depend on the place, for a number of places."""
-    address, operations, first, count, _ = program
+def fill_registers(inputs, count, lanes, work):  # type: ignore[no-untyped-def]
+    """Fill the registers of the inputs for a number of places."""
     for k in range(count):
         for i in range(lanes):
             for part in range(3):
                 work[k * ROW + part * BLOCK + i] = inputs[part, k]
+
+
+@Inner
+def begin(program, work, inputs, lanes=BLOCK):  # type: ignore[no-untyped-def]
+    """Fill the registers of the inputs, and all that do not depend on the place, for a number of places."""
+    address, operations, first, count, _ = program
+    fill_registers(inputs, count, lanes, work)
     call_interpreter(address, operations, 0, first, work, lanes)
 
 

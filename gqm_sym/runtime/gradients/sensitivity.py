@@ -17,7 +17,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.interpreter import BLOCK as LANES
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.gradients.evaluation import CUBE, PROGRAM
+from gqm_sym.runtime.gradients.evaluation import CUBE, PROGRAM, begin
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed, path_changes
@@ -149,11 +149,7 @@ def fill_sensitivities(motion, along, orbit, found):  # type: ignore[no-untyped-
     (constants, table, scale), (kinds, width) = orbit, outputs.shape
     address, operations, first, count, _ = program
     size = min(LANES, t.size)
-    for k in range(count):
-        for i in range(size):
-            for part in range(3):
-                work[k * ROW + part * LANES + i] = inputs[part, k]
-    call_interpreter(address, operations, 0, first, work, size)
+    begin(program, work, inputs, size)
     variables, functions, terms = found.shape[1], table.shape[1], table.shape[2]
     rows = POINT_ROWS + terms + 2 * functions + kinds * width + STATE_ROWS * variables + 1
     space, shares = np.empty(rows * size), np.empty(size)

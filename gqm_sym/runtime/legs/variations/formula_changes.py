@@ -11,8 +11,8 @@ from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_signed_values_of
+from gqm_sym.runtime.double_double.interpreter import BLOCK, call_interpreter
+from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_registers, fill_signed_values_of
 from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
 from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
@@ -53,10 +53,7 @@ def fill_in_doubles(program, work, inputs, places, found):  # type: ignore[no-un
         Filled with the results.
     """
     count, lanes = places.shape[1], min(BLOCK, places.shape[1])
-    for k in range(inputs.shape[1]):
-        for i in range(lanes):
-            at = k * ROW + i
-            work[at], work[at + LOW], work[at + ERROR] = inputs[0, k], inputs[1, k], inputs[2, k]
+    fill_registers(inputs, inputs.shape[1], lanes, work)
     call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
     for start in range(0, count, BLOCK):
         n = min(BLOCK, count - start)
