@@ -323,7 +323,7 @@ def forces_at_places(motion: Any, places: Array) -> Array:
     changes, times = motion._changes, np.array([motion.time_at(place) for place in places.tolist()])
     law, changed = changes.law, states_at(changes, motion._march_points(times)[0])
     by_place = law.parameters[0, law.mass] * law.loads(changed.states)[0]
-    found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.labels])
+    found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.lam])
     return found
 
 
