@@ -94,10 +94,10 @@ def along_shaped_chart(
         launch = problem.launch.v0.value, at[:2, -1], changes[:2, -1]
         found.slopes["normal_force"] = _force_slopes(source, inputs_of(p), launch, (at, changes), columns)
     elif isinstance(model.exact, ExactChartLaw):
-        slopes = _lossy_slopes(problem, places, np.isfinite(found.values["normal_force"]))
-        if slopes is not None:
-            by_launch = slopes[1 + len(p)][:, None] * moved[-1]
-            found.slopes["normal_force"] = slopes[1:].T[:, columns] + by_launch + slopes[0][:, None] * stretched
+        force = _lossy_slopes(problem, places, np.isfinite(found.values["normal_force"]))
+        if force is not None:
+            by_launch = force[1 + len(p)][:, None] * moved[-1]
+            found.slopes["normal_force"] = force[1:].T[:, columns] + by_launch + force[0][:, None] * stretched
     return found
 
 
