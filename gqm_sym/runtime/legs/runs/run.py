@@ -169,7 +169,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             change,
             at_stop and at_end,
             panel_count >= PANELS_PER_RUN
-            or may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work),
+            or may_pause(forces, march, route, run_length, (v2, largest_v2), panel, (left, step), work),
         )
         if what != END_NONE:
             v2 = 0.0 if ends_here else v2
