@@ -20,6 +20,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HALF_C,
     HEAD,
     HEADING,
+    KNOWN_PEAK,
     NO_VALUES,
     NORMAL_LOAD,
     RIGHT,
@@ -172,6 +173,19 @@ def peak_of_function(blocks, values, part, asked, best):  # type: ignore[no-unty
 
 
 @Inner
+def peak_of_row(blocks, work, row, asked, best):  # type: ignore[no-untyped-def]
+    """Return the larger of ``best`` and the largest value of a function on a part of a leg; of the speed, the row
+    has the square.
+    """
+    values = sample_buffer()
+    for at in range(0, blocks * WIDE, WIDE):
+        copy(values, at, work, blocks * row + at)
+    if asked[0] != SPEED:
+        return peak_of_function(blocks, values, (-1.0, 1.0), asked, best)
+    return max(best, sqrt(peak_of_values(blocks, values, -1.0, 1.0, 1.0, max(best, 0.0) ** 2)))
+
+
+@Inner
 def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[no-untyped-def]
     """Return the larger of ``best`` and the peak of some panels between two values of the march variable.
 
@@ -194,6 +208,9 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
         width = record[at + RIGHT] - left
         first, last = 2.0 * (low - left) / width - 1.0, 2.0 * (high - left) / width - 1.0
         if first > 1.0 or last < -1.0 or record[at + TIME_ERROR] == NO_VALUES:
+            continue
+        if record[at + TIME_ERROR] == KNOWN_PEAK:
+            best = max(best, record[at + Y_ROW])
             continue
         for j in range(COUNT):
             growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
