@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 15, input 3f2dfaf376e9, body d10c7b0ae841
+# interface 15, input 3f2dfaf376e9, body e6ae302fc8a2
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -46,22 +46,21 @@ def path_and_contact_force(n, places, speeds, p, out):
     """x, z, ds/dtheta, curvature kappa, contact force |N|, given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     R, c, g, m = p[0], p[1], p[3], p[4]
-    _t0 = R**2 + c**2
-    _t1 = sqrt(_t0)
-    _t3 = 1/_t0
+    _t0 = c**2
+    _t1 = R**2 + _t0
+    _t3 = 1/_t1
+    _c0 = sqrt(_t1)
     _t4 = R*_t3
-    _c0 = 1/_t1
-    _c1 = _t1
+    _t5 = _t3*g
     for i in range(n):
         theta, v2 = places[i], speeds[i]
         _t2 = R*cos(theta)
-        _t5 = sin(theta)
-        _t6 = c*v2
+        _t6 = _t4*sin(theta)
         out[0, i] = _t2
         out[1, i] = c*theta
-        out[2, i] = _c1
+        out[2, i] = _c0
         out[3, i] = _t4
-        out[4, i] = _c0*m*sqrt(R**4*v2**2/_t0**2 + (_t2*g + _t4*_t5*_t6)**2 + (R*_t5*g - _t2*_t3*_t6)**2)
+        out[4, i] = m*sqrt((-_t0*_t5 + g)**2 + (-_t2*_t3*v2 + _t6*c*g)**2 + (-_t2*_t5*c - _t6*v2)**2)
 
 
 @compiled(PATH_IN_SPACE)
@@ -69,23 +68,19 @@ def path_in_space(n, places, speeds, v, p, out):
     """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (4, n))
     R, c, g, m = p[0], p[1], p[3], p[4]
-    _t3 = 1/(R**2 + c**2)
-    _t9 = _t3*m
+    _t1 = c**2
+    _t2 = 1/(R**2 + _t1)
+    _t5 = _t2*g
+    _t6 = _t5*c
     for i in range(n):
         theta, v2 = places[i], speeds[i]
-        _t0 = sin(theta)
-        _t1 = R*_t0
-        _t2 = cos(theta)
-        _t4 = _t3*v2
-        _t5 = R**3*_t4
-        _t6 = R*_t2
-        _t7 = _t4*c
-        _t8 = R*_t0*g - _t6*_t7
-        _t10 = _t1*_t7 + _t6*g
-        out[0, i] = _t1
-        out[1, i] = _t9*(-_t2*_t5 + _t8*c)
-        out[2, i] = _t9*(-_t0*_t5 - _t10*c)
-        out[3, i] = _t9*(_t1*_t8 + _t10*_t6)
+        _t0 = R*sin(theta)
+        _t3 = _t2*v2
+        _t4 = R*cos(theta)
+        out[0, i] = _t0
+        out[1, i] = m*(_t0*_t6 - _t3*_t4)
+        out[2, i] = m*(-_t0*_t3 - _t4*_t6)
+        out[3, i] = m*(-_t1*_t5 + g)
 
 
 @compiled(SPEED_EQUATION)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 15, input a0162e77d64e, body 72f7db214484
+# interface 15, input a0162e77d64e, body 8bb8e4fb1015
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -447,32 +447,32 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
 @compiled(TIME_INTEGRAND_BATCH)
 def time_integrand_batch(n, sine2, cosine2, p, out):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
-    p, out = carray(p, (12, n)), carray(out, (2, n))
+    p, out = carray(p, (11, n)), carray(out, (2, n))
     for i in range(n):
         a, ecc, k, t, one_minus_t, one_minus_tt = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i]
-        sine_squared, cosine_fourth, _c0, _c1, _c2 = p[7, i], p[8, i], p[9, i], p[10, i], p[11, i]
-        _t0 = cosine2 + one_minus_tt*sine2
-        _t1 = sine2*t
-        _t2 = _t1 + 1
-        _t3 = _t2**2
-        _t4 = 1/_t3
-        _t5 = (cosine2 + one_minus_t*sine2)**2
-        _t6 = 16*_t1
-        _t7 = 1 - ecc**2
-        _t8 = 4*_t1
-        _t9 = _t3*ecc
-        _t10 = _t3 + _t8*ecc + _t9*sine_squared - _t9
-        _t11 = -_t3
-        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t1 - _t11 - _t9)**2)/_t2**4)
-        _t13 = _c2 + _t12
-        out[0, i] = _c0*_c2*_t12*_t13*_t4*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t0*_t10*cosine_fourth*ecc*k)
-        out[1, i] = 8*_c1*_t0*_t10*_t4*ecc*k/(_c0*_t12*_t13)
+        sine_squared, cosine_fourth, _c0, _c1 = p[7, i], p[8, i], p[9, i], p[10, i]
+        _t0 = sine2*t
+        _t1 = _t0 + 1
+        _t2 = 1 - ecc**2
+        _t3 = 4*_t0
+        _t4 = _t1**2
+        _t5 = -_t4
+        _t6 = 16*_t0
+        _t7 = _t4*ecc
+        _t8 = sqrt((_t2*_t6*(-_t3 - _t5) + (-8*_t0 - _t5 - _t7)**2)/_t1**4)
+        _t9 = cosine2 + one_minus_tt*sine2
+        _t10 = _t3*ecc + _t4 + _t7*sine_squared - _t7
+        _t11 = _c1 + _t8
+        _t12 = (cosine2 + one_minus_t*sine2)**2
+        _t13 = _c0*_c1/_t4
+        out[0, i] = _t11*_t13*_t8*a**2*(_t12*_t6 + _t2*(_t12 - _t3)**2)/(2*_t10*_t9*cosine_fourth*ecc*k)
+        out[1, i] = 8*_t10*_t13*_t9*ecc*k/(_t11*_t8)
 
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (7, n))
     for i in range(n):
         a, ecc, half = p[0, i], p[1, i], halves[i]
         _t0 = half/2
@@ -481,15 +481,13 @@ def integrand_invariants_batch(n, halves, p, out):
         _t3 = _t2 + 1
         _t4 = _t3**2
         _t5 = 1/_t4
-        _t6 = sqrt(4*_t1*(1 - _t1)*(1 - ecc**2) + (-2*_t1 - ecc + 1)**2)
         out[0, i] = _t1*_t5
         out[1, i] = 2*_t2/_t3
         out[2, i] = 4*_t2*_t5
         out[3, i] = _t1
         out[4, i] = _t4/4
         out[5, i] = fabs(a)
-        out[6, i] = 1/_t6
-        out[7, i] = _t6
+        out[6, i] = sqrt(4*_t1*(1 - _t1)*(1 - ecc**2) + (-2*_t1 - ecc + 1)**2)
 
 
 @compiled(BOUNDS_BATCH)
@@ -545,7 +543,7 @@ MODEL = CompiledModel(
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
-        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=15, integrand_rows=8,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=15, integrand_rows=7,
     ),
     domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(

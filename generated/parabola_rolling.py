@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 15, input 6fc25406b912, body 2ed689abe4de
+# interface 15, input 6fc25406b912, body cb15ec4f3770
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -385,7 +385,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
         _t3 = sqrt(_t2)
         _t4 = -_c0*_t1*rho/(_t3*(_c1 + _t3)) + a
         out[0, i] = _t0*(-2*a*rho + sqrt(_t2)**3)**2/(2*_t2**2*_t4*g)
-        out[1, i] = 2*_t4*g/_t0
+        out[1, i] = 2*_t0*_t4*g
 
 
 @compiled(INTEGRAND_INVARIANTS_BATCH)

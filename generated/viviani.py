@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 15, input c93b8a64a5a5, body baab8add24fc
+# interface 15, input c93b8a64a5a5, body d2b5e804b712
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -48,23 +48,31 @@ def path_and_contact_force(n, places, speeds, p, out):
     """x, z, ds/dtheta, curvature kappa, contact force |N|, given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     a, g, m = p[0], p[1], p[2]
-    _t7 = 1/a
-    _t8 = a*g
+    _t13 = 1/a**2
     for i in range(n):
         theta, v2 = places[i], speeds[i]
         _t0 = cos(theta)
         _t1 = theta/2
         _t2 = sin(_t1)
-        _t3 = cos(_t1)
-        _t4 = _t3**2
-        _t5 = _t4 + 1
-        _t6 = sqrt(_t5)
-        _t9 = v2/_t5
+        _t3 = _t2*a
+        _t4 = cos(_t1)
+        _t5 = _t4**2
+        _t6 = _t5 + 1
+        _t7 = sin(theta)
+        _t8 = _t7*a
+        _t9 = 1/_t6
+        _t10 = _t0*_t2*_t4*_t9*a/2 - _t8
+        _t11 = -_t0*a - _t2*_t4*_t8*_t9/2
+        _t12 = _t2*_t5*_t9*a/2 - _t3/2
+        _t14 = _t13*_t9
+        _t15 = _t9*g
+        _t16 = _t15*_t4
+        _t17 = _t14*v2
         out[0, i] = a*(_t0 + 1)
-        out[1, i] = 2*_t2*a
-        out[2, i] = _t6*a
-        out[3, i] = _t7*sqrt(3*_t4 + 5)/(2*sqrt(_t5)**3)
-        out[4, i] = _t7*m*sqrt((_t0*_t8 + _t2*_t9*(_t0 + 2)/2)**2 + (-_t3**3*_t9 + _t8*sin(theta))**2 + v2**2/_t5**2)/_t6
+        out[1, i] = 2*_t3
+        out[2, i] = sqrt(_t6)*a
+        out[3, i] = _t14*sqrt(_t10**2 + _t11**2 + _t12**2)
+        out[4, i] = m*sqrt((-_t0*_t16 + _t10*_t13*_t9*v2)**2 + (_t11*_t17 + _t16*_t7)**2 + (_t12*_t17 - _t15*_t5 + g)**2)
 
 
 @compiled(PATH_IN_SPACE)
@@ -72,22 +80,25 @@ def path_in_space(n, places, speeds, v, p, out):
     """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (4, n))
     a, g, m = p[0], p[1], p[2]
+    _t11 = 1/a**2
     for i in range(n):
         theta, v2 = places[i], speeds[i]
-        _t0 = a*sin(theta)
-        _t1 = theta/2
-        _t2 = cos(_t1)
-        _t3 = 1/(_t2**2 + 1)
-        _t4 = _t3*v2
-        _t5 = cos(theta)
-        _t6 = _t5*a
-        _t7 = _t0*g - _t2**3*_t4
-        _t8 = _t3*m/a**2
-        _t9 = _t4*(_t5 + 2)*sin(_t1)/2 + _t6*g
-        out[0, i] = _t0
-        out[1, i] = _t8*(_t2*_t7*a - _t4*_t6)
-        out[2, i] = _t8*(-_t0*_t4 - _t2*_t9*a)
-        out[3, i] = _t8*(_t0*_t7 + _t6*_t9)
+        _t0 = sin(theta)
+        _t1 = _t0*a
+        _t2 = theta/2
+        _t3 = cos(_t2)
+        _t4 = _t3**2
+        _t5 = 1/(_t4 + 1)
+        _t6 = _t5*g
+        _t7 = _t3*_t6
+        _t8 = cos(theta)
+        _t9 = sin(_t2)
+        _t10 = _t9/2
+        _t12 = _t11*_t5*v2
+        out[0, i] = _t1
+        out[1, i] = m*(_t0*_t7 + _t12*(-_t1*_t10*_t3*_t5 - _t8*a))
+        out[2, i] = m*(_t11*_t5*v2*(-_t1 + _t3*_t5*_t8*_t9*a/2) - _t7*_t8)
+        out[3, i] = m*(_t12*(-_t10*a + _t4*_t5*_t9*a/2) - _t4*_t6 + g)
 
 
 @compiled(EFFECTIVE_POTENTIAL)
@@ -302,7 +313,7 @@ def load_map(n, w0, level, places, p, out):
     """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms, y, N along x, y and z."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (11, n))
     a, g, m = p[0], p[1], p[2]
-    _t8 = 1/a
+    _t14 = 1/a**2
     _c0 = fabs(a)
     _c1 = fabs(g)
     for i in range(n):
@@ -310,31 +321,36 @@ def load_map(n, w0, level, places, p, out):
         _t0 = cos(theta)
         _t1 = theta/2
         _t2 = sin(_t1)
-        _t3 = 2*_t2*a
-        _t4 = cos(_t1)
-        _t5 = _t4**2
-        _t6 = _t5 + 1
-        _t7 = sqrt(_t6)
-        _t9 = speed_squared_from_potential(w0, _t3*g, level)
-        _t10 = a*sin(theta)
-        _t11 = 1/_t6
-        _t12 = _t11*_t9
-        _t13 = _t10*g - _t12*_t4**3
-        _t14 = _t0*a
-        _t15 = _t12*_t2*(_t0 + 2)/2 + _t14*g
-        _t16 = _t4*a
-        _t17 = _t11*m/a**2
+        _t3 = _t2*a
+        _t4 = 2*_t3
+        _t5 = cos(_t1)
+        _t6 = _t5**2
+        _t7 = _t6 + 1
+        _t8 = sin(theta)
+        _t9 = _t8*a
+        _t10 = 1/_t7
+        _t11 = _t0*_t10*_t2*_t5*a/2 - _t9
+        _t12 = -_t0*a - _t10*_t2*_t5*_t9/2
+        _t13 = _t10*_t2*_t6*a/2 - _t3/2
+        _t15 = _t10*_t14
+        _t16 = speed_squared_from_potential(w0, _t4*g, level)
+        _t17 = _t10*g
+        _t18 = _t17*_t5
+        _t19 = _t15*_t16
+        _t20 = _t12*_t19 + _t18*_t8
+        _t21 = -_t0*_t18 + _t10*_t11*_t14*_t16
+        _t22 = _t13*_t19 - _t17*_t6 + g
         out[0, i] = a*(_t0 + 1)
-        out[1, i] = _t3
-        out[2, i] = _t7*a
-        out[3, i] = _t8*sqrt(3*_t5 + 5)/(2*sqrt(_t6)**3)
-        out[4, i] = _t9
-        out[5, i] = _t8*m*sqrt(_t13**2 + _t15**2 + _t9**2/_t6**2)/_t7
+        out[1, i] = _t4
+        out[2, i] = sqrt(_t7)*a
+        out[3, i] = _t15*sqrt(_t11**2 + _t12**2 + _t13**2)
+        out[4, i] = _t16
+        out[5, i] = m*sqrt(_t20**2 + _t21**2 + _t22**2)
         out[6, i] = 2*_c0*_c1*fabs(_t2)
-        out[7, i] = _t10
-        out[8, i] = _t17*(-_t12*_t14 + _t13*_t16)
-        out[9, i] = _t17*(-_t10*_t12 - _t15*_t16)
-        out[10, i] = _t17*(_t10*_t13 + _t14*_t15)
+        out[7, i] = _t9
+        out[8, i] = _t20*m
+        out[9, i] = _t21*m
+        out[10, i] = _t22*m
 
 
 @compiled(POTENTIAL_DIVDIFF1_BATCH)

@@ -119,6 +119,8 @@ class Model:
         on which side of the track a body is.
     rider
         The loads on a rider of a banked space curve; None for other curves.
+    common_factor
+        A factor of dx/dλ, dy/dλ and dz/dλ, whose zeros are the cusps.
     """
 
     curve: Curve
@@ -168,6 +170,7 @@ class Model:
     level_set: LevelSet | None = None
     sided: bool = True
     rider: Rider | None = None
+    common_factor: sp.Expr = sp.S.One
 
     if not TYPE_CHECKING:
         __getattr__ = renamed(

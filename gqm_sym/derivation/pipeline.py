@@ -200,6 +200,7 @@ def derive(
         level_set=level,
         sided=not law.loads or upright is not None,
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
+        common_factor=shape.size,
     )
     if law.loads:
         model = replace(model, normal_force=model.normal_force_at(speed.in_other_forms))

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.design.limit_programs import POINT, rows_at, track_program
 from gqm_sym.design.limits import LIMITS, PLACES, Limited, inputs_of, places_between
@@ -20,10 +21,12 @@ from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import values as results
 from gqm_sym.runtime.gradients.programs import Program, range_program, with_derivatives
-from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.interface import ExactChartLaw, ExactPotential
 from gqm_sym.runtime.launch.formulas import true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
+from gqm_sym.runtime.legs.dissipative import dissipate
+from gqm_sym.runtime.legs.variations.answers import forces_at_places
 from gqm_sym.runtime.model import CompiledModel
 
 
@@ -58,7 +61,7 @@ def along_shaped_chart(
     """Return the quantities along a planar curve without formulas, with their derivatives by some of its parameters;
     None if it has none.
 
-    With losses the contact force has no derivatives here.
+    With losses the contact force has derivatives if a motion that passes the places is found and has them.
 
     Parameters
     ----------
@@ -90,6 +93,24 @@ def along_shaped_chart(
         source = source_along(problem)._replace(shaping=())
         launch = problem.launch.v0.value, at[:2, -1], changes[:2, -1]
         found.slopes["normal_force"] = _force_slopes(source, inputs_of(p), launch, (at, changes), columns)
+    elif isinstance(model.exact, ExactChartLaw):
+        force = _lossy_slopes(problem, places, np.isfinite(found.values["normal_force"]))
+        if force is not None:
+            by_launch = force[1 + len(p)][:, None] * moved[-1]
+            found.slopes["normal_force"] = force[1:].T[:, columns] + by_launch + force[0][:, None] * stretched
+    return found
+
+
+def _lossy_slopes(problem: Problem, places: Array, passed: NDArray[np.bool_]) -> Array | None:
+    """Return the derivatives of the contact force with losses with respect to the place and to all variables at given
+    arc lengths, with a column for each place that is passed; None if there are none.
+    """
+    found = np.zeros((len(problem.p) + 3, places.size))
+    try:
+        motion = dissipate(problem.formulas, problem.p, problem.launch)
+        found[:, passed] = forces_at_places(motion, places[passed])
+    except SolutionError:
+        return None
     return found
 
 

@@ -101,10 +101,9 @@ def minimise(
     Notes
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
-    curve with parameters they are those of ``motion.gradient`` and of all limits; on a curve without formulas not those
-    of the contact force with losses. For a track through points they are those of all limits by all its points
-    together, if the body loses no energy, and those of the time to its end, if the body is also launched from the first
-    point, which does not move. The result is a local minimum.
+    curve with parameters they are those of ``motion.gradient`` and of all limits. For a track through points they are
+    those of all limits by all its points together, if the body loses no energy, and those of the time to its end, if
+    the body is also launched from the first point, which does not move. The result is a local minimum.
 
     Examples
     --------

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from sympy import Expr, Function, S, Symbol, cos, expand, sin
 from sympy.core.function import AppliedUndef
 
+from gqm_sym.derivation.algebra.angles import of_sum
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.algebra.rewrite import in_single_waves
 from gqm_sym.emission.context import Lowering
@@ -98,27 +99,12 @@ def _with_constant_factors(
     return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
-def _of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Expr:
-    """Rewrite a function of a rate times the mean of some points by the numbers whose sum its argument is.
-
-    Other functions are returned unchanged. Multiplied by the rate of a wave, the rounding of a place far from zero is
-    much more than that of the sine, and all nodes of an orbit have it in common.
-    """
-    argument = call.args[0]
-    rates = {argument.diff(point) for point in points}
-    if len(rates) > 1 or any(rate.has(point) for rate in rates for point in points):
-        return call
-    rate = rates.pop()
-    phase = expand(argument - rate * sum(points))
-    return Function(f"{call.func.__name__}_of_sum")(phase, len(points) * rate, *sum_of)
-
-
 def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
     """Write first differences of sines and cosines by a place and the gap to another one, whose sum is not rounded."""
     names = {"divdiff1_sin", "divdiff1_cos"}
     return form.replace(
         lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in names,
-        lambda t: _of_sum(t, (start,), (start, gap)),
+        lambda t: of_sum(t, (start,), (start, gap)),
     )
 
 
@@ -156,12 +142,12 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     outputs = [
         form.replace(
             lambda t: isinstance(t, (sin, cos)) and t.has(place),
-            lambda t: _of_sum(t, (place,), (middle, rest, (da - db) / 2)),
+            lambda t: of_sum(t, (place,), (middle, rest, (da - db) / 2)),
         )
         for form in outputs
     ]
     held = [
-        (symbol, _of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
+        (symbol, of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
         for symbol, value in held
     ]
     held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]

@@ -1,11 +1,14 @@
 """The common context of the lowered functions of one model: names, parameters, and functions made from forms."""
 
 from collections.abc import Iterable
+from functools import cached_property
 
 import sympy
 from sympy import Expr, Symbol, cos, ordered, sin, tan
 
 from gqm_sym.derivation import Model
+from gqm_sym.derivation.algebra.angles import with_exact_angles
+from gqm_sym.emission.contact_force import Contact, Vector, contact_at, turned_parts
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.emission.subscripts import at
@@ -73,6 +76,25 @@ class Lowering:
         of_curve = {chart_x(self.place): x + radius * model.dzds, chart_z(self.place): z - radius * model.dxds}
         found = form.xreplace(of_curve)
         return sympy.expand(found) if radius and self.place in found.free_symbols else found
+
+    @cached_property
+    def _contact(self) -> tuple[Symbol, Contact]:
+        v2 = self.names.symbol("v2")
+        return v2, contact_at(self.model, v2)
+
+    def contact(self, v2: Expr, direction: Expr = sympy.S.One) -> Contact:
+        """Return curvature and contact force for given values of V² and of the sign of ds/dt."""
+        symbol, contact = self._contact
+        return contact.replaced({symbol: v2, DIRECTION: direction})
+
+    @cached_property
+    def turned_parts(self) -> tuple[Vector, Vector]:
+        """The components of t × dt/dλ and of -t × F for a curve in no vertical plane."""
+        return turned_parts(self.model)
+
+    def accurate(self, forms: Iterable[Expr]) -> tuple[Expr, ...]:
+        """Return the forms of a space curve with sines of exact angles, and those of a planar curve as they are."""
+        return with_exact_angles(forms, self.place) if self.model.curve.in_space else tuple(forms)
 
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
         """Yield the function that evaluates them, if there are any."""

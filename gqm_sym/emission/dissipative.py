@@ -159,9 +159,11 @@ def _in_pieces(
     these.
     """
     law = replace(law, outputs=[form.xreplace(lowering.trigonometric) for form in law.outputs])
+    turns, loads = lowering.turned_parts
+    pieces = {**dict(loss.pieces), **dict(zip(TURNS, turns, strict=False)), **dict(zip(LOADS, loads, strict=False))}
     values = {
         piece: form.xreplace(lowering.trigonometric)
-        for piece, form in loss.pieces
+        for piece, form in pieces.items()
         if any(piece in o.free_symbols for o in law.outputs)
     }
     named = {piece: lowering.names.symbol(_NAMES[piece]) for piece, form in values.items() if not form.is_number}

@@ -5,9 +5,11 @@ terms.
 from collections.abc import Callable
 from math import prod
 
-from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
+from sympy import Abs, Expr, Function, Pow, Symbol, cos, cosh, exp, ordered, sin, sinh
+from sympy.core.function import AppliedUndef
 
-from gqm_sym.emission.context import FORWARDS, Lowering
+from gqm_sym.derivation.algebra.angles import is_power_of_two
+from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.subscripts import at
 
@@ -16,15 +18,16 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     """Return the function of a load map; none if the size of the terms of the effective potential is not known."""
     model, names = lowering.model, lowering.names
     potential = _without_constant(model.effective_potential, lowering.place)
-    size = rounded_size(potential, lowering.place)
+    (accurate,) = lowering.accurate([potential])
+    size = rounded_size(accurate, lowering.place)
     if size is None:
         return ()
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
-    force = model.normal_force_at(v2).xreplace(FORWARDS)
-    in_space = () if not model.curve.in_space or model.coriolis else (model.y, *model.normal_force_vector_at(v2))
-    rows = (model.x, model.z, model.ds, model.kappa, v2, force, size, *in_space)
-    grown, outputs = with_named_exponentials(rows, names.symbol)
+    contact = lowering.contact(v2)
+    in_space = () if not model.curve.in_space or model.coriolis else (model.y, *contact.vector)
+    rows = (model.x, model.z, model.ds, contact.kappa, v2, contact.size, size, *in_space)
+    grown, outputs = with_named_exponentials(lowering.accurate(rows), names.symbol)
     return (
         lowering.function(
             "load_map",
@@ -90,12 +93,8 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
         return form  # SymPy would write the real part of an exponent that it does not know to be real
     if isinstance(form, sinh):
         return Abs(form)
+    if isinstance(form, AppliedUndef):  # a sine or cosine of an exact angle
+        return Abs(form)
     if isinstance(form, sin | cos):
-        return Abs(form) if _is_exact(form.args[0], place) else Abs(form) + sizes[0]
+        return Abs(form) if is_power_of_two(form.args[0] / place) else Abs(form) + sizes[0]
     return None
-
-
-def _is_exact(form: Expr, place: Symbol) -> bool:
-    """Return whether a form is the place times a power of two, which is not rounded."""
-    factor = form / place
-    return isinstance(factor, Rational) and all(part & (part - 1) == 0 for part in (abs(factor.p), factor.q))

@@ -114,12 +114,13 @@ class _ModelLowering(Lowering):
         model, v2 = self.model, self.names.symbol("v2")
         lam, places, speeds = self.place, self.names("places"), self.names("speeds")
         form = "|N|" if model.loads else "N = m*(kappa*V**2 + n0)"
+        contact = self.contact(v2)
         return self.function(
             "path_and_contact_force",
             (places, speeds),
             f"x, z, ds/d{lam}, curvature kappa, contact force {form}, given V**2 (paper, eqs. 8, 15).",
             inside=[(lam, at(places)), (v2, at(speeds))],
-            outputs=(model.x, model.z, model.ds, model.kappa, model.normal_force_at(v2).xreplace(FORWARDS)),
+            outputs=self.accurate((model.x, model.z, model.ds, contact.kappa, contact.size)),
         )
 
     def path_in_space(self) -> tuple[FunctionIR, ...]:
@@ -130,13 +131,12 @@ class _ModelLowering(Lowering):
         places, speeds, v = self.names("places"), self.names("speeds"), self.names.symbol("v")
         if not model.curve.in_space:
             return ()
-        vector = (part.xreplace({DIRECTION: v}) for part in model.normal_force_vector_at(v2))
         function = self.function(
             "path_in_space",
             (places, speeds, v),
             "y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt).",
             inside=[(self.place, at(places)), (v2, at(speeds))],
-            outputs=(model.y, *vector),
+            outputs=self.accurate((model.y, *self.contact(v2, v).vector)),
         )
         return (function,)
 
@@ -158,7 +158,7 @@ class _ModelLowering(Lowering):
             (places, speeds, v, nu),
             "Loads on a rider, their rates, and roll and place of the track; v = sgn(ds/dt), nu = sgn(N).",
             inside=[(self.place, at(places)), (w, at(speeds))],
-            outputs=tuple(row.xreplace(symbols) for row in rows),
+            outputs=self.accurate(row.xreplace(symbols) for row in rows),
         )
         return (function,)
 

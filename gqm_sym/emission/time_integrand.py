@@ -1,6 +1,6 @@
 """The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
-from sympy import Expr
+from sympy import Expr, Symbol
 
 from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
@@ -82,12 +82,23 @@ def _agm_arguments(lowering: Lowering, squares: tuple[Expr, Expr]) -> FunctionIR
     )
 
 
+def _without_constant_divisors(form: Expr, moving: set[Symbol]) -> Expr:
+    """Multiply a form by the square of what it is divided by and what does not depend on the place.
+
+    Only ratios of the form at places of one orbit are asked for, and a division takes as long as many products.
+    """
+    constant, rest = form.as_independent(*moving, as_Add=False)
+    above, below = constant.as_numer_denom()
+    return above * below * rest
+
+
 def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr) -> tuple[FunctionIR, ...]:
     names = lowering.names
     sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
     own = {symbol: names.symbol(symbol.name.removeprefix("_")) for symbol in (HALF, *dict(orbits.invariants))}
     here = own | at_place(own, sine2, cosine2)
-    outputs, calls = hoist([form.xreplace(here) for form in (integrand, orbits.divisor)], {sine2, cosine2})
+    forms = integrand.xreplace(here), _without_constant_divisors(orbits.divisor.xreplace(here), {sine2, cosine2})
+    outputs, calls = hoist(forms, {sine2, cosine2})
     ends = {own[symbol]: end.xreplace(own) for symbol, end in orbits.invariants}
     used = set().union(*(form.free_symbols for form in outputs))
     held = [*ends.items(), *((symbol, call.xreplace(ends)) for symbol, call in calls)]

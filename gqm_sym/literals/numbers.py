@@ -159,6 +159,8 @@ def read_number(value: Source, *, where: str, unit: str | None = None) -> Number
     try:
         if isinstance(value, str):
             return _read_text(value, where, unit)
+        if type(value) is int:
+            return _read_int(value, where)
         if is_quantity(value):
             return _of_quantity(value, where, unit)
         exact = rationals.read_exact(value, where=where)
@@ -330,6 +332,14 @@ def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
         exact = enclose(tree, _TIE_BITS + _GUARD_BITS, where=where)
         low = _split(_nearest(exact), where)
     return _number(low, tree, text)
+
+
+@lru_cache(maxsize=1024)
+def _read_int(value: int, where: str) -> Number:
+    # The cache is for launches, which often have the same small integers.
+    exact = rationals.read_exact(value, where=where)
+    assert exact is not None
+    return _from_fraction(exact, str(value), where)
 
 
 def _from_fraction(exact: Fraction, text: str, where: str) -> Number:

@@ -22,6 +22,10 @@ PERIODS = ("half_period", "period")
 # any other extreme is improved by Newton's method, whose steps may be at most this share of the width.
 AT_TURN, MAX_STEP, NEWTON_STEPS = 1e-12, 1e-5, 3
 
+# An extreme that is nearer to a break of the curve than the first share of the orbit's width counts as being there. At
+# a distance of the second share, a place is on one side of the break.
+AT_BREAK, SIDE_SHARE = 1e-12, 1e-13
+
 
 def selected(parameters: Iterable[str], wrt: Any) -> Mapping[str, int]:
     """Return the names of the variables of differentiation, each with its row among all variables.
@@ -109,7 +113,8 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
     """Return the derivatives of an extreme along the motion, with respect to all variables.
 
     Inside the orbit the extreme changes as the quantity does at a fixed place, because the quantity is stationary there
-    (envelope theorem). At a turning point, or where a horizon cuts the motion, the place changes too.
+    (envelope theorem). At a turning point, or where a horizon cuts the motion, the place changes too. At a break of the
+    curve the extreme stays there, as the limit from one of its sides.
     """
     extreme, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     found = np.zeros(derivatives.source.variables)
@@ -124,6 +129,13 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
             if abs(extreme.lam - end) <= AT_TURN * width:
                 moved = tangent
     if moved is found:
+        sides = _beside_break(motion, extreme.lam, width)
+        if sides is not None:
+            rows = derivatives.extreme_rows(sides, of_speed=of_speed)
+            wanted = 0.5 * extreme.value**2 if of_speed else extreme.value
+            near, far = rows.reshape(-1, 2, 2)[3:, np.abs(rows[0, ::2] - wanted).argmin()].T
+            on_side: Array = (2.0 * near - far) / (extreme.value if of_speed else 1.0)
+            return on_side
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
             everything = (*motion.problem.formulas.parameters, "lam0", "v0")
@@ -131,6 +143,23 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
     (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total
+
+
+def _beside_break(motion: Any, place: float, width: float) -> Array | None:
+    """Return two places before a break of the curve and two after it, if a place is there; else None.
+
+    Of two places on one side, the second one is twice as far from the break.
+    """
+    breaks, period = motion.problem.functions.breaks, motion.problem.period
+    distances = place - breaks
+    if period:
+        distances -= period * np.round(distances / period)
+    nearest = np.abs(distances).argmin() if breaks.size else 0
+    if not breaks.size or abs(distances[nearest]) > AT_BREAK * width:
+        return None
+    step = SIDE_SHARE * width
+    sides: Array = place - distances[nearest] + step * np.array([-1.0, -2.0, 1.0, 2.0])
+    return sides
 
 
 def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width: float) -> tuple[Array, bool]:

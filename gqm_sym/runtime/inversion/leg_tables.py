@@ -49,6 +49,10 @@ PANEL_COLUMNS = SERIES + 2 * WIDE
 # A phase angle whose relative distance from the last one is below this is the last one.
 ROUNDED = 4e-16
 
+# A time is at most this many half lengths from the middle of its interval. It is further away where the rounding of the
+# time is longer than the interval, as beside a cusp, and polynomials have no meaning there.
+FARTHEST = 1.0 + 2.0**-10
+
 # The number of states that are found together.
 BLOCK = 64
 
@@ -68,7 +72,7 @@ def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
 def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
     """Return the phase angle at a time on the interval whose row begins at an index."""
     x = (t - item_at(intervals, at + MIDDLE)) - item_at(intervals, at + MIDDLE_LOW)
-    x *= item_at(intervals, at + SCALE)
+    x = min(max(x * item_at(intervals, at + SCALE), -FARTHEST), FARTHEST)
     phi, stop = item_at(intervals, at + POWERS + LAST), item_at(intervals, at + STOP)
     for m in range(LAST - 1, -1, -1):
         phi = fma(phi, x, item_at(intervals, at + POWERS + m))

@@ -22,7 +22,7 @@ from gqm_sym.runtime.legs.leg_record import (
     BEGIN_LOW,
     LAPS_BEFORE,
 )
-from gqm_sym.runtime.legs.leg_segments import TURN
+from gqm_sym.runtime.legs.leg_segments import TURN, Run
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import (
     MarchPoints,
@@ -33,6 +33,7 @@ from gqm_sym.runtime.legs.variations.answers import (
     points_by_record,
     points_of,
     states_at,
+    turning_points,
 )
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
@@ -290,8 +291,11 @@ class DissipativeMotion(FollowedMotion):
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         rows = selected(self.problem.formulas.parameters, wrt)
         self._look_ahead()
+        if quantity == "turning_points":
+            columns = list(zip(*turning_points(self), strict=True))
+            return {name: columns[row] if columns else () for name, row in rows.items()}
         found = gradient(self, quantity).tolist()
-        return {name: tuple(found[row]) if quantity == "turning_points" else found[row] for name, row in rows.items()}
+        return {name: found[row] for name, row in rows.items()}
 
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
@@ -336,25 +340,31 @@ class DissipativeMotion(FollowedMotion):
     @property
     def _changes(self) -> Changes:
         """The derivatives of the legs so far."""
-        self._follow_again()
-        return self._changes_of(len(self._all_runs))
+        return self._changes_along(self._varied_runs)
 
-    def _changes_of(self, count: int) -> Changes:
-        """Return the derivatives of the first runs, which have panels."""
-        if self._known_changes is None or self._known_changes.followed < count:
-            self._known_changes = Changes(self.problem, self._all_runs[:count])
-        return self._known_changes
+    def _changes_along(self, runs: Sequence[Run]) -> Changes:
+        """Return the derivatives of the first runs."""
+        known = self._known_changes
+        if known is None or known.followed < len(runs):
+            known = self._known_changes = Changes(self.problem, runs)
+        return known
 
     @property
-    def _turns(self) -> list[int]:
-        """The numbers of the runs at the ends of which are the turning points of the motion, without the launch; all
-        runs have panels.
+    def _varied_runs(self) -> list[Run]:
+        """The runs so far, with panels along charts, where they are followed in as many parts as necessary."""
+        if self.problem.formulas.chart is not None:
+            self._follow_again()
+        return self._all_runs
+
+    def _turns_and_changes(self) -> tuple[list[int], Changes | None]:
+        """Return the numbers of the runs at the ends of which are the turning points of the motion, without the launch,
+        and the derivatives of the runs up to there; None if there are no such turns.
         """
-        self._follow_again()
-        runs = self._all_runs
+        runs = self._varied_runs
         turns = [k for k, run in enumerate(runs[: self._beginning or None]) if run.end == TURN]
-        is_late = turns and turns[-1] + 1 == len(runs) and self._driver.elapsed > self._horizon
-        return turns[:-1] if is_late else turns
+        if turns and turns[-1] + 1 == len(runs) and self._driver.elapsed > self._horizon:
+            turns.pop()
+        return turns, self._changes_along(runs[: turns[-1] + 1]) if turns else None
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""

@@ -1,5 +1,6 @@
 """A body with losses, driven leg after leg along the curve, or by its distance from an equilibrium close by."""
 
+from collections.abc import Callable
 from math import inf
 
 import numpy as np
@@ -210,7 +211,15 @@ class Driver:
             return
         if count > 1:
             self.runs.append(TurnedLegs(line, count - 1, -1, before))
-        self._end_run(what, last, None if before is None else before[-1])
+        if what == END_PAUSE and self._frame is None and not number(STATUS) and not self._creeps(number):
+            # This avoids the constructor of a named tuple, which is slow.
+            self.runs.append(tuple.__new__(Run, (last, what, "", None, None, None)))
+        else:
+            self._end_run(what, last, None if before is None else before[-1])
+
+    def _creeps(self, number: Callable[[int], float]) -> bool:
+        """Return whether a body without friction, of which some ``number`` is given, creeps towards an equilibrium."""
+        return not self.dissipation.friction and number(STEP) <= CREEPING_SHARE * number(FIRST_STEP)
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
@@ -307,8 +316,7 @@ class Driver:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame and not self.dissipation.friction:  # with friction it slides (`_slides_nearby`)
             turns_nearby = what == END_TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
-            creeps = what == END_PAUSE and self.number(STEP) <= CREEPING_SHARE * self.number(FIRST_STEP)
-            if turns_nearby or creeps:
+            if turns_nearby or (what == END_PAUSE and self._creeps(self.body.item)):
                 self._enter_frame()
 
     def _slides_nearby(self, what: int, record: Array) -> bool:

@@ -133,7 +133,9 @@ class FollowedMotion(Motion):
     @property
     def _all_runs(self) -> list[Run]:
         """The runs so far."""
-        return [*self._layout.runs, *self._driver.runs.all()]
+        layout: Layout | None = self.__dict__.get("_layout")
+        runs = self._driver.runs.all()
+        return runs if layout is None else [*layout.runs, *runs]
 
     def _runs_as_legs(self) -> list[Leg]:
         """Return the runs of `legs`, which are not cut at changes of the contact sign and at corners."""
@@ -185,8 +187,11 @@ class FollowedMotion(Motion):
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
-        if isfinite(self._horizon):
-            self._follow(self._horizon)
+        if self._horizon < inf:
+            driver = self._driver
+            while not driver.ending and driver.elapsed < self._horizon:
+                driver.go_on()
+            return
         while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
             self._follow_next()
 

@@ -274,12 +274,13 @@ class TurnedLegs(NamedTuple):
 
     def runs(self) -> list[Run]:
         """Return a run for each leg."""
+        line, size, _, lines_before = self
         runs, at = [], 0
-        for k in range(self.size):
-            end = at + int(self.line[at + USED])
-            before = None if self.before is None else self.before[k]
+        for k in range(size):
+            end = at + int(line.item(at + USED)) if size > 1 else line.size
+            before = None if lines_before is None else lines_before[k]
             # This avoids the constructor of a named tuple, which is slow.
-            runs.append(tuple.__new__(Run, (self.line[at:end], END_TURN, TURN, None, before, None)))
+            runs.append(tuple.__new__(Run, (line[at:end], END_TURN, TURN, None, before, None)))
             at = end
         return runs
 
@@ -318,12 +319,14 @@ class Runs:
 
     def all(self) -> list[Run]:
         """Return all runs."""
-        if any(isinstance(part, TurnedLegs) for part in self._parts):
-            runs: list[Run] = []
-            for part in self._parts:
-                runs += part.runs() if isinstance(part, TurnedLegs) else [part]
-            self.replace(runs)
-        return [part for part in self._parts if isinstance(part, Run)]
+        runs: list[Run] = []
+        for part in self._parts:
+            if isinstance(part, TurnedLegs):
+                runs += part.runs()
+            else:
+                runs.append(part)
+        self._parts = [*runs]
+        return runs
 
     @property
     def parts(self) -> list[Run | TurnedLegs]:

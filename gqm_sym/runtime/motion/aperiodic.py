@@ -187,7 +187,13 @@ class AperiodicMotion(Motion):
     @computed_once
     def _passage(self) -> PassageChanges:
         """The changes of the motion."""
-        if not isinstance(self.problem.formulas.exact, ExactFormulas):
+        formulas = self.problem.formulas
+        if formulas.chart is not None and not formulas.rolling_radius and self.problem.true_pieces is not None:
+            raise SolutionError(
+                "gradients: there are none yet of motions without losses that do not repeat, along curves without "
+                "formulas; there are if QuadraticDrag(b=0) is added to the forces"
+            )
+        if not isinstance(formulas.exact, ExactFormulas):
             raise without_formulas()
         turns, last = self.turning_points, self._segments[-1]
         limit = last.segment.b if last.end == "asymptote" else self.legs[-1].lam_end if isfinite(self.t_end) else inf

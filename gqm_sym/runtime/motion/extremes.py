@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from math import isfinite
+from math import copysign, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,10 @@ BEFORE_CORNER = 1e-13
 # The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
 # of the phase angle.
 BESIDE_JOINT = 64.0 * ULP
+
+# Where the contact force at a cusp is this many times its largest value before, it grows without bound there. The place
+# of a cusp is rounded, and the force there is a large number, unless that place is 0.
+UNBOUNDED_GROWTH = 1e6
 
 # Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
@@ -200,10 +204,17 @@ def _on_segment(
         return np.where(np.isnan(values), -np.inf, values)
 
     values = signed(phi)
+    at_cusp = -1 if stop > start else 0
+    ends_at_cusp = timed.end == "cusp" and timed.t_stop[0] <= end and quantity is not SPEED
+    if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * _size(np.delete(values, at_cusp)):
+        values[at_cusp] = copysign(np.inf, values[at_cusp])
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
     found, size = [], _size(values)
     for k in sorted(peaks.tolist(), key=lambda k: -float(values[k]))[:MAX_PEAKS]:
+        if values[k] == np.inf:
+            found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
+            continue
         angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
         value = float(signed(np.array([angle]))[0])
         # Since a peak at an end of the segment may be flat, it may be found next to the end within rounding. At a joint

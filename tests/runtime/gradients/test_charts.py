@@ -11,6 +11,7 @@ from mpmath import mp, mpf
 from paths import ROOT
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
 from gqm_sym.runtime.motion import timing
 
@@ -312,3 +313,21 @@ def test_a_launch_at_rest_where_two_pieces_meet(generated_folder: Path) -> None:
     found = motion.gradient("half_period", tuple(wanted))
     for name, value in wanted.items():
         assert abs(found[name]) == pytest.approx(abs(float(value)), rel=2e-15), name
+
+
+def test_motions_that_do_not_repeat(generated_folder: Path) -> None:
+    """The error for a body that leaves a rail names the remedy, with which the derivatives are those of a fall along
+    a straight line, t = sqrt(2 (length - lam0) / (g sin)).
+    """
+    curve = gqm.Curve.piecewise([gqm.line(length=3), gqm.line(length="q")], heading="-pi/6", parameters={"q": 2})
+    free = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_slope", folder=generated_folder)
+    motion = free.solve("0.5")
+    t = np.sqrt(2 * 4.5 / (9.81 * 0.5))
+    assert motion.t_end == pytest.approx(t, rel=4e-16)
+    with pytest.raises(SolutionError, match=r"do not repeat.*QuadraticDrag\(b=0\)"):
+        motion.gradient("t_end")
+    model = gqm.derive(curve, gqm.Gravity() + gqm.QuadraticDrag(b=0))
+    damped = gqm.build(model, name="gradient_slope_with_drag", folder=generated_folder).solve("0.5")
+    wanted = {"lam0": -t / 9.0, "q": t / 9.0, "g": -t / (2 * 9.81)}
+    assert damped.t_end == pytest.approx(t, rel=4e-16)
+    assert damped.gradient("t_end", tuple(wanted)) == pytest.approx(wanted, rel=1e-13)

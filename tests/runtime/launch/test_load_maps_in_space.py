@@ -1,11 +1,15 @@
 """Load maps of space curves have the contact force as a vector, with all digits also next to a launch from rest."""
 
+import json
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+import sympy as sp
 from mpmath import mp, mpf
+from naive import ulps
+from paths import DATA
 
 import generated.viviani
 import gqm_sym as gqm
@@ -15,6 +19,9 @@ from gqm_sym.runtime.launch.speed import BLOCK
 # measured 5.1e-16.
 SCALE, OF_LENGTH = 4e-16, 8e-16
 LAUNCH = 0.4
+
+ROWS = {row["name"]: row for row in json.loads((DATA / "space_curves.json").read_text(encoding="utf-8"))}
+U = sp.Symbol("u", real=True)
 
 
 def exact(u: float, v0: float) -> list[mpf]:
@@ -55,6 +62,76 @@ def test_rows_do_not_depend_on_their_neighbours() -> None:
     assert np.array_equal(together, alone.T)
     filled = generated.viviani.pass1(lam, LAUNCH, 0.0, out=[np.empty(lam.size) for _ in together])
     assert np.array_equal(together, filled)
+
+
+def by_definition(
+    coordinates: list[sp.Expr], potential: sp.Expr, lam: list[float], w0: mpf, start: mpf
+) -> list[list[mpf]]:
+    """Return the contact force at places, from the derivatives of the coordinates and of the potential (m = 1)."""
+    axes = sp.symbols("x y z")
+    along = dict(zip(axes, coordinates, strict=True))
+    forms = [*(sp.diff(form, U) for form in coordinates), *(sp.diff(form, U, 2) for form in coordinates)]
+    forms += [*(sp.diff(potential, axis).xreplace(along) for axis in axes), potential.xreplace(along)]
+    call = sp.lambdify(U, forms, "mpmath")
+    with mp.workdps(40):
+        rows, level = [], call(start)[9]
+        for place in lam:
+            values = call(mpf(place))
+            rate, bend, pull, w = values[:3], values[3:6], values[6:9], w0 - 2 * (values[9] - level)
+            square = mp.fdot(rate, rate)
+            across = [[a - r * mp.fdot(rate, v) / square for a, r in zip(v, rate, strict=True)] for v in (bend, pull)]
+            rows.append([w * k / square + f for k, f in zip(*across, strict=True)])
+    return rows
+
+
+@pytest.mark.parametrize("name", ["trefoil", "torus_knot", "saddle", "bowl_spiral", "catenary_weave", "tilted_ring"])
+def test_the_vector_of_sines_of_multiples(name: str, tmp_path: Path) -> None:
+    """The contact force has all digits where sines of many multiples of the parameter would add up to it."""
+    row = ROWS[name]
+    module = gqm.build(
+        gqm.derive(gqm.Curve.space(**dict(zip("xyz", row["curve"], strict=True)), parameter="u"), gqm.Gravity()),
+        name=name,
+        folder=tmp_path,
+    )
+    lam0, v0 = row["launch"]["lam0"], row["launch"]["v0"]
+    ends = module.solve(lam0, v0).turning_points or (0.0, 6.28)
+    lam = np.random.default_rng(3).uniform(min(ends), max(ends), 100)
+    path = module.pass1(lam, lam0, v0)
+    coordinates = [sp.sympify(form, locals={"u": U}) for form in row["curve"]]
+    start, w0 = sp.Rational(lam0), sp.Rational(v0) ** 2
+    with mp.workdps(40):
+        weight = sp.Rational(981, 100) * sp.Symbol("z")
+        exact = by_definition(coordinates, weight, lam.tolist(), mpf(w0.p) / w0.q, mpf(start.p) / start.q)
+        found = zip(path.normal_x.tolist(), path.normal_y.tolist(), path.normal_z.tolist(), strict=True)
+        errors = [[float(abs(a - b)) for a, b in zip(*pair, strict=True)] for pair in zip(found, exact, strict=True)]
+        size = max(float(mp.norm(force)) for force in exact)
+    assert np.max(errors) < SCALE * size
+
+
+def test_angles_are_not_rounded(tmp_path: Path) -> None:
+    """Coordinates keep their last place where the angle is a large multiple of the parameter, with a phase or none."""
+    curve = gqm.Curve.space(x="cos(k*u)", y="sin(1001*u + 1)", z="u", parameter="u", parameters={"k": "733"})
+    path = gqm.build(gqm.derive(curve, gqm.Gravity()), name="fast_turns", folder=tmp_path).pass1(
+        lam := np.random.default_rng(1).uniform(-7, 7, 200), 0.0, 1.0
+    )
+    with mp.workdps(40):
+        for u, x, y in zip(lam.tolist(), path.x.tolist(), path.y.tolist(), strict=True):
+            assert ulps(x, mp.cos(733 * mpf(u))) <= 1.0
+            assert ulps(y, mp.sin(1001 * mpf(u) + 1)) <= 1.0
+
+
+def test_a_parameter_that_slows_down(tmp_path: Path) -> None:
+    """Next to a zero of ds the contact force keeps its digits, although the derivatives of coordinates are parallel."""
+    curve = gqm.Curve.space(x="cos(u**3)", y="sin(u**3)", z="u**3/2", parameter="u", domain=("1/100", "3"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="slowing", folder=tmp_path)
+    lam = np.array([0.011, 0.02, 0.1, 0.5, 1.2])
+    path = module.pass1(lam, 1.0, 6.0)
+    coordinates = [sp.cos(U**3), sp.sin(U**3), U**3 / 2]
+    with mp.workdps(40):
+        exact = by_definition(coordinates, sp.Rational(981, 100) * sp.Symbol("z"), lam.tolist(), mpf(36), mpf(1))
+    found = np.array([path.normal_x, path.normal_y, path.normal_z]).T
+    true = np.array(exact, dtype=float)
+    assert np.all(np.abs(found - true) < 8e-16 * np.linalg.norm(true, axis=1)[:, None])
 
 
 @pytest.fixture(scope="module")

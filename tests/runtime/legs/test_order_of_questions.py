@@ -55,6 +55,8 @@ def asked(motion: Any, end: float) -> dict[str, Callable[[], Any]]:
         "condition": lambda: (motion.condition_number, motion.quadrature_error),
         "an arrival": lambda: motion.time_at(motion.lam(0.02 * end)),
         "end": lambda: motion.t_end,
+        "derivatives of turning points": lambda: motion.gradient("turning_points"),
+        "derivatives of a state": lambda: [row.tolist() for row in motion.sensitivity(0.02 * end)[1:]],
     }
 
 

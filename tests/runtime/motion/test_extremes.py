@@ -1,11 +1,12 @@
 """Extremes of speed and of the contact force, their times and places agree with closed forms and dense samples."""
 
-from math import cos, pi, sqrt
+from math import cos, pi, sin, sqrt
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
 from gqm_sym.building import transient
@@ -129,6 +130,55 @@ def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
     states = motion.state(np.linspace(0.0, motion.t_end * (1.0 - 1e-9), 20_001))
     assert motion.v_max.value == pytest.approx(np.abs(states.v).max(), rel=1e-6)
     assert motion.v_max.value >= np.abs(states.v).max()
+
+
+CUSP_FORCES = {
+    "none": gqm.Gravity(),
+    "drag": gqm.Gravity() + gqm.QuadraticDrag(b=0.02),
+    "friction": gqm.Gravity() + gqm.CoulombFriction(mu="0.4"),
+    "rotating": gqm.Gravity() + gqm.RotatingFrame(Omega="0.7") + gqm.CoulombFriction(mu="0.4"),
+}
+
+
+@pytest.mark.parametrize("force", CUSP_FORCES)
+@pytest.mark.parametrize(("lam0", "direction"), [(-1.5, 1), (1.25, -1)])
+def test_a_load_that_grows_without_bound(force: str, lam0: float, direction: int, tmp_path: Path) -> None:
+    """A body that comes to a cusp with a speed presses on the curve there with an infinite force; its speed just before
+    is that of the equation of motion, solved by DOP853 as a function of the place.
+    """
+    curve = gqm.Curve.parametric(x="u - sin(u)", z="-cos(u)", parameter="u")
+    module = gqm.build(gqm.derive(curve, CUSP_FORCES[force]), name=f"cusp_{force}", folder=tmp_path)
+    motion = module.solve(lam0, 2.0, direction, t_max=4.0)
+    assert motion.legs[-1].end == "cusp"
+    assert abs(motion.legs[-1].lam_end) < 1e-15
+    least = motion.normal_force_min
+    assert least.value == -np.inf
+    assert least.t == motion.t_end
+    assert motion.normal_force_max.t == 0.0
+    with pytest.raises(SolutionError, match="cusp"):
+        motion.gradient("normal_force_min")
+    sweep = module.sweep("normal_force_min", [lam0], 2.0, direction, t_max=4.0, gradient="g")
+    assert sweep.values == [-np.inf]
+    assert np.isnan(sweep.gradient).all()
+
+    g, drag, mu = 9.81, 0.02 * (force == "drag"), 0.4 * (force in ("friction", "rotating"))
+    omega = 0.7 * (force == "rotating")
+
+    def rate(u: float, w: np.ndarray) -> np.ndarray:
+        ds = 2.0 * abs(sin(0.5 * u))
+        along_x, along_z, x = (1.0 - cos(u)) / ds, sin(u) / ds, u - sin(u)
+        inside = -w / (2.0 * ds) + g * along_x + omega**2 * x * along_z
+        load = np.hypot(inside, 2.0 * omega * np.sqrt(w) * along_x)
+        pull = -g * along_z + omega**2 * x * along_x
+        slope: np.ndarray = 2.0 * ds * (pull - direction * (mu * load + drag * w))
+        return slope
+
+    before = motion.state(motion.t_end * (1.0 - 1e-9))
+    assert abs(before.lam) < 1e-3
+    found = solve_ivp(rate, (lam0, before.lam), [4.0], method="DOP853", rtol=1e-12, atol=1e-12)
+    assert abs(before.v) == pytest.approx(sqrt(found.y[0, -1]), rel=1e-11)
+    # The time at the end is rounded, which moves the place by up to 1e-7.
+    assert abs(motion.state(motion.t_end).v) == pytest.approx(abs(before.v), rel=1e-4)
 
 
 def test_a_load_that_jumps_at_a_joint(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from gqm_sym.runtime.legs.panels.breaks import located, within
 from gqm_sym.runtime.legs.panels.equation import EXPM1_Q, slope_at
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT
+from gqm_sym.runtime.legs.panels.widest import ds_at
 
 # The codes of the end of a run:
 #
@@ -42,10 +43,11 @@ END_NONE = -1
 # beyond a turn.
 NEAR_TURN = 1e-11
 
-# If the place of a body is smaller by this factor than the start of its run, and the next step is hardly longer than
-# the place, the body is on its way to an equilibrium at 0. Its run pauses, because places that are counted from a
-# farther origin would lose their digits.
-CLOSE_SHARE = 2.0**-10
+# If the place of a body is smaller by the first factor than the start of its run, and the next step is hardly longer
+# than the place, the body is on its way to an equilibrium at 0. (Close to a cusp at 0 it is not; ds/dlam is smaller by
+# the second factor there.) Its run pauses, because places that are counted from a farther origin would lose their
+# digits.
+CLOSE_SHARE, CUSP_SHARE = 2.0**-10, 2.0**-5
 
 # What slows a body down may be a resistance alone, so that no more than a share of the slope of V**2 is left without
 # speed. If it falls to this share where V**2 is smaller by the factor, V**2 vanishes like the square of the distance,
@@ -142,16 +144,18 @@ def turn_below_noise(forces, march, panel, change, run_length, point):  # type: 
 
 
 @Inner
-def may_pause(forces, march, route, run_length, speeds, panel, work):  # type: ignore[no-untyped-def]
+def may_pause(forces, march, route, run_length, speeds, panel, ahead, work):  # type: ignore[no-untyped-def]
     """Return whether the run may pause: it is long enough, or approaches an equilibrium at 0 that is far from its
     start.
 
-    ``speeds`` are V**2 and its largest value so far; ``panel`` is the start and the width of the next panel. If
-    resistance alone has slowed the body down on its last panel, no turn is near.
+    ``speeds`` are V**2 and its largest value so far; ``panel`` is the last panel, and ``ahead`` the start and the width
+    of the next one. If resistance alone has slowed the body down on its last panel, no turn is near.
     """
-    here, (left, step) = fabs(march.origin[0] + march.direction * run_length), panel
+    here, (left, step) = fabs(march.origin[0] + march.direction * run_length), ahead
     onwards = step * (slope_at(left, march) + march.g * step)
     is_close = not forces.linear and onwards <= here <= CLOSE_SHARE * fabs(march.origin[0])
+    if is_close:
+        is_close = ds_at(forces, march, panel, run_length) >= CUSP_SHARE * ds_at(forces, march, panel, 0.0)
     undamped = speeds[0] * (1.0 + work[EXPM1_Q + COUNT])
     return is_close or (run_length >= route.pause and 2.0 * undamped >= speeds[1])
 

@@ -159,7 +159,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             CurveAhead(ahead.upcoming, ahead.span, inf, True),
             timed if searching else LastTimed(run_length, v2, nu, change_count),
         )
-        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step), work)
+        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), panel, (left, step), work)
         what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
         if what != END_NONE:
             v2 = 0.0 if ends_here else v2

@@ -213,10 +213,10 @@ def lay_half(record, to, blocks, series, variable, force_size, time):  # type: i
     return count
 
 
-@entry(VECTOR(VECTOR), checked=False)
-def lay_panels(record):  # type: ignore[no-untyped-def]
+@Inner
+def with_panels(record):  # type: ignore[no-untyped-def]
     """Return the record with panels in place of rows of the whole leg."""
-    record, out, series = borrowed(record), np.empty(HEAD + 2 * MAX_PARTS * COLUMNS), series_buffer()
+    out, series = np.empty(HEAD + 2 * MAX_PARTS * COLUMNS), series_buffer()
     blocks = int(record[WHOLE])
     variable = LegVariable(record[WHOLE_WIDTH], record[RISING], record[FALLING], record[EXTENT])
     for k in range(HEAD):
@@ -229,3 +229,9 @@ def lay_panels(record):  # type: ignore[no-untyped-def]
     back = lay_half(out, HEAD + ahead * COLUMNS, blocks, series, variable, size, record[TIME_FROM_END])
     out[WHOLE], out[AHEAD], out[BACK] = 0.0, ahead, back
     return out[: HEAD + (ahead + back) * COLUMNS].copy()
+
+
+@entry(VECTOR(VECTOR), checked=False)
+def lay_panels(record):  # type: ignore[no-untyped-def]
+    """Return what `with_panels` does."""
+    return with_panels(borrowed(record))

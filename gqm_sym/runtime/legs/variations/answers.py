@@ -171,20 +171,17 @@ def states_at(changes: Changes, points: MarchPoints) -> StateChanges:
 
 
 def gradient(motion: Any, quantity: str) -> Array:
-    """Return the derivatives of a quantity of a motion with respect to all variables; for turning points, a column for
-    each.
+    """Return the derivatives of a quantity of a motion with respect to all variables.
 
     Parameters
     ----------
     motion : legs.dissipative.DissipativeMotion
         The motion.
     quantity : str
-        One of `launch.kinds.QUANTITIES`.
+        One of `launch.kinds.QUANTITIES` except the turning points.
     """
     if quantity in PERIODIC_QUANTITIES:
         raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
-    if quantity == "turning_points":
-        return turning_points(motion)
     changes = motion._changes
     if quantity in EXTREMES:
         return extreme(motion, changes, quantity)
@@ -199,16 +196,23 @@ def gradient(motion: Any, quantity: str) -> Array:
     return place
 
 
-def turning_points(motion: Any) -> Array:
-    """Return the derivatives of the turning points of a motion."""
-    turns, variables = motion._turns, len(motion.problem.p) + 2
-    launch = np.eye(variables)[:, -2:-1] if motion.problem.w0 == 0.0 else np.empty((variables, 0))
-    if not turns:
-        return launch
-    changes = motion._changes_of(turns[-1] + 1)
-    sigma, arc = changes.ends[turns, SIGMA].T, changes.ends[turns, ARC].T
-    columns = changes.parameter_change(sigma, arc, np.array([changes.runs[k].laps for k in turns]))
-    return np.hstack([launch, columns]) if launch.size else columns
+def turning_points(motion: Any) -> list[list[float]]:
+    """Return the derivatives of the turning points of a motion: a list for each, with respect to all variables."""
+    turns, changes = motion._turns_and_changes()
+    found: list[list[float]] = []
+    if motion.problem.w0 == 0.0:  # the launch is one
+        found.append([*[0.0] * len(motion.problem.p), 1.0, 0.0])
+    if changes is None:
+        return found
+    ends, law = changes.ends, changes.law
+    if law.by_arc_length or motion.problem.period:
+        laps = np.array([changes.runs[k].laps for k in turns])
+        columns: Array = changes.parameter_change(ends[turns, SIGMA].T, ends[turns, ARC].T, laps)
+        found += columns.T.tolist()
+        return found
+    rows = ends[:, SIGMA].tolist()
+    found += [rows[k] for k in turns]
+    return found
 
 
 def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
@@ -323,7 +327,7 @@ def forces_at_places(motion: Any, places: Array) -> Array:
     changes, times = motion._changes, np.array([motion.time_at(place) for place in places.tolist()])
     law, changed = changes.law, states_at(changes, motion._march_points(times)[0])
     by_place = law.parameters[0, law.mass] * law.loads(changed.states)[0]
-    found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.labels])
+    found: Array = np.vstack([by_place, changed.normal_force - by_place * changed.lam])
     return found
 
 

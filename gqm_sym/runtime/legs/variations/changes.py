@@ -46,7 +46,7 @@ class Changes:
     problem : Problem
         The launch.
     runs : sequence of Run
-        The runs in the order of time, up to an approach to an equilibrium.
+        The runs in the order of time, up to an approach to an equilibrium; along charts they have panels.
 
     Attributes
     ----------
@@ -64,13 +64,14 @@ class Changes:
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
         self.law, self._problem = law_of(problem), problem
         self.followed, self.runs = len(runs), [run for run in runs if run.what != END_ASYMPTOTE]
-        records = [run.record for run in self.runs]
-        if len(records) == 1:
-            line, begins = records[0], FIRST
+        if len(self.runs) == 1:
+            line, begins = self.runs[0].record, FIRST
         else:
+            records = [run.record for run in self.runs]
             line = np.concatenate(records)
             begins = np.array([0, *accumulate([record.size for record in records[:-1]])])
-        self._followed = self.law.followed(line, begins, problem.launch, self.lap, self.breaks)
+        lap = self.lap if problem.period else np.zeros(self.variables)
+        self._followed = self.law.followed(line, begins, problem.launch, lap, self.breaks)
         self.ends = self._followed.ends
 
     @property

@@ -15,7 +15,9 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_registers, fill_signed_values_of
 from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
 from gqm_sym.runtime.legs.leg_record import HEADING
+from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
+from gqm_sym.runtime.legs.runs.whole_panels import with_panels
 from gqm_sym.runtime.legs.variations.chain import FOLLOWED, follow
 from gqm_sym.runtime.legs.variations.equation import (
     MARKS,
@@ -102,6 +104,27 @@ def law_on_panels(programs, inputs, states, marks):  # type: ignore[no-untyped-d
     return found
 
 
+@Inner
+def panelled(records, begins):  # type: ignore[no-untyped-def]
+    """Return the records of runs with panels in place of rows of whole legs, and the indices at which they begin."""
+    runs, is_whole = begins.size, False
+    for k in range(runs):
+        is_whole = is_whole or records[begins[k] + WHOLE_LEG] > 0.0
+    if not is_whole:
+        return records, begins
+    parts, total = [records[:0]], 0
+    for k in range(runs):
+        record = records[begins[k] : begins[k + 1] if k + 1 < runs else records.size]
+        parts.append(with_panels(record) if record[WHOLE_LEG] > 0.0 else record)
+        total += parts[k + 1].size
+    line, starts, at = np.empty(total), np.empty_like(begins), 0
+    for k in range(runs):
+        starts[k], size = at, parts[k + 1].size
+        line[at : at + size] = parts[k + 1]
+        at += size
+    return line, starts
+
+
 @entry(
     types.Tuple((WHOLE, MATRIX, FOLLOWED))(
         *(VECTOR, WHOLE, PROGRAMS, MATRIX, types.UniTuple(types.float64, 2)),
@@ -115,7 +138,7 @@ def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap
     Parameters
     ----------
     records, begins
-        As for `equation.lay_panels`.
+        As for `equation.lay_panels`; the records may have rows of whole legs.
     programs : PROGRAMS
         `programs.law_in_doubles`, `programs.law_program` and `programs.rates_program`.
     inputs : (3, n + 2) array
@@ -125,6 +148,7 @@ def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap
     moves, lap
         As for `chain.follow`.
     """
+    records, begins = panelled(records, begins)
     first, panels = lay_panels(records, begins)
     states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
     law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0

@@ -1,6 +1,7 @@
 """Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
-from gqm_sym.runtime.launch.kinds import QUANTITIES
+from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.parts.positions import Positions
 
@@ -59,6 +60,11 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         check_force(self.problem.formulas, quantity)
+        if quantity in EXTREMES and not isfinite(getattr(self, quantity).value):
+            raise SolutionError(
+                f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
+                "which this motion ends"
+            )
         found = self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
         self._check_known(f"gradient of {quantity}", found, found.values())
         return found
