@@ -21,9 +21,7 @@ from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
     FORCE,
-    KAPPA,
     MEAN,
-    N0,
     NODES,
     OFFSET,
     SPEED,
@@ -36,7 +34,6 @@ from gqm_sym.runtime.legs.panels.equation import (
     copy,
     copy_row,
     damped_row,
-    load_per_mass_row,
     product,
     solution_row,
 )
@@ -48,8 +45,7 @@ from gqm_sym.runtime.legs.runs.branch_points import branch_beside
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, END_TURN, End
 from gqm_sym.runtime.legs.runs.gaps import GAP_V2_RATIO, ROUNDINGS_OF_TIMES
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, unstretched, variable_for
-from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, peak_of_row
-from gqm_sym.runtime.legs.runs.peaks import SPEED as SPEED_PEAK
+from gqm_sym.runtime.legs.runs.peaks import Stretch, peak_of_part
 from gqm_sym.runtime.legs.runs.whole_leg import CHECK, variable_of_leg
 from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
@@ -77,8 +73,8 @@ MIN_SHARE = 0.9
 # The share of the way to the next kink at which a turn is sought if V**2 vanishes before that.
 TO_SEEK = 0.75
 
-# The largest ratio of the length of a part to its distance from a turn behind or ahead of it. A longer one is divided so
-# that the rest has a smaller ratio, and the part next to the turn one of at most the last.
+# The largest ratio of the length of a part to its distance from a turn behind or ahead of it. A longer one is divided
+# so that the rest has a smaller ratio, and the part next to the turn one of at most the last.
 MAX_GRADING, GRADING, NEXT_GRADING = 3.0, 2.7, 2.0
 
 # What is at the end of a part.
@@ -187,18 +183,6 @@ def time_of_part(blocks, v2, h, is_last, work):  # type: ignore[no-untyped-def]
         reverse_row(blocks, work, TIME_RATE)
     to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
     return work[blocks * TAILS]
-
-
-@Inner
-def peak_of_part(blocks, reading, best, work):  # type: ignore[no-untyped-def]
-    """Return the larger of ``best`` and the extreme that is read of a part."""
-    if reading.what != PEAKS or (reading.sign < 0.0 and not reading.force):
-        return best  # the body is slowest where it turns
-    for at in range(0, blocks * WIDE, WIDE):
-        load_per_mass_row(work, blocks * MEAN + at, blocks * N0 + at, blocks * KAPPA + at, blocks * W + at)
-    if reading.force:
-        return peak_of_row(blocks, work, MEAN, (LENGTH if reading.length else LOAD, reading.sign), best)
-    return peak_of_row(blocks, work, W, (SPEED_PEAK, reading.sign), best)
 
 
 @Inner
@@ -324,7 +308,7 @@ def try_next(march, kinks, variable, blocks, branch, ratio, work):  # type: igno
     What is not resolved is noted.
     """
     h = variable.width
-    if blocks == 1 and branch.height == 0.0:
+    if blocks == 1 and branch.height == 0.0 and variable.extent == 0.0:
         branch = branch_beside(march, h, work)
         if variable_for(branch, march.origin, march.direction, h).extent > 0.0:
             return 1, branch
@@ -392,7 +376,10 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
             break
         place = place_after(part.place, v * h) if is_last else place
         time, rounding = two_sum(part.time, time_of_part(blocks, part.v2, h, is_last, work))
-        peak = peak_of_part(blocks, reading, part.peak, work)
+        peak = part.peak
+        if reading.what == PEAKS:
+            stretch = Stretch(part.place, place, float(v), variable)
+            peak = peak_of_part(forces, stretch, blocks, reading, peak, work)
         part = PartStart(place, end, stop == AT_KINK, part.passed + h, largest, time, part.time_low + rounding, peak)
         rest, blocks = rest - h if rest > h else TO_SEEK * h, 0
         if is_last or stop == AT_TARGET:
