@@ -29,7 +29,7 @@ from gqm_sym.derivation.forces.dissipation import (
     dissipation,
 )
 from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
-from gqm_sym.derivation.forces.rider import rider, upright_force
+from gqm_sym.derivation.forces.rider import has_upward_direction, rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
@@ -198,7 +198,7 @@ def derive(
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
-        sided=not law.loads or upright is not None,
+        sided=not law.loads or upright is not None or (kernel.conservative and has_upward_direction(curve.banking)),
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
         common_factor=shape.size,
     )
@@ -215,12 +215,22 @@ def derive(
 def _refuse_planar_forces(kernel: Kernel) -> None:
     """Refuse forces that are defined for planar curves only."""
     refused = (
-        ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
-        ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
+        (
+            "rolling: radius",
+            kernel.radius,
+            "the path of the centre of a rolling body",
+            "leave it out and declare that path, with roll= and heartline= for the track under it",
+        ),
+        (
+            "surface_tension: form",
+            kernel.resistance and not kernel.resistance.has(sp.Abs),
+            "the printed form's sign",
+            "leave it out",
+        ),
     )
-    for name, given, what in refused:
+    for name, given, what, remedy in refused:
         if given:
-            raise DeclarationError(f"derive: {name}: {what} is so far known for planar curves only; leave it out")
+            raise DeclarationError(f"derive: {name}: {what} is so far known for planar curves only; {remedy}")
 
 
 def _refuse_of_train(kernel: Kernel) -> None:

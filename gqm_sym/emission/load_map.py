@@ -5,7 +5,7 @@ terms.
 from collections.abc import Callable
 from math import prod
 
-from sympy import Abs, Expr, Function, Pow, Symbol, cos, cosh, exp, ordered, sin, sinh
+from sympy import Abs, Expr, Function, Pow, S, Symbol, cos, cosh, exp, ordered, sin, sinh
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.angles import is_power_of_two
@@ -25,15 +25,17 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
     contact = lowering.contact(v2)
+    # In a rotating frame the contact force depends on the direction of motion, which this function does not know.
+    force = S.Zero if model.coriolis else contact.size
     in_space = () if not model.curve.in_space or model.coriolis else (model.y, *contact.vector)
-    rows = (model.x, model.z, model.ds, contact.kappa, v2, contact.size, size, *in_space)
+    rows = (model.x, model.z, model.ds, contact.kappa, v2, force, size, *in_space)
     grown, outputs = with_named_exponentials(lowering.accurate(rows), names.symbol)
     return (
         lowering.function(
             "load_map",
             (w0, level, places),
-            f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), "
-            f"size of U's terms{', y, N along x, y and z' if in_space else ''}.",
+            f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), {'0' if model.coriolis else 'N'} (paper, "
+            f"eqs. 8, 13, 15), size of U's terms{', y, N along x, y and z' if in_space else ''}.",
             inside=[(lowering.place, at(places)), *grown],
             outputs=outputs,
         ),

@@ -162,10 +162,9 @@ class CompiledModel(Formulas):
             self._fill_in_space(f.p, launch, places, arrays, MAP_ROWS)
             return _without(arrays, beyond)
         start = (launch.lam0.value, launch.lam0.low, launch.v0.value**2)
-        # In a rotating frame the rows in space depend on the direction of motion.
-        in_space = None if self.directed else self.path_in_space
-        filled = MAP_ROWS if in_space is None else MAP_ROWS_IN_SPACE
-        of_map = 0 if self.load_map is None else self.load_map.address, 0 if in_space is None else in_space.address
+        filled = MAP_ROWS if self.path_in_space is None else MAP_ROWS_IN_SPACE
+        addresses = (0 if function is None else function.address for function in (self.load_map, self.path_in_space))
+        of_map = (*addresses, launch.direction if self.directed else 0)
         rows = tuple(array.reshape(-1) for array in arrays[:filled])
         to_fill = (*rows, *(NO_LOW_PARTS,) * (MAP_ROWS_IN_SPACE - filled))
         past_cache = len(rows) * places.nbytes >= LARGE
@@ -194,8 +193,7 @@ class CompiledModel(Formulas):
             found: list[Array] = []
             if filled == MAP_ROWS:
                 found.extend(path_in_space(self, p, places[part], v2[part], ahead))
-            if self.directed:
-                force[part] = length(np.array(found[1:]))
+                force[part] = length(np.array(found[1:])) if self.directed else force[part]
             if self.rider_loads is not None:
                 found.extend(rider_loads(self, p, places[part], v2[part], ahead, force[part]))
             for row, values in zip(rows, found, strict=True):

@@ -122,7 +122,7 @@ def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> N
         assert swept == pytest.approx(getattr(motion, name).value, rel=4.5e-16, abs=0.0)
     with pytest.raises(SolutionError, match=r"none of normal_force_max, .* in a rotating frame"):
         motion.gradient("normal_force_max")
-    with pytest.raises(LaunchError, match="is not defined in a frame that turns"):
+    with pytest.raises(LaunchError, match="declare the upward direction"):
         module.solve(-2, 4, contact="above")
 
 
@@ -150,9 +150,9 @@ def hill(u: float) -> tuple[Any, Any, Any]:
     )
 
 
-def upright(u: float, roll: float) -> Vector:
+def upright_on(track: Callable[[float], Any], u: float, roll: float) -> Vector:
     """Return the upward direction of riders at a roll angle from the level."""
-    tangent = np.array(hill(u)[1])
+    tangent = np.array(track(u)[1])
     tangent /= np.linalg.norm(tangent)
     left = np.cross([0.0, 0.0, 1.0], tangent)
     left /= np.linalg.norm(left)
@@ -170,7 +170,7 @@ def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
     newton = Newton(hill, mu=mu)
 
     def lifts(_: float, state: Vector) -> float:
-        return float(newton.forces(state[0], state[1])[0] @ upright(state[0], state[0] / 10))
+        return float(newton.forces(state[0], state[1])[0] @ upright_on(hill, state[0], state[0] / 10))
 
     lifts.terminal = True  # type: ignore[attr-defined]
     truth = newton.follow(-3.0, 30.0, [2.0], lifts)
@@ -192,6 +192,61 @@ def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
     )
     below = module.solve(-3, 30, contact="below")
     assert (below.t_end, below.events[0].kind) == (0.0, "liftoff")
+
+
+def valley(u: float) -> tuple[Any, Any, Any]:
+    """Return a valley in a bend, and its derivatives."""
+    return (
+        (10.0 * u, 4.0 * np.sin(u / 2), 2.0 * u * u),
+        (10.0, 2.0 * np.cos(u / 2), 4.0 * u),
+        (0.0, -np.sin(u / 2), 4.0),
+    )
+
+
+@pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 8.0, 1, 2), (1.2, 6.7, -1, 1)])
+def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way: int, legs: int, build: Build) -> None:
+    """In a frame that turns contact is lost on the way on which the Coriolis force lifts the body, although the other
+    way, with the same speeds, it is kept.
+    """
+    curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter="u", roll="pi/3")
+    module = build("turning_groove", curve, gqm.Gravity() + gqm.RotatingFrame(Omega="1/2"))
+    newton = Newton(valley, 0.5)
+
+    def lifts(_: float, state: Vector) -> float:
+        return float(newton.forces(state[0], state[1])[0] @ upright_on(valley, state[0], np.pi / 3))
+
+    lifts.terminal = True  # type: ignore[attr-defined]
+    motion = module.solve(lam0, v0, way, contact="above")
+    truth = newton.follow(lam0, v0 * way, [20.0], lifts)
+    assert [event.kind for event in motion.events] == ["turn"] * (legs - 1) + ["liftoff"]
+    assert motion.t_end == pytest.approx(truth.t_events[0][0], abs=INTEGRATED)
+    assert motion.events[-1].lam == pytest.approx(truth.y_events[0][0][0], abs=INTEGRATED)
+    assert motion.state(motion.t_end).n_vertical == pytest.approx(0.0, abs=1e-12)
+    assert module.sweep("t_end", [lam0], [v0], way, contact="above").values == pytest.approx([motion.t_end], rel=1e-13)
+    assert module.solve(lam0, v0, way, contact="below").t_end == 0.0
+    # Held from all sides, the body passes the same places the other way with a force that would keep it on the track.
+    held = module.solve(lam0, v0, way)
+    state = held.state(np.linspace(0.0, held.period, 101))
+    assert state.n_vertical[state.v > 0.0].min() > 0.4
+    assert state.n_vertical[state.v < 0.0].min() < 0.0
+    assert [event.kind for event in held.events].count("contact-sign") == 2
+
+
+def test_sides_of_a_turning_track_with_friction_are_refused(build: Build) -> None:
+    """With losses of energy, the sides of a track that turns are refused by an error that says so."""
+    curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter="u", roll="pi/3")
+    module = build("rough_groove_turning", curve, gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction())
+    with pytest.raises(LaunchError, match="not known of bodies that lose energy on a space curve"):
+        module.solve(0, 1, contact="above", Omega=1, mu="1/10")
+
+
+def test_a_ball_on_a_banked_track(build: Build) -> None:
+    """The path of the centre, banked with the radius as heartline, has a line of contact and energy without slip."""
+    curve = gqm.Curve.space(x="2*cos(u)", y="2*sin(u)", z="-u/2", parameter="u", roll="pi/6", heartline="1/10")
+    state = build("ball", curve, gqm.Gravity() + gqm.Rolling(beta="2/5")).solve(0, 1).state(np.linspace(0.0, 2.0, 5))
+    assert state.v2 == pytest.approx(1.0 - 2.0 * 9.81 / 1.4 * state.z, rel=4e-15)
+    gap = np.stack([state.x - state.track_x, state.y - state.track_y, state.z - state.track_z])
+    assert np.linalg.norm(gap, axis=0) == pytest.approx(np.full(5, 0.1), rel=1e-13)
 
 
 def test_random_space_curves_with_friction(build: Build) -> None:

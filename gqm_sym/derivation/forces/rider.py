@@ -97,13 +97,18 @@ def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Ex
     """Return κ and n₀ for which κ W + n₀ is the component of N/m along the rider's upward direction.
 
     The result is None in a vertical plane, where N has a sign; if that direction depends on the motion; and in a
-    rotating frame.
+    rotating frame, where that component also depends on the direction of motion.
     """
-    if shape.heading is not None or law.coriolis or (banking.angle is None and banking.speed is None):
+    if shape.heading is not None or law.coriolis or not has_upward_direction(banking):
         return None
     upright = _in_space(banking, shape, law).vertical
     load = upright.xreplace({W: sp.S.Zero})
     return differentiate(upright, W), load
+
+
+def has_upward_direction(banking: Banking | None) -> bool:
+    """Return whether the upward direction of riders is that of the track, whatever the motion."""
+    return banking is not None and not (banking.angle is None and banking.speed is None)
 
 
 def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:

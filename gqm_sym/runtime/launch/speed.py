@@ -254,9 +254,29 @@ def fill_by_difference(fns, path_in_space, p, launch, places, low_parts, field):
     v2[:] = better
 
 
+@Inner
+def fill_directed(path_in_space, p, launch, direction, places, field):  # type: ignore[no-untyped-def]
+    """Fill the contact force of a block of a load map, and the last four rows, in a rotating frame.
+
+    ``direction`` is the sign of ds/dt at launch. From rest the body may move to either side of the launch.
+    """
+    n, first = places.size, LOAD_MAP_ROWS * places.size
+    v2, force, rows = field[4 * n : 5 * n], field[5 * n : 6 * n], field[first : first + SPACE_ROWS * n]
+    call_path_in_space(path_in_space, n, places, v2, direction, p, rows)
+    if launch.w0 == 0.0:
+        backwards = np.empty(SPACE_ROWS * n)
+        call_path_in_space(path_in_space, n, places, v2, -direction, p, backwards)
+        for i in range(n):
+            for k in range(SPACE_ROWS if (places[i] - launch.lam0) * direction < 0.0 else 0):
+                rows[k * n + i] = backwards[k * n + i]
+    for i in range(n):
+        along_x, along_y, along_z = rows[n + i], rows[2 * n + i], rows[3 * n + i]
+        force[i] = sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
+
+
 @entry(
     types.void(
-        *(ADDRESSES, types.UniTuple(INTEGER, 2), VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
+        *(ADDRESSES, types.UniTuple(INTEGER, 3), VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
         *(types.UniTuple(VECTOR, MAP_ROWS_IN_SPACE), types.UniTuple(INTEGER, 2), types.boolean),
     ),
     nogil=True,
@@ -271,8 +291,9 @@ def fill_load_map(fns, of_map, p, launch, places, rows, part, past_cache):  # ty
 
     Parameters
     ----------
-    of_map : (load_map, path_in_space)
-        The addresses of the module's functions for load maps and for the last four rows; 0 if there are none.
+    of_map : (load_map, path_in_space, direction)
+        The addresses of the module's functions for load maps and for the last four rows; 0 if there are none. In a
+        rotating frame in space, the sign of ds/dt at launch, on which the contact force depends; otherwise 0.
     launch : (lam0, lam0_low, w0)
         The launch place as two doubles, and V**2 there.
     places : (lam, low_parts)
@@ -284,7 +305,8 @@ def fill_load_map(fns, of_map, p, launch, places, rows, part, past_cache):  # ty
     past_cache : bool
         Whether the rows are written past the caches (`streaming.put`).
     """
-    (lam0, lam0_low, w0), (lam, low_parts), (begin, end), (load_map, path_in_space) = launch, places, part, of_map
+    (lam0, lam0_low, w0), (lam, low_parts), (begin, end) = launch, places, part
+    load_map, path_in_space, direction = of_map
     slopes, field = np.empty((2, 1)), np.empty((LOAD_MAP_ROWS + SPACE_ROWS) * BLOCK)
     start = np.array([lam0])
     call_effective_potential(fns.effective_potential, 1, start, p, slopes)
@@ -305,8 +327,10 @@ def fill_load_map(fns, of_map, p, launch, places, rows, part, past_cache):  # ty
             for i in range(n):
                 inaccurate += 0 if keeps_digits(w0, field[4 * n + i], size + field[6 * n + i]) else 1
         if inaccurate:
-            part_low = low_parts[first : first + n]
-            fill_by_difference(fns, path_in_space, p, numbers, lam[first : first + n], part_low, field)
+            part_low, in_space = low_parts[first : first + n], 0 if direction else path_in_space
+            fill_by_difference(fns, in_space, p, numbers, lam[first : first + n], part_low, field)
+        if direction:
+            fill_directed(path_in_space, p, numbers, float(direction), lam[first : first + n], field)
         put(x, first, field, 0, n, past_cache)
         put(z, first, field, n, n, past_cache)
         put(ds, first, field, 2 * n, n, past_cache)

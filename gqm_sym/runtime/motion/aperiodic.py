@@ -396,4 +396,6 @@ class MotionAtRest(Motion):
 def _is_pulled(problem: Problem) -> bool:
     """Return whether a track that can push from one side only would have to pull a body at rest at the launch place."""
     f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
-    return bool(side) and bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1))[0] < 0.0)
+    if not side:
+        return False
+    return bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1), 1)[0] < 0.0)

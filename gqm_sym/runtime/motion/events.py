@@ -106,23 +106,24 @@ def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Arr
     return length(forces[1:])
 
 
-def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Array) -> Array:
+def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Array, direction: int) -> Array:
     """Return a force whose sign shows on which side of the track a body is: N, or the vertical load on the riders of a
-    space curve.
+    space curve, which in a rotating frame depends on the direction of motion.
     """
     force: Array
     if formulas.signed:
         force = path_and_force_at(f.addresses, f.p, places, v2)[4]
     else:
-        force = rider_loads(formulas, f.p, places, v2, np.ones(places.size), np.zeros(places.size))[0]
+        force = rider_loads(formulas, f.p, places, v2, np.full(places.size, direction), np.zeros(places.size))[0]
     return force
 
 
-def contact_signs(formulas: "Formulas", segment: Segment, phi: Array) -> Array:
+def contact_signs(formulas: "Formulas", timed: TimedSegment, phi: Array) -> Array:
     """Return the sign of `sided_force` at phase angles of a segment; 0 where it is zero within rounding, or NaN."""
+    segment = timed.segment
     f, places = segment.functions, segment.places(phi)
-    force = sided_force(formulas, f, places, segment.speeds(phi) ** 2)
-    load = sided_force(formulas, f, places, np.zeros_like(phi))
+    force = sided_force(formulas, f, places, segment.speeds(phi) ** 2, timed.direction)
+    load = sided_force(formulas, f, places, np.zeros_like(phi), timed.direction)
     parts = np.abs(force - load) + np.abs(load)
     finite = np.isfinite(parts)
     least = (
@@ -139,8 +140,10 @@ def contact_changes(formulas: "Formulas", timed: TimedSegment) -> Array:
         return np.empty(0)
     changes = sign_changes(
         segment,
-        partial(contact_signs, formulas, segment),
-        lambda phi: np.sign(sided_force(formulas, segment.functions, segment.places(phi), segment.speeds(phi) ** 2)),
+        partial(contact_signs, formulas, timed),
+        lambda phi: np.sign(
+            sided_force(formulas, segment.functions, segment.places(phi), segment.speeds(phi) ** 2, timed.direction)
+        ),
     )
     if timed.end == "singular-point":
         changes = changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
@@ -266,7 +269,7 @@ def liftoff(formulas: "Formulas", timed: TimedSegment, side: int, *, first: bool
         # N may vanish at the launch itself; its sign half-way to the first change then decides. At a cusp it is
         # infinity times zero, so places a little ahead are examined.
         near = start + share * (stop - start)
-        here, then = contact_signs(formulas, timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
+        here, then = contact_signs(formulas, timed, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
     lost = sorted([*crossed, *corner_crossings(timed, timed.segment.functions.liftoff_corners(side), 0.0)])

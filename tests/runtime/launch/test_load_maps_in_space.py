@@ -54,6 +54,39 @@ def test_the_contact_force_along_each_axis(v0: float) -> None:
     assert path.normal_force == pytest.approx(size, abs=OF_LENGTH * size.max(), rel=0)
 
 
+@pytest.mark.parametrize("v0", [0.0, 9.0])
+def test_the_contact_force_in_a_frame_that_turns(v0: float, tmp_path: Path) -> None:
+    """The Coriolis part has the sign of the direction of launch, and from rest that of the side of the launch."""
+    curve = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter="u")
+    module = gqm.build(
+        gqm.derive(curve, gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")), name="turning_map", folder=tmp_path
+    )
+    lam = np.concatenate([LAUNCH + np.linspace(-3.0, 3.0, BLOCK + 8), [LAUNCH]])
+    with mp.workdps(40):
+        spin, g, height = mpf("1.5"), mpf("9.81"), sp.Symbol("z")
+        potential = sp.Rational(981, 100) * height - sp.Rational(9, 8) * (sp.Symbol("x") ** 2 + sp.Symbol("y") ** 2)
+        coordinates = [1 + sp.cos(U), sp.sin(U), 2 * sp.sin(U / 2)]
+        start = mpf(LAUNCH)
+        still = np.array(by_definition(coordinates, potential, lam.tolist(), mpf(v0) ** 2, start))
+
+        def half(u: float) -> mpf:
+            return g * 2 * mp.sin(mpf(u) / 2) - spin**2 * (1 + mp.cos(u))
+
+        true = []
+        for u, force in zip(lam.tolist(), still, strict=True):
+            v2 = max(mpf(v0) ** 2 - 2 * (half(u) - half(LAUNCH)), mpf(0))
+            way = 1 if v0 else mp.sign(mpf(u) - start)
+            size = mp.sqrt(1 + mp.cos(mpf(u) / 2) ** 2)
+            aside = 2 * spin * way * mp.sqrt(v2) / size
+            true.append([float(force[0] - aside * mp.cos(u)), float(force[1] - aside * mp.sin(u)), float(force[2])])
+    path, reachable = module.pass1(lam, LAUNCH, v0), module.pass1(lam, LAUNCH, v0).v2 >= 0.0
+    found = np.array([path.normal_x, path.normal_y, path.normal_z]).T[reachable]
+    size = np.linalg.norm(np.array(true)[reachable], axis=1)
+    # Next to a launch from rest the square root of V**2 has half the digits of the place.
+    assert np.all(np.abs(found - np.array(true)[reachable]) < 2e-15 * size.max())
+    assert path.normal_force[reachable] == pytest.approx(size, rel=4e-15)
+
+
 def test_rows_do_not_depend_on_their_neighbours() -> None:
     """A place has the same numbers alone and among others, whether their V**2 comes by difference or not."""
     lam = np.concatenate([np.linspace(-1, 3, BLOCK + 9), [LAUNCH], LAUNCH + np.linspace(0, 1e-3, BLOCK)])
