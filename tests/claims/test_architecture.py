@@ -157,7 +157,6 @@ TESTED_THROUGH = {
     "legs/runs/changes.py": "claims/test_dissipative.py",
     "legs/runs/ends.py": "runtime/legs/test_dissipative.py",
     "legs/runs/gap_data.py": "claims/test_space_curves.py",
-    "legs/runs/gaps.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/runs/peaks.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/runs/route.py": "claims/test_dissipative.py",
     "legs/runs/run.py": "claims/test_dissipative.py",

@@ -271,7 +271,7 @@ class TurnedLegs(NamedTuple):
         line, size, _, lines_before = self
         runs, at = [], 0
         for k in range(size):
-            end = at + int(line.item(at + USED)) if size > 1 else line.size
+            end = at + int(line.item(at + USED))
             before = None if lines_before is None else lines_before[k]
             # This avoids the constructor of a named tuple, which is slow.
             runs.append(tuple.__new__(Run, (line[at:end], END_TURN, TURN, None, before, None)))

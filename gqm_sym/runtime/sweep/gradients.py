@@ -20,9 +20,9 @@ from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.sweep.columns import as_doubles
-from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
+from gqm_sym.runtime.sweep.quantities import ANSWERED, LOWER_END, SOLVE, UPPER_END
 from gqm_sym.runtime.sweep.result import Sweep
-from gqm_sym.runtime.sweep.sweep import Solve, sweep
+from gqm_sym.runtime.sweep.sweep import Solve, sweep, sweep_with_columns
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
@@ -50,28 +50,35 @@ def sweep_with_gradient(
     if quantity in LOAD_EXTREMES:
         raise InputError(f"gradient: there is none of {quantity}, which is a load on a rider; leave gradient out")
     check_force(formulas, quantity)
-    found = sweep(formulas, quantity, launches, parameters, lam, solve)
+    is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
+    is_compiled = quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None
+    width = UPPER_END + 1 if is_compiled and quantity in PERIODS else 0
+    found, columns = sweep_with_columns(formulas, quantity, launches, parameters, lam, solve, width)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
     size, shape = found.status.size, (*found.values.shape[found.status.ndim :], len(rows))  # two turning points
-    table = np.empty((size, len(names)))
-    by_launch = table.reshape(*found.status.shape, len(names))
-    for column, (value, name) in enumerate(zip(given, names, strict=True)):
-        by_launch[..., column] = as_doubles(value, name)
-    answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
-    gradient, route = np.full((size, *shape), nan), found.route.reshape(-1)
-    is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
-    if quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None:
-        spans = sweep(formulas, "turning_points", launches, parameters, None, solve)
-        periods = found if quantity in PERIODS else sweep(formulas, "period", launches, parameters, None, solve)
-        which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
+    table = np.empty((len(names), size))
+    by_launch = table.reshape(len(names), *found.status.shape)
+    for row, (value, name) in enumerate(zip(given, names, strict=True)):
+        by_launch[row] = as_doubles(value, name)
+    answered, route = np.flatnonzero(found.status.reshape(-1) == ANSWERED), found.route.reshape(-1)
+    gradient = np.full((size, *shape), nan)
+    if is_compiled:
+        periods = found
+        if quantity not in PERIODS:
+            width = UPPER_END + 1
+            periods, columns = sweep_with_columns(formulas, "period", launches, parameters, None, solve, width)
+        are_periodic = periods.status.reshape(-1)[answered] == ANSWERED
+        which = answered if are_periodic.all() else answered[are_periodic]
         some: Any = slice(None) if which.size == size else which
-        ends, values = spans.values.reshape(-1, 2)[some], found.values.reshape(size, *shape[:-1])[some]
-        several = launches_of(formulas, table[some, :-2], table[some, -2], ends)
+        ends = columns[some, LOWER_END:]
+        values, launched = found.values.reshape(size, *shape[:-1])[some], table[:, some]
+        _fill_missing_ends(formulas, launched, ends, solve)
+        several = launches_of(formulas, launched[:-2].T, launched[-2], ends)
         if which.size:
             gradient[some] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
     for k in answered[_are_open(gradient, answered)].tolist():
-        *p, lam0, v0, direction, place = table[k].tolist()
+        *p, lam0, v0, direction, place = table[:, k].tolist()
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
         route[k] = SOLVE
         with suppress(GQMError):
@@ -82,6 +89,21 @@ def sweep_with_gradient(
     found.route[...] = route.reshape(found.status.shape)
     found.gradient = gradient.reshape(*found.status.shape, *shape)
     return found
+
+
+def _fill_missing_ends(formulas: "Formulas", table: Array, ends: Array, solve: Solve) -> None:
+    """Fill the turning points of launches for which batches have found none.
+
+    The rows of ``table`` are the run-time parameters, lam0, v0, the direction and a place.
+    """
+    if not np.isnan(ends.sum()):
+        return
+    missing = np.flatnonzero(np.isnan(ends).all(axis=1))
+    if missing.size:
+        *parameters, lam0, v0, direction, _ = table[:, missing]
+        ends[missing] = sweep(
+            formulas, "turning_points", LaunchRequest(lam0, v0, direction), tuple(parameters), None, solve
+        ).values
 
 
 def _are_open(gradient: Array, answered: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -21,6 +21,10 @@ HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME, MIN_SPEED, MAX_SPEED, MIN_FOR
     10
 )
 
+# The columns for both turning points beside the time of an orbit, where they are asked for. They are NaN where batches
+# do not find them, and NaN and infinity for laps.
+LOWER_END, UPPER_END = 1, 2
+
 # The code of a quantity that compiled code does not compute.
 NOT_COMPILED = -1
 

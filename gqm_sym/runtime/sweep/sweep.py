@@ -85,6 +85,22 @@ def sweep(
     ParameterError
         If a parameter is missing, or outside of the range in which the closed forms hold.
     """
+    return sweep_with_columns(formulas, quantity, launches, parameters, lam, solve)[0]
+
+
+def sweep_with_columns(
+    formulas: "Formulas",
+    quantity: str,
+    launches: LaunchRequest,
+    parameters: tuple[Any, ...],
+    lam: Any,
+    solve: Solve,
+    width: int = 0,
+) -> tuple[Sweep, Array]:
+    """Do what `sweep` does, and also return all columns that compiled code fills, a row for each launch.
+
+    There are at least ``width`` columns. With UPPER_END + 1 of them the turning points are beside the times.
+    """
     lam0, v0, direction, _, t_max, contact = launches
     found = QUANTITIES[one_of(quantity, tuple(QUANTITIES), where="quantity")]
     if quantity in LOAD_EXTREMES:
@@ -105,7 +121,7 @@ def sweep(
     shape = broadcast_shape(dict(zip(names, arrays, strict=False)))
     columns, domain = ([widen(array, shape) for array in of] for of in (arrays, domain))
     size = prod(shape)
-    answers = Answers(np.empty((size, found.width)), np.empty(size, np.int8), np.empty(size, np.int8))
+    answers = Answers(np.empty((size, max(found.width, width))), np.empty(size, np.int8), np.empty(size, np.int8))
     answers.values.fill(nan)
     answers.status.fill(quantities.UNDECIDED)
     answers.route.fill(quantities.BATCH)
@@ -131,12 +147,13 @@ def sweep(
                 answers.put(chosen, some)
     if domain and (far := _too_far(columns[0], domain[2])).any():
         answers.status[np.broadcast_to(far.ravel(), size)] = quantities.UNDECIDED
-    values = answers.values[:, found.columns]
+    values = answers.values[:, found.columns].copy() if width else answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
         values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
         answers.route[k] = quantities.SOLVE
-    return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
+    swept = Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
+    return swept, answers.values
 
 
 def refuse(answers: Answers) -> None:

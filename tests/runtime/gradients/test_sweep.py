@@ -11,6 +11,9 @@ from paths import ROOT
 import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.loading import load
+from gqm_sym.runtime.launch.request import LaunchRequest
+from gqm_sym.runtime.sweep.quantities import LOWER_END, UPPER_END
+from gqm_sym.runtime.sweep.sweep import sweep_with_columns
 
 ULP = 2.0**-52
 
@@ -34,6 +37,20 @@ def test_pendulums() -> None:
             shape = mp.ellipe(k**2) / (k * (1 - k**2)) - mp.ellipk(k**2) / k
             wanted = 2 * mp.sqrt(mpf(length) / mpf(9.81)) * mp.cos(mpf(amplitude) / 2) * shape
             assert abs(value - wanted) <= 2 * ULP * abs(wanted)
+
+
+def test_turning_points_come_with_times() -> None:
+    """A pendulum at rest turns at its mirror image; a thrown one turns where its energy ends; a lap has no turns."""
+    module, lam0, v0 = generated("circle"), np.array([0.3, -1.2, 0.0, 0.5]), np.array([0.0, 0.0, 1.0, 12.0])
+    parameters = tuple(module.PARAMETERS.values())
+    swept, columns = sweep_with_columns(
+        module.MODEL, "period", LaunchRequest(lam0, v0), parameters, None, module.MODEL.solve, UPPER_END + 1
+    )
+    turn = float(2 * mp.asin(1 / mp.sqrt(4 * mpf("9.81") * mpf("0.9"))))
+    assert (swept.status == 0).all()
+    np.testing.assert_array_equal(columns[:2, LOWER_END:], [[-0.3, 0.3], [-1.2, 1.2]])
+    np.testing.assert_allclose(columns[2, LOWER_END:], [-turn, turn], rtol=2 * ULP)
+    np.testing.assert_array_equal(columns[3, LOWER_END:], [np.nan, np.inf])
 
 
 @pytest.mark.parametrize("name", ["ellipse", "rolling_circle", "double_well", "circle_spring"])

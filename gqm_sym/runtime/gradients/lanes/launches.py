@@ -1,12 +1,16 @@
 """Many launches whose motions are periodic, with the symmetry of their orbits."""
 
+from math import fabs
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.intrinsics import nearest_whole
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.formulas import Formulas
 
 # The kinds of librations by their symmetry.
@@ -29,20 +33,23 @@ class Launches(NamedTuple):
         The turning points of each launch; NaN for a circulation.
     even : (m,) array
         UNEVEN, or EVEN if the orbit is even about an axis of symmetry, or ABOUT_ONE_AXIS if it also contains no other.
-    axes : (m, 2) array
-        The number of the axis, and the sign of the launch's distance from it.
+    from_axis : (m, n + 1) array
+        The run-time parameters and lam0, the number of the axis, and the sign of the launch's distance from it.
     """
 
     given: Array
     directions: Array
     spans: Array
     even: NDArray[np.int8]
-    axes: Array
+    from_axis: Array
 
     @property
     def table(self) -> Array:
         """The arguments of compiled code: the variables of each launch, then its turning points."""
-        return np.hstack([self.given, np.zeros((len(self.given), 1)), self.spans])
+        count = self.given.shape[1]
+        found = np.empty((len(self.given), count + 3))
+        found[:, :count], found[:, count], found[:, count + 1 :] = self.given, 0.0, self.spans
+        return found
 
     @property
     def circulates(self) -> NDArray[np.bool_]:
@@ -51,18 +58,45 @@ class Launches(NamedTuple):
         return circulates
 
 
+@entry(
+    types.void(VECTOR, VECTOR, types.float64[:, :], types.float64[:, :], types.Tuple((types.int8[::1], MATRIX))),
+    nogil=True,
+)
+def fill_symmetry(places, steps, given, spans, found):  # type: ignore[no-untyped-def]
+    """Fill the kind of each orbit by its symmetry, and its axis.
+
+    Parameters
+    ----------
+    places, steps : arrays
+        A place of symmetry and the distance to the next for each launch, or one that all launches have in common. The
+        distance is 0 if there is no other axis.
+    given, spans : arrays
+        As in `Launches`.
+    found : (array, array)
+        Filled: ``even`` and ``from_axis`` of `Launches`.
+    """
+    (even, from_axis), count = found, given.shape[1] - 1
+    for i in range(even.size):
+        place, step = places[min(i, places.size - 1)], steps[min(i, steps.size - 1)]
+        low, high = spans[i, 0], spans[i, 1]
+        middle, number = 0.5 * (low + high) - place, 0.0
+        if step != 0.0:
+            number = nearest_whole(middle / step)
+            number = number if number - number == 0.0 else 0.0
+        axis = step * number
+        is_even = fabs(middle - axis) <= EVEN_TOLERANCE * (fabs(low) + fabs(high) + fabs(place))
+        is_alone = step == 0.0 or high - low < 2.0 * fabs(step)
+        even[i] = (ABOUT_ONE_AXIS if is_alone else EVEN) if is_even else UNEVEN
+        for k in range(count):
+            from_axis[i, k] = given[i, k]
+        from_axis[i, count], from_axis[i, count + 1] = number, 1.0 if given[i, count - 1] >= place + axis else -1.0
+
+
 def launches_of(formulas: Formulas, given: Array, directions: Array, spans: Array) -> Launches:
     """Return launches, whose librations may be even about an axis of symmetry of the curve and the forces on it."""
-    even, axes = np.full(len(spans), UNEVEN, dtype=np.int8), np.zeros((len(spans), 2))
+    even, from_axis = np.full(len(spans), UNEVEN, dtype=np.int8), np.empty((len(spans), given.shape[1] + 1))
     place, step = formulas.axes(ARRAYS, tuple(given[:, :-2].T))
-    if place is not None:
-        low, high = spans.T
-        middle = 0.5 * (low + high) - place
-        if step is not None:
-            axes[:, 0] = np.nan_to_num(np.rint(middle / step))
-        axis = 0.0 if step is None else step * axes[:, 0]
-        is_even = np.abs(middle - axis) <= EVEN_TOLERANCE * (np.abs(low) + np.abs(high) + np.abs(place))
-        is_alone = True if step is None else high - low < 2.0 * np.abs(step)
-        even = np.where(is_even, np.where(is_alone, ABOUT_ONE_AXIS, EVEN), UNEVEN).astype(np.int8)
-        axes[:, 1] = np.where(given[:, -2] >= place + axis, 1.0, -1.0)
-    return Launches(given, directions, spans, even, axes)
+    if place is not None and len(spans):
+        places, steps = (np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (place, 0.0 if step is None else step))
+        fill_symmetry(np.ascontiguousarray(places), np.ascontiguousarray(steps), given, spans, (even, from_axis))
+    return Launches(given, directions, spans, even, from_axis)

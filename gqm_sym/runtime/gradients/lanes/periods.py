@@ -150,7 +150,7 @@ def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Ite
             if not chosen.any():
                 continue
             orbits = Orbits(source, formulas.axes_of, are_at_rest, rows)
-            launched = np.hstack([launches.given[:, : n + 1], launches.axes]) if are_at_rest else launches.table
+            launched = launches.from_axis if are_at_rest else launches.table
             for make in (mean_program, axis_program, exact_axis_program):
                 yield Stage(chosen, make, (orbits,), launched, n + 3 if are_at_rest else n, not are_at_rest)
     table = launches.table
@@ -212,6 +212,6 @@ def carried_out(
             fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
-    if isinstance(program, Program):
+    if isinstance(program, Program) and np.isnan(out.sum()):  # one sum is much faster than one for each
         states[np.isnan(out).any(axis=1)] = LEFT
     return out, states

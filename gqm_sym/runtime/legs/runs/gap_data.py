@@ -61,7 +61,7 @@ STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_D
 LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
 BOUNDS_OF_SQUARE, FACTORS = 11, 24
 FIRST_ROW = FACTORS + POWERS
-GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, SPEED, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
+GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, MEAN, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
 SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
 FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
 GAP_COLUMNS = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
@@ -69,6 +69,10 @@ FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.
 LEAST_SHARE = 1e-2
+
+# Where the force almost vanishes along a whole gap, as where friction balances the weight, its coefficients are
+# compared with this share of n0, because a rounding of a chart's angle changes it by a rounding of n0.
+NOISE_OF_FORCE = 2.0**-5
 
 square_size_row = over_rows(lambda a, c, w: a + c * (w * w), WIDE)
 undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
@@ -119,7 +123,7 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
         return
     to_means(work, FORCE, work, MEAN)
     product(work, SPEED, OFFSET, MEAN)
-    work[size_at(FORCE)] = size_of(work, FORCE)
+    work[size_at(FORCE)] = max(size_of(work, FORCE), NOISE_OF_FORCE * size_of(work, N0))
     if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
         return
     if forces.kinked and not kink(work) > 1.0:

@@ -40,6 +40,8 @@ from gqm_sym.runtime.legs.panels.equation import (
     LOAD,
     MEAN,
     N0,
+    NODES,
+    SERIES,
     SPEED,
     TAILS,
     TIME_RATE,
@@ -51,14 +53,18 @@ from gqm_sym.runtime.legs.panels.equation import (
     load_row,
     load_size_row,
     marched,
+    product,
     root_row,
     solution_row,
     time_rate_row,
 )
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of
+from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of, sum_and_slope, to_coefficients
 from gqm_sym.runtime.legs.panels.resolution import (
+    CANCELLATION_NOISE,
     FAR_FROM_ZERO_RATIO,
     examine,
+    first_change_of,
     keeps_sign,
 )
 from gqm_sym.runtime.legs.runs.gap_data import (
@@ -119,6 +125,23 @@ def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def read_rows(v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Read the rows kept of a gap at whose start V**2 is ``v2``, for forces that are linear in V**2, and fill W."""
+    for k, row in enumerate(GAP_ROWS):
+        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
+    product(work, SPEED, NODES, width)
+    product(work, SPEED, SPEED, MEAN)
+    solution_row(work, W, SPEED, EXPM1_Q, v2)
+
+
+@Inner
+def fill_load(work):  # type: ignore[no-untyped-def]
+    """Fill the row LOAD, and the size of its terms in MEAN."""
+    load_row(work, LOAD, DS, N0, KAPPA, W)
+    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+
+
+@Inner
 def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
     """Return the time over a gap, V**2 at its end, the largest V**2 on it, and E at its end; fill V**2, Y and the rate
     of time at nodes.
@@ -128,13 +151,10 @@ def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: igno
     if gaps[at] != FILLED:
         return nan, nan, nan, nan
     if forces.linear:
-        for k, row in enumerate(GAP_ROWS):
-            copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
-        solution_row(work, W, SPEED, EXPM1_Q, v2)
+        read_rows(v2, width, gaps, at, work)
     elif not solve_on_gap(forces, v2, width, gaps, at, work):
         return nan, nan, nan, nan
-    load_row(work, LOAD, DS, N0, KAPPA, W)
-    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+    fill_load(work)
     end, (low, high), lost = work[W + COUNT], extent(work, W), work[EXPM1_Q + COUNT]
     if not (min(low, end) > 0.0 and contact_sign * work[LOAD] > 0.0):
         return nan, end, high, lost
@@ -145,6 +165,13 @@ def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: igno
         return nan, end, high, lost
     return width * work[TAILS + 6], end, high, lost
 
+
+# A turn nearer to the start of a gap than this share of it is sought with the mean force from there, which must be more
+# than a share of its largest values.
+SHORT_SHARE, LEAST_MEAN = 0.25, 0.125
+
+# The number of gaps on which a turn is sought. Gaps before the one with the turn are passed as elsewhere.
+GAPS_TO_TURN = 4
 
 # The relative error of times that are summed in another order.
 ROUNDINGS_OF_TIMES = 1e-12
@@ -178,6 +205,21 @@ def ends_of_gap(all_breaks, period, gap):  # type: ignore[no-untyped-def]
     lap.
     """
     return all_breaks[gap], (all_breaks[gap + 1] if gap + 1 < all_breaks.size else all_breaks[0] + period)
+
+
+@Inner
+def kept_gap(forces, route, upcoming, v, contact_sign, work):  # type: ignore[no-untyped-def]
+    """Return the position of the data kept of the gap ahead of the break at ``upcoming``, and its width; the data are
+    filled in if they are not known yet.
+    """
+    gaps, gap = route.gaps, (route.first_break + (upcoming if v > 0 else -upcoming - 1)) % route.all_breaks.size
+    low, high = ends_of_gap(route.all_breaks, route.period, gap)
+    at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), high - low
+    if gaps[at] == 0.0:
+        off, begin_at = clearance(low, high), low if v > 0 else high
+        panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
+        fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
+    return at, width
 
 
 @Inner
@@ -230,13 +272,7 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         is_ahead = offset(start, march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
-        gap = (route.first_break + (upcoming if v > 0 else -upcoming - 1)) % route.all_breaks.size
-        low, high = ends_of_gap(route.all_breaks, route.period, gap)
-        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), high - low
-        if gaps[at] == 0.0:
-            off, begin_at = clearance(low, high), low if v > 0 else high
-            panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
-            fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
+        at, width = kept_gap(forces, route, upcoming, v, contact_sign, work)
         time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, gaps, at, work)
         if not time > 0.0 or is_read_inside(route, (start, stop), (spent, spent + time)):
             break
@@ -260,3 +296,68 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         left, ahead = marched(run_length, march), CurveAhead(upcoming, ahead.span, inf, True)
         count = (to - HEAD) // COLUMNS + (1 if may_join else 0)
     return RunState(left, run_length, v2, largest_v2, ahead, count)
+
+
+@Inner
+def distance_to_turn(v2, turn, width, work):  # type: ignore[no-untyped-def]
+    """Return the distance from the start of a gap, where V**2 is ``v2``, at which it vanishes, near the zero x =
+    ``turn`` of the series of W; infinity if that has none, and 0 if the distance is not resolved.
+
+    Of a short distance that series has few digits. But the force times exp(q) has the mean ``-v2/d`` up to the distance
+    d where V**2 vanishes, and this mean has its digits if it is not small.
+    """
+    share = 0.5 * (1.0 + turn)
+    if share > SHORT_SHARE:
+        return width * share if share <= 1.0 else inf
+    to_coefficients(work, MEAN, work, SERIES)
+    c = work[SERIES : SERIES + COUNT]
+    far = v2 / -sum_and_slope(c, turn)[0]
+    # A step of Newton's method, written so that nothing is subtracted from the distance.
+    share = far / width
+    mean, slope = sum_and_slope(c, 2.0 * share - 1.0)
+    far = (v2 - 2.0 * share * far * slope) / -(mean + 2.0 * share * slope)
+    return far if -mean >= LEAST_MEAN * size_of(work, MEAN) else 0.0
+
+
+@Inner
+def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type: ignore[no-untyped-def]
+    """Return the distance at which a body that becomes slower turns, by the rows kept of the next gaps, and the data of
+    the curve ahead of it there; the distance is 0 if they do not show a turn, or N may change its sign before.
+
+    V**2 is a polynomial on each gap, so that the curve is not evaluated.
+
+    Parameters
+    ----------
+    timed : LastTimed
+        The break at which the body is, with V**2 and the sign of N there.
+    largest_v2 : float
+        The largest V**2 so far.
+    ahead : CurveAhead
+    """
+    v, nu, v2, first, breaks = march.direction, timed.contact_sign, timed.v2, ahead.upcoming, route.breaks
+    if not forces.linear or nu in (0, -route.only_sign) or route.gaps.size == 0 or first + 1 >= breaks.size:
+        return 0.0, ahead
+    # If a panel is laid once more, the break at which the body is lies behind already.
+    if offset(breaks[first], march.origin, v) != timed.distance:
+        return 0.0, ahead
+    for upcoming in range(first, min(first + GAPS_TO_TURN, breaks.size - 1)):
+        begin = offset(breaks[upcoming], march.origin, v)
+        at, width = kept_gap(forces, route, upcoming, v, nu, work)
+        if route.gaps[at] != FILLED:
+            break
+        read_rows(v2, width, route.gaps, at, work)
+        noise = CANCELLATION_NOISE * max(largest_v2, extent(work, W)[1])
+        turn, _, touch = first_change_of(work, W, 1, noise)
+        far = distance_to_turn(v2, turn, width, work)
+        fill_load(work)
+        load, _, no_load = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * extent(work, MEAN)[1])
+        # Behind the turn V**2 is negative, and N may be anything.
+        if not (touch > 1.0 and min(load, no_load) > min(turn, 1.0) and far > 0.0):
+            break
+        if far < inf:
+            return begin + far, CurveAhead(upcoming + 1, ahead.span, inf, True)
+        v2 = work[W + COUNT]
+        # Where the body does not become slower, this is not the end of its leg.
+        if not noise < v2 <= work[W]:
+            break
+    return 0.0, ahead

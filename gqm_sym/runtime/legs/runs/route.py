@@ -196,11 +196,15 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
 
 @Inner
 def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-untyped-def]
-    """Return the data ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``."""
+    """Return the data ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``; whether there is
+    no break ahead; and the distance of the next break, or of the end.
+    """
     upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
-    if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
-        return ahead
-    return CurveAhead(upcoming + 1, span_before(breaks, upcoming + 1, v, off), inf, v2 == 0.0)
+    if upcoming < breaks.size and offset(breaks[upcoming], march.origin, v) <= run_length:
+        upcoming += 1
+        ahead = CurveAhead(upcoming, span_before(breaks, upcoming, v, off), inf, v2 == 0.0)
+    at_end = upcoming == breaks.size
+    return ahead, at_end, offset(route.limit if at_end else breaks[upcoming], march.origin, v)
 
 
 @Inner

@@ -8,7 +8,6 @@ from math import inf
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
-from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
     LOAD,
@@ -39,7 +38,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     what_after,
     what_before,
 )
-from gqm_sym.runtime.legs.runs.gaps import RunState, pass_gaps
+from gqm_sym.runtime.legs.runs.gaps import RunState, pass_gaps, turn_on_gaps
 from gqm_sym.runtime.legs.runs.route import CurveAhead, begin, limited, pass_break
 
 # The number of panels after which a run pauses.
@@ -106,12 +105,19 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
                 *(forces, march, route, nu, RunState(left, run_length, v2, largest_v2, ahead, recorded), record, work)
             )
             timed = LastTimed(run_length, v2, nu, change_count)
+            turn, after = turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work)
+            if turn > run_length:
+                what, run_length, v2, step, ahead = END_TURN, turn, 0.0, marched(turn, march) - left, after
+                break
         late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
-        ahead = pass_break(march, route, off, v2, ahead, run_length)
-        at_end = ahead.upcoming == route.breaks.size
-        stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
-        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
-        what = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
+        ahead, at_end, stop = pass_break(march, route, off, v2, ahead, run_length)
+        what = what_before(
+            nu,
+            route.only_sign,
+            has_space(record, HEAD + recorded * COLUMNS, change_count),
+            searching and not late,
+            stop <= run_length,
+        )
         if what != END_NONE:
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
@@ -159,22 +165,18 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             CurveAhead(ahead.upcoming, ahead.span, inf, True),
             timed if searching else LastTimed(run_length, v2, nu, change_count),
         )
-        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), panel, (left, step), work)
-        what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
+        what = what_after(
+            change,
+            at_stop and at_end,
+            panel_count >= PANELS_PER_RUN
+            or may_pause(forces, march, route, run_length, (v2, largest_v2), panel, (left, step), work),
+        )
         if what != END_NONE:
             v2 = 0.0 if ends_here else v2
             break
         if ends_here:
             change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
-    onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
-    ends = (
-        END_TOO_MANY_PANELS if what == END_NONE else what,
-        march.origin,
-        v2,
-        nu,
-        onwards,
-        start.no_turn_until,
-        march.origin,
-    )
-    end = End(*ends, half_c, change_count, recorded, ahead.upcoming)
-    return conclude(forces, route, march, end, timed, searching, run_length)
+    what, half_c = END_TOO_MANY_PANELS if what == END_NONE else what, 0.5 * march.c if march.g > 0.0 else inf
+    onwards = step * (slope_at(left, march) + march.g * step)
+    end = (what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin, half_c, change_count, recorded)
+    return conclude(forces, route, march, End(*end, ahead.upcoming), timed, searching, run_length)

@@ -4,7 +4,7 @@ Orbits without proved turning points, or whose time does not converge, are left 
 (`scalar`).
 """
 
-from math import nan
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -62,11 +62,13 @@ from gqm_sym.runtime.sweep.batch.wells import (
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
+    LOWER_END,
     NOT_PERIODIC,
     PERIOD,
     SPAN_KNOWN,
     SPANS,
     TURNING_POINTS,
+    UPPER_END,
     Answers,
 )
 
@@ -119,6 +121,17 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
 
 
 @Inner
+def fill_ends(orbits, kind, answers):  # type: ignore[no-untyped-def]
+    """Fill the turning points beside times if there are columns for them; laps have NaN and infinity there."""
+    rows, out, laps = orbits.rows, answers.values, kind == CIRCULATION
+    if out.shape[1] > UPPER_END:
+        for j in range(orbits.size):
+            k = int(rows[INDEX, j])
+            out[k, LOWER_END] = choose(laps, nan, rows[END_LOW, j])
+            out[k, UPPER_END] = choose(laps, inf, rows[END_HIGH, j])
+
+
+@Inner
 def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Prove orbits of one kind, and fill the answers for those that are proved; ``spare`` stores the others
     meanwhile.
@@ -142,10 +155,12 @@ def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers): 
         orbits = shrink(orbits, count, scratch.chosen, proved, TIME_ROWS)
         if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
             answer_spans(orbits, kind.kind, quantity, answers)
-        elif orbits.size and kind.kind == AGM_LIBRATION:
-            half_periods_by_agm(fns, orbits, scratch, quantity, answers)
         elif orbits.size:
-            times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
+            fill_ends(orbits, kind.kind, answers)
+            if kind.kind == AGM_LIBRATION:
+                half_periods_by_agm(fns, orbits, scratch, quantity, answers)
+            else:
+                times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
         if unproved == 0:
             return
         orbits, spare = Orbits(waiting, spare.rows, spare.params), orbits
@@ -281,7 +296,7 @@ def answer_batches(fns, layout, columns, monotone, quantity, answers):  # type: 
     quantity : int
         HALF_PERIOD, PERIOD, TURNING_POINTS or SPANS.
     answers : Answers
-        Filled in.
+        Filled in: the quantity, and beside times, if there are columns for them, both turning points.
     """
     count = columns.shape[0] - PARAMETERS
     size = (count + max(layout[0], layout[1])) * BATCH

@@ -95,6 +95,23 @@ def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
         assert np.abs(motion.state(t).lam - (place + ways * spent * (v + rate * spent / 2))).max() <= PLACES * high
 
 
+@pytest.mark.parametrize("mu", [0.05, 0.2])
+def test_sweeps_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
+    """Sweeps find turns by data kept of the planes, also where the turn is close to a corner (bodies passed through
+    whole planes, or turned for ever).
+    """
+    module, points = track
+    high = sum(math.dist(a, b) for a, b in pairwise(points))
+    lam0 = np.random.default_rng(3).uniform(0.0, high, 4 * LAUNCHES)
+    times, places = (module.sweep(what, lam0, 0.0, mu=mu, b=0).values for what in ("t_end", "rest_position"))
+    for start, time, place in zip(lam0.tolist(), times, places, strict=True):
+        rows, end = slide(points, start, 0.0, 1, mu)
+        if len(rows) > 1:
+            assert abs(time - rows[-1, 0]) <= TIMES * rows[-1, 0]
+        if end == "rest":
+            assert abs(place - rows[-1, 1]) <= PLACES * high
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_drag_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
     """Random launches with drag are followed and only lose energy; with friction as well they are followed to their
