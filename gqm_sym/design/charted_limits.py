@@ -86,7 +86,7 @@ def along_shaped_chart(
     moved = np.vstack([stretched, float(from_end) * ends[:1]])
     shaped = [k in shaping for k in columns]
     at, changes = _at_lengths(shape, np.append(places, start), moved, shaped)
-    shape_values, slopes = _shape_slopes(at[:, :-1], changes[:, :-1])
+    shape_values, slopes = shape_slopes(at[:, :-1], changes[:, :-1])
     found = Limited(dict(zip(LIMITS, shape_values, strict=False)), dict(zip(LIMITS, slopes, strict=False)))
     found.values["normal_force"] = model.pass1(request, parameters, places).normal_force
     if isinstance(model.exact, ExactPotential):
@@ -94,14 +94,14 @@ def along_shaped_chart(
         launch = problem.launch.v0.value, at[:2, -1], changes[:2, -1]
         found.slopes["normal_force"] = _force_slopes(source, inputs_of(p), launch, (at, changes), columns)
     elif isinstance(model.exact, ExactChartLaw):
-        force = _lossy_slopes(problem, places, np.isfinite(found.values["normal_force"]))
+        force = lossy_slopes(problem, places, np.isfinite(found.values["normal_force"]))
         if force is not None:
             by_launch = force[1 + len(p)][:, None] * moved[-1]
             found.slopes["normal_force"] = force[1:].T[:, columns] + by_launch + force[0][:, None] * stretched
     return found
 
 
-def _lossy_slopes(problem: Problem, places: Array, passed: NDArray[np.bool_]) -> Array | None:
+def lossy_slopes(problem: Problem, places: Array, passed: NDArray[np.bool_]) -> Array | None:
     """Return the derivatives of the contact force with losses with respect to the place and to all variables at given
     arc lengths, with a column for each place that is passed; None if there are none.
     """
@@ -157,7 +157,7 @@ def _at_lengths(shape: ShapedPieces, lengths: Array, moved: Array, shaped: list[
     return at, changes
 
 
-def _shape_slopes(at: Array, changes: Array) -> tuple[list[Array], list[Array]]:
+def shape_slopes(at: Array, changes: Array) -> tuple[list[Array], list[Array]]:
     """Return height, slope and curvature at points (`_at_lengths`), and their changes."""
     _, z, dx, dz, bend_x, bend_z = at
     _, z_by, dx_by, dz_by, bend_x_by, bend_z_by = changes

@@ -23,9 +23,11 @@ from gqm_sym.design.limits import (
     along_spline,
     end_slopes,
     margins_of,
+    places_between,
     read_limits,
     slopes_of,
 )
+from gqm_sym.design.moving_points import lossy_limits, problem_of, slopes_by_heights, source_along
 from gqm_sym.design.shape import SplineChanges, time_gradient
 from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
 from gqm_sym.fitting.quotients import central_differences
@@ -34,7 +36,6 @@ from gqm_sym.parameters import exact_value
 from gqm_sym.runtime.charts.interpolation import MIN_POINTS
 from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.model import CompiledModel
@@ -102,8 +103,9 @@ def minimise(
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
     curve with parameters they are those of ``motion.gradient`` and of all limits. For a track through points they are
-    those of all limits by all its points together, if the body loses no energy, and those of the time to its end, if
-    the body is also launched from the first point, which does not move. The result is a local minimum.
+    those of all limits and of the solved motion by all its points together. The time of a body that loses no energy and
+    does not swing has them if it is that from the first point, which does not move, to the end of the track. The result
+    is a local minimum.
 
     Examples
     --------
@@ -369,33 +371,39 @@ class _Points(_Tracks):
         return replace(self._compiled, chart=Sampled(text)), {}
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
-        """Return the derivatives of the time to the end of the track, for a body that loses no energy and is launched
-        from the first point, which does not move.
+        """Return the derivatives of a quantity by all heights together.
+
+        Those of the time to the end of the track, for a body that loses no energy and is launched from the first point,
+        which does not move, are an integral along the track. Others are those of a solved motion.
         """
         model, request, parameters, (low, _) = self._launch(x)
         numbers, points = model.numbers(parameters), self._heights(x)
         launch = read_launch(model, numbers, request)
-        if (
-            not isinstance(model.exact, ExactPotential)
-            or (quantity, launch.direction, launch.lam0.value) != ("time_at", 1, low)
-            or ("lam" in self._given or model.rolling_radius or 0 in self._moved or len(points) > MIN_POINTS)
-        ):
+        if model.rolling_radius or len(points) > MIN_POINTS:
             return None
-        p = tuple(number.value for number in numbers)
-        return time_gradient(points, self._moved, model.exact.effective_potential, p, launch.v0.value)
+        begins = (quantity, launch.direction, launch.lam0.value) == ("time_at", 1, low) and 0 not in self._moved
+        if isinstance(model.exact, ExactPotential) and begins and "lam" not in self._given:
+            p = tuple(number.value for number in numbers)
+            return time_gradient(points, self._moved, model.exact.effective_potential, p, launch.v0.value)
+        lam = self._given.get("lam") if quantity == "time_at" else None
+        asked = "t_end" if quantity == "time_at" and lam is None else quantity
+        try:
+            return slopes_by_heights(problem_of(model, request, parameters, points, self._moved), asked, lam)
+        except GQMError:
+            return None
 
     def _limited(self, x: Array, between: Any) -> Limited:
-        """Return the quantities along a spline, with their derivatives if the body loses no energy."""
+        """Return the quantities along a spline, with their derivatives."""
         model, request, parameters, ends = self._launch(x)
         points = self._heights(x)
-        if not isinstance(model.exact, ExactPotential) or points.shape[1] > 2 or model.rolling_radius:
+        if points.shape[1] > 2 or model.rolling_radius:
             return super()._limited(x, between)
-        numbers, names = model.numbers(parameters), list(model.parameters)
-        launch = read_launch(model, numbers, request)
-        source = ChartSource(model.exact.effective_potential, model.inertia, len(names), names.index("m"), ())
-        p = tuple(number.value for number in numbers)
-        changes = SplineChanges(points, self._moved)
-        return along_spline(changes, source, (p, launch.lam0.value, launch.v0.value), ends, between)
+        if not isinstance(model.exact, ExactPotential):
+            force = model.pass1(request, parameters, places_between(ends, between)).normal_force
+            return lossy_limits(problem_of(model, request, parameters, points, self._moved), force, between)
+        numbers, changes = model.numbers(parameters), SplineChanges(points, self._moved)
+        launch, p = read_launch(model, numbers, request), tuple(number.value for number in numbers)
+        return along_spline(changes, source_along(model), (p, launch.lam0.value, launch.v0.value), ends, between)
 
     def track(self, x: Array) -> Curve:
         """Return the track through the points with these heights. They are not measured, so they have no scatter."""

@@ -10,6 +10,7 @@ with the potential's derivative U_n along the normal. The time is an integral ov
 points takes one set of nodes.
 """
 
+from functools import cached_property
 from math import factorial
 from typing import Any
 
@@ -20,9 +21,15 @@ from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.runtime.charts.interpolation import DEGREE, Ends, arc_length_knots, interpolated
 from gqm_sym.runtime.compiled.types import Array
 
-# The number of Gauss-Legendre nodes between two points. The lengths between points change by this many iterations, each
-# of which gains some digits.
+# The number of Gauss-Legendre nodes between two points, and of Newton steps to the place at a length.
 NODES, ITERATIONS = 16, 8
+_NODES, _WEIGHTS = leggauss(NODES)
+SHARES, WEIGHTS = 0.5 + 0.5 * _NODES, 0.5 * _WEIGHTS
+
+# The rule for the lengths between points from which knots follow (`charts.interpolation`): places, as shares of an
+# interval, and weights.
+LENGTH_SHARES = np.arange(9) / 8.0
+LENGTH_WEIGHTS = (8.0 * np.array([1, 4, 2, 4, 2, 4, 2, 4, 1]) - np.array([1, 0, 4, 0, 2, 0, 4, 0, 1])) / 180.0
 
 
 class SplineChanges:
@@ -41,6 +48,8 @@ class SplineChanges:
         The spline.
     knots : (n,) array
         Its knots, which are its arc lengths at the points.
+    shifts : (n, k) array
+        The changes of the knots.
     lengthening : (k,) array
         The changes of its length.
     place, weight : (n - 1, NODES + 1) arrays
@@ -59,23 +68,38 @@ class SplineChanges:
         place, weight = knots[0] + root * root, 2.0 * root * halves * weights
         self.place = np.hstack([place, knots[1:, None]])
         self.weight = np.hstack([weight, np.zeros((len(weight), 1))])
-        self._cardinal = interpolated(np.eye(len(points))[:, moved], knots, ends)
+        self._ends, cardinal = ends, interpolated(np.eye(len(points))[:, moved], knots, ends)
         # A spline changes by a power of the distance behind each knot that moves: its fifth derivative jumps there.
         pieces = self.spline(0.5 * (knots[1:] + knots[:-1]), DEGREE)
-        jumps = np.zeros_like(points)
-        jumps[1:-1] = np.diff(pieces, axis=0)
-        at_knots, first = self.spline(knots, 1), self.spline(self.place, 1)
-        tangent = first / np.linalg.norm(first, axis=-1, keepdims=True)
-        speed = np.hypot(*at_knots.T)[:, None]
-        shifts = np.zeros((len(points), len(moved)))
-        for _ in range(1 + ITERATIONS):
-            self._kicks = [-jumps[:, axis, None] * shifts for axis in range(2)]
-            self._filled = [self._passing(axis, shifts, ends) for axis in range(2)]
-            moves = np.einsum("nia,anik,ni->nk", tangent, self.at(self.place, 1), self.weight)
-            # The length between two knots also changes because they move.
-            moves += np.diff(speed * shifts, axis=0)
-            shifts = np.vstack([np.zeros(len(moved)), np.cumsum(moves, axis=0)])
-        self.lengthening = shifts[-1]
+        self._jumps = np.zeros_like(points)
+        self._jumps[1:-1] = np.diff(pieces, axis=0)
+        # The knots are the lengths, which change with the points and with the knots themselves.
+        by_points = self._lengths_after(np.zeros((len(points), len(moved))), cardinal)
+        by_knots = self._lengths_after(np.eye(len(points)), None)
+        shifts = np.asarray(np.linalg.solve(np.eye(len(points)) - by_knots, by_points), dtype=np.float64)
+        self._move(shifts, cardinal)
+        self.shifts: Array = shifts
+        self.lengthening = self.lengthened(knots[-1:])[0] + np.hypot(*self.spline(knots[-1], 1)) * shifts[-1]
+
+    def _move(self, shifts: Array, cardinal: Any) -> None:
+        """Let the knots move by ``shifts``, and the points as ``cardinal`` says; None if they stay."""
+        self._cardinal = cardinal
+        self._kicks = [-self._jumps[:, axis, None] * shifts for axis in range(2)]
+        self._filled = [self._passing(axis, shifts, self._ends) for axis in range(2)]
+
+    def _lengths_after(self, shifts: Array, cardinal: Any) -> Array:
+        """Return the changes of the lengths up to all knots after `_move`, by the rule from which the knots follow."""
+        self._move(shifts, cardinal)
+        widths = np.diff(self.knots)
+        place = self.knots[:-1, None] + widths[:, None] * LENGTH_SHARES
+        first, second = self.spline(place, 1), self.spline(place, 2)
+        speed = np.linalg.norm(first, axis=-1)
+        moved = shifts[:-1, None] + np.diff(shifts, axis=0)[:, None] * LENGTH_SHARES[:, None]  # with the knots
+        rates = np.moveaxis(self.at(place, 1), 0, 2) + second[..., None] * moved[:, :, None]
+        faster = np.einsum("nia,niak->nik", first / speed[..., None], rates)
+        moves = np.einsum("nik,i,n->nk", faster, LENGTH_WEIGHTS, widths)
+        moves += (speed @ LENGTH_WEIGHTS)[:, None] * np.diff(shifts, axis=0)
+        return np.vstack([np.zeros(shifts.shape[1]), np.cumsum(moves, axis=0)])
 
     def _passing(self, axis: int, shifts: Array, ends: Ends) -> Any:
         """Return the change of a coordinate, less the powers behind its knots, if the knots move by ``shifts``.
@@ -92,7 +116,10 @@ class SplineChanges:
     def _behind(self, place: Array, order: int) -> Array:
         """Return the powers of the distances behind all knots, divided by the factorial, or a derivative of them."""
         power = DEGREE - 1 - order
-        found: Array = np.maximum(place[..., None] - self.knots, 0.0) ** power / factorial(power)
+        if power < 0:
+            return np.zeros((*place.shape, len(self.knots)))
+        distance = place[..., None] - self.knots
+        found: Array = np.where(distance > 0.0, distance**power / factorial(power), 0.0)
         return found
 
     def at(self, place: Array, order: int) -> Array:
@@ -107,7 +134,31 @@ class SplineChanges:
         found = np.array(
             [filled(place, order) + behind @ kicks for filled, kicks in zip(self._filled, self._kicks, strict=True)]
         )
-        found[1] += self._cardinal(place, order)
+        if self._cardinal is not None:
+            found[1] += self._cardinal(place, order)
+        return found
+
+    def _longer(self, begin: Array, end: Array) -> Array:
+        """Return the changes of the lengths of parts of the spline, between fixed values of its parameter."""
+        widths = end - begin
+        inner = begin[:, None] + widths[:, None] * SHARES
+        first = self.spline(inner, 1)
+        tangent = first / np.linalg.norm(first, axis=-1, keepdims=True)
+        longer: Array = np.einsum("nia,anik,i,n->nk", tangent, self.at(inner, 1), WEIGHTS, widths)
+        return longer
+
+    @cached_property
+    def _longer_before(self) -> Array:
+        """The changes of the lengths up to all knots."""
+        longer = self._longer(self.knots[:-1], self.knots[1:])
+        return np.vstack([np.zeros(longer.shape[1]), np.cumsum(longer, axis=0)])
+
+    def lengthened(self, place: Array) -> Array:
+        """Return the changes of the lengths from the first point to fixed values of the spline's parameter: a row for
+        each.
+        """
+        number = np.clip(np.searchsorted(self.knots, place, side="right") - 1, 0, len(self.knots) - 2)
+        found: Array = self._longer_before[number] + self._longer(self.knots[number], place)
         return found
 
     def at_lengths(self, lengths: Array, moved: Array) -> tuple[Array, Array]:
@@ -125,8 +176,7 @@ class SplineChanges:
         (6, m) and (6, m, k) arrays
             x, z, their first derivatives with respect to the spline's parameter, and their second ones.
         """
-        nodes, weights = leggauss(NODES)
-        shares, weights = 0.5 + 0.5 * nodes, 0.5 * weights
+        shares, weights = SHARES, WEIGHTS
 
         def ahead(begin: Array, end: Array) -> Array:
             """Return the lengths of parts of the spline."""
@@ -141,15 +191,8 @@ class SplineChanges:
         for _ in range(ITERATIONS):
             missing = lengths - edges[number] - ahead(begin, place)
             place = place + missing / np.hypot(*self.spline(place, 1).T)
-        starts, widths = np.append(self.knots[:-1], begin), np.append(np.diff(self.knots), place - begin)
-        inner = starts[:, None] + widths[:, None] * shares
-        first = self.spline(inner, 1)
-        tangent = first / np.linalg.norm(first, axis=-1, keepdims=True)
-        longer = np.einsum("nia,anik,i,n->nk", tangent, self.at(inner, 1), weights, widths)
-        count = len(self.knots) - 1
-        before = np.vstack([np.zeros(longer.shape[1]), np.cumsum(longer[:count], axis=0)])
         orders = [np.moveaxis(self.spline(place, order), -1, 0) for order in range(4)]
-        shift = (moved - before[number] - longer[count:]) / np.hypot(*orders[1])[:, None]
+        shift = (moved - self.lengthened(place)) / np.hypot(*orders[1])[:, None]
         changes = [self.at(place, order) + orders[order + 1][..., None] * shift for order in range(3)]
         return np.concatenate(orders[:3]), np.concatenate(changes)
 

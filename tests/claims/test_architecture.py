@@ -145,6 +145,7 @@ TESTED_THROUGH = {
     "legs/followed.py": "runtime/legs/test_dissipative.py",
     "legs/frames/entering.py": "runtime/legs/frames/test_local_frame.py",
     "legs/inherited.py": "runtime/legs/test_leg_errors.py",
+    "legs/kinks/places.py": "runtime/legs/kinks/test_parts.py",
     "legs/layout.py": "claims/test_dissipative.py",
     "legs/leg_reading.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/leg_record.py": "claims/test_dissipative.py",

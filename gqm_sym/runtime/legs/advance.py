@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.body import (
     FROM_REST,
     HIGH,
     HORIZON,
+    KINKS,
     LAM0,
     LAPS,
     LAST_LEG,
@@ -48,6 +49,7 @@ from gqm_sym.runtime.legs.body import (
     V2,
     WIDTH_BEFORE,
 )
+from gqm_sym.runtime.legs.kinks.places import ROOM_FOR_KINKS
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -77,7 +79,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_NARROW,
     END_TURN,
 )
-from gqm_sym.runtime.legs.runs.follow import direction_from_rest, follow
+from gqm_sym.runtime.legs.runs.follow import IN_PARTS, direction_from_rest, follow
 from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
@@ -268,6 +270,8 @@ def fold(body):  # type: ignore[no-untyped-def]
         body[PLACE], low = two_sum(body[PLACE], -laps * period)
         body[PLACE_LOW] += low
         body[LAPS] += laps
+        if laps != 0.0:
+            body[KINKS] = 0.0
 
 
 @Inner
@@ -321,11 +325,14 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     width = expected_width(body)
     blocks, branch = blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
+    # Along a chart, legs are followed by other data.
+    has_kinks = dissipation.kinked and dissipation.linear and joints.breaks.size == 0
+    kinks = body[KINKS : KINKS + (ROOM_FOR_KINKS if has_kinks else 1)]
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:
         start = RunStart(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
-            *(width, blocks, branch),
+            *(width, blocks, branch, kinks),
         )
         route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
@@ -344,7 +351,8 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
     width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
     body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0
-    note_blocks(body, body[LAST_WIDTH], found.blocks)
+    if found.blocks != IN_PARTS:
+        note_blocks(body, body[LAST_WIDTH], found.blocks)
     body[BRANCH], body[BRANCH_HEIGHT] = found.branch
     body[TURNS] += 1.0
     body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0

@@ -65,6 +65,7 @@ from gqm_sym.runtime.legs.leg_record import (
     PANELS,
     PASSAGE,
     PEAKS,
+    ROWS,
     START,
     START_V2,
     TIMES,
@@ -146,6 +147,10 @@ class Track(NamedTuple):
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
         is_possible = dissipation.linear or dissipation.squared_contact != 0
         return is_possible and self.breaks.size > 0 and self.chart.size > 0
+
+    def has_kinks(self, dissipation: Dissipation) -> bool:
+        """Return whether legs may be followed past kinks of the law without panels (`kinks.parts`)."""
+        return dissipation.kinked and dissipation.linear and not self.breaks.size
 
 
 class Findings(NamedTuple):
@@ -315,14 +320,15 @@ def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
 
 @Inner
 def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no-untyped-def]
-    """Advance a body by one leg, with the data kept of the gaps between breaks; ``before`` becomes a copy of the body
-    before the leg.
+    """Advance a body by one leg, with the data kept of the gaps between breaks or past kinks; ``before`` becomes a copy
+    of the body before the leg.
 
-    A leg that ends at a turn, or at the limit of a run, has a record without panels, which `RUN_AGAIN` fills in.
+    A leg that ends at a turn, or at the limit of a run, may have a record without panels, which `RUN_AGAIN` fills in.
     """
     for k in range(SIZE):
         before[k] = body[k]
-    what = advance(dissipation, p, joints, body, Reading(TIMES, False, False, 1.0, -inf), record)
+    reads = TIMES if joints.gaps.size > 0 else ROWS
+    what = advance(dissipation, p, joints, body, Reading(reads, False, False, 1.0, -inf), record)
     if what in (END_TURN, END_REST, END_LIMIT, END_RECORD_FULL):
         return what
     for k in range(SIZE):
@@ -338,7 +344,8 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
     where there is space for a whole row of ``records``, so that how a leg is followed does not depend on those before.
     """
     what, count, used, body = END_REST, 0, 0, bodies[0]
-    line, size, keeps = records.reshape(-1), records.shape[1], joints.gaps.size > 0
+    line, size = records.reshape(-1), records.shape[1]
+    keeps = joints.gaps.size > 0 or (dissipation.kinked and bodies.shape[0] > 1)
     while used + size <= line.size and not (keeps and count + 1 >= bodies.shape[0]):
         record = line[used : used + size]
         if keeps:
@@ -382,7 +389,7 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         the number of legs that have been followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
     bodies : (n, SIZE) array
         The bodies (`legs.body`), which are moved on. For questions up to RUN_AGAIN there is one body, in the first row;
-        if data of gaps are kept, the other rows become copies of it before each leg.
+        if legs may have to be followed again, there are other rows, which become copies of it before each leg.
     records : (n, size) array
         Filled with legs of the first body (`leg_record`), one directly behind the other; TOTAL is the number of
         elements that they take. For other questions the first row is work space.

@@ -40,6 +40,7 @@ LEAST_SIZE            a size of places below which their roundings do not decrea
 TOTAL, LAST_AT        how many elements the records of the last call take, and where the last of them begins (counted
                       for `solve`)
 BRANCH, BRANCH_HEIGHT the branch point of ds that the last leg passed by (`runs.leg_variable`)
+KINKS                 the beginning of what is known of kinks of the law (`kinks.places`)
 VALUE, STATUS         the quantity that was asked for, and whether it has a value (`answers`)
 ===================== ===========================================================================================
 """
@@ -49,12 +50,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.legs.kinks.places import ROOM_FOR_KINKS
 
 LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
 LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
-UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, SIZE = range(34, 42)
+UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, KINKS = range(34, 42)
+SIZE = KINKS + ROOM_FOR_KINKS
 
 # A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest
 # doubles.

@@ -56,7 +56,7 @@ class Conditions(NamedTuple):
     parameters : (1, n) array
         The run-time parameters, followed by the curve's chart if it has one.
     passes : bool
-        Whether legs are followed by the data kept of gaps, and may have to be followed again.
+        Whether legs are followed by the data kept of gaps, or past kinks, and may have to be followed again.
     space : int
         The number of panels for which a record has space.
     lines : array
@@ -79,7 +79,7 @@ def conditions_of(problem: Problem) -> Conditions:
         f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
         assert f.dissipation is not None
         track = Track(f.chart, f.joints, f.corners, f.liftoff_corners(only_sign)) if f.chart.size else SMOOTH
-        passes = track.is_kept(f.dissipation)
+        passes = track.is_kept(f.dissipation) or track.has_kinks(f.dissipation)
         given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
         lines = launched((given,), LEGS_PER_CALL if passes else 0)
         if f.chart.size:

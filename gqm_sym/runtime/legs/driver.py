@@ -223,7 +223,7 @@ class Driver:
 
     def with_panels(self, run: Run) -> list[Run]:
         """Return a run divided into parts with panels; the run alone if its panels are known."""
-        if run.before is None:
+        if run.before is None or run.has_rows:
             return [run.as_panels(self._horizon)]
         parts: list[Array] = []
         space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()

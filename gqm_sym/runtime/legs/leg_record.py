@@ -33,7 +33,8 @@ A panel is a row of COLUMNS numbers. It has, at its nodes, the rates of time and
 per mass (from NORMAL_LOAD on). After each of the first three there is one more number: RIGHT (the march variable at the
 panel's end), TIME, and TIME_ERROR (the error of the time). The last number is INHERITED (`leg_errors`). A panel that
 was passed by the data kept of a gap (`runs.gaps`) has its nodes in terms of distance, V in place of Y, no rates, and
-TIME_ERROR = NO_RATES; with NO_VALUES it has RIGHT and TIME alone.
+TIME_ERROR = NO_RATES; with NO_VALUES it has RIGHT and TIME alone. A leg past kinks (`kinks.parts`) has one panel
+like the latter, or with TIME_ERROR = KNOWN_PEAK and the peak that is read in place of Y.
 
 A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
 which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).
@@ -61,16 +62,16 @@ END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE
 WHOLE, WHOLE_WIDTH, RISING, FALLING, EXTENT, AHEAD, BACK, USED, HEAD = range(15, 24)
 
 # The data that are read from a record (`runs.route.Reading`): the times and places between which the leg runs; also the
-# largest or smallest speed or contact force; the time at which the body passes a place; or everything that panels
-# contain.
-TIMES, PEAKS, PASSAGE, PANELS = range(4)
+# largest or smallest speed or contact force; the time at which the body passes a place; everything that panels contain;
+# or that for a leg which is followed in a way that gives it, and for another one the first.
+TIMES, PEAKS, PASSAGE, PANELS, ROWS = range(5)
 
 COLUMNS = 4 * WIDE
 MAX_ROWS, ROWS_COUNT_AS = 4, 2
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 FIELD_COLUMNS = 2 + 2 * COUNT
-NO_RATES, NO_VALUES = -1.0, -2.0
+NO_RATES, NO_VALUES, KNOWN_PEAK = -1.0, -2.0, -3.0
 
 
 @Inlined

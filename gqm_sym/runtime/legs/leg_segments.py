@@ -35,6 +35,7 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_START,
     USED,
     WHOLE,
+    WHOLE_WIDTH,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
@@ -142,13 +143,18 @@ class Run(NamedTuple):
         """Return the run with panels, if its record has rows of the whole leg; ``until`` is as in `with_panels`."""
         if not self.record.item(WHOLE):
             return self
-        return tuple.__new__(Run, (lay_panels(self.record), *self[1:5], self._passed(until)))
+        return tuple.__new__(Run, (lay_panels(self.record), *self[1:4], None, self._passed(until)))
 
     def _passed(self, until: float) -> Array | None:
         """Return the record, if the motion may end at the time ``until`` within the run."""
         number = self.record.item
         begin, times = number(BEGIN), number(TIME_FROM_START) + number(TIME_FROM_END)
         return self.record if begin <= until <= begin + 2.0 * times else None
+
+    @property
+    def has_rows(self) -> bool:
+        """Whether its record has rows of the whole leg, from which panels can be made."""
+        return self.record.item(WHOLE) > 0.0 and self.record.item(WHOLE_WIDTH) > 0.0
 
     @property
     def has_panels(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_path_in_space, call_potential_divdiff1
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS, SPACE_ROWS
 
@@ -72,16 +72,11 @@ def fill_squares(curve, direction, n, lam, v2, out):  # type: ignore[no-untyped-
 
 
 @Inner
-def fill_force(curve, sought, n, lam, v2, frame, out):  # type: ignore[no-untyped-def]
-    """Fill the contact force at n places, or the square of its length if that is sought, and ``frame`` with the path.
-
-    ``sought`` has the function that is searched, and the direction of motion if the force depends on it, otherwise 0.
+def fill_force(curve, function, n, lam, v2, frame, out):  # type: ignore[no-untyped-def]
+    """Fill the contact force at n places, or the square of its length if that is the function that is searched, and
+    ``frame`` with the path.
     """
-    function, direction = sought
     call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
-    if function == FORCE_SQUARED and direction != 0:
-        fill_squares(curve, direction, n, lam, v2, out)
-        return
     for i in range(n):
         force = frame[4 * n + i]
         out[i] = force * force if function == FORCE_SQUARED else force
@@ -91,19 +86,26 @@ def fill_force(curve, sought, n, lam, v2, frame, out):  # type: ignore[no-untype
 def is_loop(orbit, sought):  # type: ignore[no-untyped-def]
     """Return whether the function that is sought is searched along a whole lap or period.
 
+    ``sought`` has the function that is searched, and the direction of motion if the force depends on it, otherwise 0.
     That is so for circulations, and for librations if the force depends on the direction of motion.
     """
     return orbit.circulates or sought[1] != 0
 
 
-@Inner
-def sample_loads(curve, orbit, sought, shares, n, out, frame):  # type: ignore[no-untyped-def]
-    """Fill the function that is sought (`fill_force`) at n shares of an orbit's width from its lower end.
+@Inlined
+def way_at(orbit, direction, share):  # type: ignore[no-untyped-def]
+    """Return the sign of ds/dt at a share of a lap, or of a period of a libration."""
+    return direction if orbit.circulates else 1 if floor(2.0 * share) % 2.0 == 0.0 else -1
 
-    If a libration is searched along its whole period (`is_loop`), they are shares of the period's phase angle. For the
-    contact force, and only then, ``frame`` is filled with the path. V**2 is its value at launch less its decrease from
-    there. Next to a turning point its error is a rounding of the largest V**2 on the orbit, not of the small value
-    itself.
+
+@Inner
+def sample_loads(curve, orbit, sought, shares, n, out, frame, with_path):  # type: ignore[no-untyped-def]
+    """Fill the function that is sought (`is_loop`) at n shares of an orbit's width from its lower end.
+
+    If a libration is searched along its whole period, they are shares of the period's phase angle. For the contact
+    force, and only then, ``frame`` is filled with the path, unless ``with_path`` is false and it is not needed. V**2 is
+    its value at launch less its decrease from there. Next to a turning point its error is a rounding of the largest
+    V**2 on the orbit, not of the small value itself.
     """
     offsets, lam, rows, v2 = line_buffer(), line_buffer(), pair_buffer(), line_buffer()
     width, there_and_back = orbit.high - orbit.low, sought[1] != 0 and not orbit.circulates
@@ -116,14 +118,18 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame):  # type: ignore[n
         out[i] = v2[i] = max(orbit.v2 - 2.0 * offsets[i] * rows[i], 0.0)
     if sought[0] == V2:
         return
-    if not there_and_back:
-        fill_force(curve, sought, n, lam, v2, frame, out)
+    if sought[1] == 0:
+        fill_force(curve, sought[0], n, lam, v2, frame, out)
         return
-    fill_force(curve, (sought[0], 1), n, lam, v2, frame, out)
-    fill_squares(curve, -1, n, lam, v2, offsets)
-    for i in range(n):
-        if floor(2.0 * shares[i]) % 2.0 != 0.0:
-            out[i] = offsets[i]
+    if with_path:
+        call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
+    begin = 0
+    while begin < n:
+        way, end = way_at(orbit, sought[1], shares[begin]), begin + 1
+        while end < n and way_at(orbit, sought[1], shares[end]) == way:
+            end += 1
+        fill_squares(curve, way, end - begin, lam[begin:end], v2[begin:end], out[begin:end])
+        begin = end
 
 
 @Inner
@@ -199,7 +205,7 @@ def find_peaks(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore[
             if grids > 1:
                 share = (grid + LAP_SHARES[i]) / grids
                 shares[i] = share if loop else sin(0.5 * pi * share) ** 2
-        sample_loads(curve, orbit, sought, shares, GRID_POINTS, out, frame)
+        sample_loads(curve, orbit, sought, shares, GRID_POINTS, out, frame, True)
         for i in range(min(grid, 1), GRID_POINTS):
             j = grid * GRID_INTERVALS + i
             weight, is_coarse = 0.5 if j in (0, count) else 1.0, i % 2 == 0
@@ -237,7 +243,7 @@ def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-unt
         if not is_loop(orbit, sought):
             for i in range(3):
                 points[i] = sin(0.5 * pi * points[i]) ** 2
-        sample_loads(curve, orbit, sought, points, 3, found, frame)
+        sample_loads(curve, orbit, sought, points, 3, found, frame, False)
         f1, f0, f2 = found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
     return np.nan
@@ -259,7 +265,7 @@ def highest_top(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore
 
 @Inner
 def extreme(curve, orbit, sought, sign):  # type: ignore[no-untyped-def]
-    """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit; `fill_force` explains
+    """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit; `is_loop` explains
     ``sought``.
 
     Parabolas through three points are repeated with smaller and smaller steps. At an extreme the function is flat, so
@@ -275,7 +281,7 @@ def extreme(curve, orbit, sought, sign):  # type: ignore[no-untyped-def]
     if orbit.even and not (orbit.circulates or force):
         points, frame = point_buffer(), frame_buffer()
         points[0] = 0.5
-        sample_loads(curve, orbit, sought, points, 1, sums, frame)
+        sample_loads(curve, orbit, sought, points, 1, sums, frame, False)
         return sqrt(sums[0])
     grids = 1
     while grids <= MAX_GRIDS:

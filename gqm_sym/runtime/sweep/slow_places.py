@@ -133,7 +133,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
     v2, cuts, places = grid_buffer(), place_buffer(), place_buffer()
     slowest, slopes = place_buffer(), place_buffer()
     part_orbit = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
-    sample_loads(curve, part_orbit, (V2, 0), WIDTH_SHARES, GRID_POINTS, v2, v2)
+    sample_loads(curve, part_orbit, (V2, 0), WIDTH_SHARES, GRID_POINTS, v2, v2, False)
     # The ends are known with their rounding errors; the places in between are doubles.
     (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
     count, peak, at_peak, largest = 0, -1.0, 0, 0.0

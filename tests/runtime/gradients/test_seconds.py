@@ -80,6 +80,36 @@ def test_the_reference_number(circle: ModuleType) -> None:
     assert found["v0"]["v0"] == pytest.approx(0.5 * motion.period_slope, rel=2 * ULP)
 
 
+def on_ellipse(lam0: Any, v0: Any, a: Any, b: Any, g: Any) -> Any:
+    """Return the period of a bead on an ellipse x = a cos(lam), z = b sin(lam), by the trapezoidal rule."""
+    n, square = 96, v0**2 / (2 * g * b) + (1 + mp.sin(lam0))
+    angles = [2 * mp.pi * (2 * k + 1) / (2 * n) for k in range(n)]
+
+    def ds(cosine: Any) -> Any:
+        return mp.sqrt(a**2 * cosine**2 + b**2 * (1 - cosine**2))
+
+    if square > 2:
+        return mp.fsum(ds(mp.cos(u)) / mp.sqrt(2 * g * b * (square - 1 + mp.cos(u))) for u in angles) * 2 * mp.pi / n
+    # sin(u/2) is a share, which is the sine of the new variable, of its value at the turning point.
+    rates = (ds(1 - square * mp.sin(x) ** 2) / mp.sqrt(1 - square / 2 * mp.sin(x) ** 2) for x in angles)
+    return mp.fsum(rates) * 2 * mp.pi / n / mp.sqrt(g * b)
+
+
+@pytest.mark.parametrize("launch", [("-2/5", "0"), ("-9/4", "2"), ("1/2", "13")])
+def test_parameters_that_shape_a_curve(launch: tuple[str, str]) -> None:
+    """On an ellipse, the second derivatives with respect to its axes are those of differences of 60 digits."""
+    at = {"lam0": launch[0], "v0": launch[1], "a": "5/4", "b": "3/4", "g": "9.81"}
+    module = load(str(ROOT / "generated" / "ellipse.py"), "ellipse")
+    found = module.solve(**at).gradient("period", tuple(at), order=2)
+    with mp.workdps(60):
+        fractions = {name: Fraction(text) for name, text in at.items()}
+        numbers = {name: mpf(x.numerator) / x.denominator for name, x in fractions.items()}
+        for one, other in combinations_with_replacement(at, 2):
+            wanted = second(on_ellipse, numbers, one, other)
+            size = abs(wanted) + abs(on_ellipse(**numbers)) * 1e-3
+            assert abs(found[one][other] - wanted) <= 4 * ULP * size, (one, other)
+
+
 def test_an_asymmetric_well(generated_folder: Path) -> None:
     """On z = x**2 + c*x**3 second derivatives agree with differences of first derivatives, which are exact."""
     module = gqm.build(

@@ -2,11 +2,11 @@
 
 The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). The
 displacements are differences of these polynomials for neighbouring values of a parameter; they have some 20 digits,
-because the polynomials have 31.
+because the polynomials have 31. Of some curves the maker of the chart knows the displacements.
 """
 
 from fractions import Fraction
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numba import types
@@ -110,6 +110,25 @@ def shaping_of(formulas: Formulas) -> tuple[int, ...]:
     return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
 
 
+class Displacements(Protocol):
+    """The displacements of the points of a chart by all parameters that shape it, which its maker knows."""
+
+    def points(self, places: Array, orders: int) -> Array:
+        """Return the displacements at places with their derivatives with respect to u below an order.
+
+        Returns
+        -------
+        (parameters, orders * dimension, n) array
+            For each parameter the rows of order 0, then those of order 1, and so on.
+        """
+
+    def pairs(self, places: Array) -> Array:
+        """Return the displacements at places as two doubles each, of shape (parameters, dimension, 2, n)."""
+
+    def arc_lengths(self, places: Array) -> Array:
+        """Return the increase of the arc length from the start point to points of equal u: a row for each parameter."""
+
+
 class ShapedPieces:
     """The true pieces of a curve, and those for neighbouring values of the parameters that shape it.
 
@@ -129,7 +148,9 @@ class ShapedPieces:
         maker, chart = problem.formulas.chart, problem.formulas.charted(problem.p)
         assert maker is not None
         self._smoothed: dict[int, Array] = {}
-        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping]
+        displacements = getattr(maker, "displacements", None) if shaping else None
+        self._known: Displacements | None = None if displacements is None else displacements(chart)
+        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping if self._known is None]
 
     @property
     def dimension(self) -> int:
@@ -168,7 +189,7 @@ class ShapedPieces:
         d = self.dimension
         rows, curvature = [np.empty((4 * d, places.shape[1]))], np.zeros((2 if d == 2 else 6, places.shape[1]))
         fill_coordinates(self.pieces.curve, places, rows[0])
-        if self._beside:
+        if self._beside or self._known is not None:
             curvature[::2] = _curvature(_derivatives(self._terms, places, 3)[d:])
         rows.append(curvature)
         for step, *sides in self._beside:
@@ -179,6 +200,8 @@ class ShapedPieces:
             fill_coordinates(sides[0].curve, places, before)
             fill_coordinates(sides[1].curve, places, after)
             rows.append(_quotient(before[: 2 * d], after[: 2 * d], step))
+        if self._known is not None:
+            rows.append(self._known.pairs(places).reshape(-1, places.shape[1]))
         return np.concatenate(rows)
 
     def bends(self, places: Array) -> Array:
@@ -213,6 +236,8 @@ class ShapedPieces:
     def arc_length_changes(self, places: Array) -> Array:
         """Return the increase of the arc length from the start point to points of equal u: a row for each parameter."""
         self._make(int(places[0].min()), int(places[0].max()))
+        if self._known is not None:
+            return self._known.arc_lengths(places)
         found = []
         for step, *sides in self._beside:
             if not sides:
@@ -259,6 +284,8 @@ class ShapedPieces:
             for k, found in self._smoothed.items():
                 terms[k] = found
             rows += [_derivatives(terms[:, d * i : d * i + d], places, 3) for i in range(len(self._beside))]
+        if self._known is not None:
+            rows.append(self._known.points(places, 3).reshape(-1, places.shape[1]))
         return np.concatenate(rows)
 
     def _smooth(self, k: int) -> Array:

@@ -8,6 +8,7 @@ long as V**2 at the place is not small. The width is given, which takes fewer va
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.legs.kinks.places import note_kinks
 from gqm_sym.runtime.legs.leg_record import ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before
 from gqm_sym.runtime.legs.panels.equation import (
@@ -31,6 +32,8 @@ from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
 from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
+    HAS_KINKS,
+    NO_KINKS,
     are_rows_resolved,
     begin_leg,
     blocks_for,
@@ -66,7 +69,7 @@ def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
-    """Fill the rows up to LOAD for the place at the end of a variable, with the nodes and V**2 to begin with in the
+    """Fill the rows up to W for the place at the end of a variable, with the nodes and V**2 to begin with in the
     rows NODES and W; return whether the body is fast there.
     """
     change = 0.0
@@ -79,17 +82,23 @@ def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-un
             return False
         settled = change <= SETTLED * size or is_settled(change, before, size, forces.squared_contact != 0)
         if forces.linear or settled:
-            fill_load(blocks, work)
             return True
     return False
 
 
 @Inner
-def is_resolved(forces, panel, blocks, variable, work):  # type: ignore[no-untyped-def]
-    """Fill the time rate; return whether all rows are resolved and V**2 and N each have one sign up to the place; the
-    number of blocks to try next, or 0; and the largest ratio of middle coefficients to sizes.
+def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: ignore[no-untyped-def]
+    """Fill the rows LOAD and TIME_RATE; return whether all rows are resolved and V**2 and N each have one sign up to
+    the place; the number of blocks to try next, 0 for none, or HAS_KINKS; and the largest ratio of middle coefficients
+    to sizes.
     """
     h, is_stretched = variable.width, variable.extent > 0.0
+    curve_fine, bends_one_way, curve_ratio = True, True, 0.0
+    if forces.kinked:
+        curve_fine, bends_one_way, curve_ratio = curvature_sign(is_stretched, blocks, NO_KINKS, work)
+        if not bends_one_way and note_kinks(forces, march, blocks, variable, kinks, work):
+            return False, HAS_KINKS, 1.0
+    fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if not (fine and load_fine):
@@ -97,10 +106,8 @@ def is_resolved(forces, panel, blocks, variable, work):  # type: ignore[no-untyp
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0, 1.0
-    if forces.kinked:
-        curve_fine, is_kept, ratio = curvature_sign(is_stretched, blocks, work)
-        if not (curve_fine and is_kept):
-            return False, blocks_for(ratio, blocks, is_stretched), ratio
+    if not (curve_fine and bends_one_way):
+        return False, blocks_for(curve_ratio, blocks, is_stretched), curve_ratio
     fine, ratio = fill_times(blocks, h, work)
     return fine, blocks_for(ratio, blocks, is_stretched), ratio
 
@@ -128,11 +135,14 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             if not reaches(forces, march, panel, blocks, variable, work):
                 blocks = 0
                 break
-            fine, onwards, ratio = is_resolved(forces, panel, blocks, variable, work)
+            fine, onwards, ratio = is_resolved(forces, march, panel, blocks, variable, start.kinks, work)
             if fine:
                 what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
                 to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
                 record[TIME_FROM_START], record[TIME_FROM_END] = work[blocks * TAILS], 0.0
+                break
+            if onwards == HAS_KINKS:
+                blocks = 0
                 break
             if onwards == 0 or attempt.plain_blocks != NOT_TRIED:
                 attempt = next_attempt(attempt, onwards, ratio, march, work)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.kinks.parts import run_past_kinks
+from gqm_sym.runtime.legs.kinks.places import next_kink
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -25,6 +27,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     MIDDLE,
     MIDDLE_LOW,
+    PANELS,
     PASSAGE,
     ROWS_COUNT_AS,
     TIME_FROM_END,
@@ -62,6 +65,7 @@ from gqm_sym.runtime.legs.panels.widest import (
 from gqm_sym.runtime.legs.runs.arrival import run_to_target
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
+    END_NONE,
     END_PAUSE,
     END_RECORD_FULL,
     END_SLOW,
@@ -78,6 +82,9 @@ FIRST_PANEL_OF_LEG = 0.25
 
 # The reasons for which a leg was not followed back.
 NO_SPACE, LOST = -1, -2
+
+# Stands for the number of blocks of a leg past kinks that was followed in parts.
+IN_PARTS = -1
 
 
 @Inner
@@ -245,26 +252,40 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
             no_turn_until = end.no_turn_until
         start = RunStart(
             *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, step),
-            *(no_turn_until, start.width, 0, start.branch),
+            *(no_turn_until, start.width, 0, start.branch, start.kinks),
         )
 
 
 @Inner
+def passes_kinks(start):  # type: ignore[no-untyped-def]
+    """Return whether a leg is expected to pass known kinks of the law."""
+    d = next_kink(start.kinks, (start.place, start.place_low), start.direction)[1]
+    return d < inf and (start.width == 0.0 or d < start.width)
+
+
+@Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
-    """Run to the end, or to a place whose passage is to be found, as one polynomial if that suffices, else by
-    `run_to_end`; return the end, the number of blocks of the polynomial (`whole_tables`) or 0, and the branch point of
-    ds that it passes by.
+    """Run to the end, or to a place whose passage is to be found, as one polynomial if that suffices, in parts past
+    kinks of the law, or else by `run_to_end`; return the end, the number of blocks of the polynomial (`whole_tables`),
+    IN_PARTS or 0, and the branch point of ds that it passes by.
     """
     # Beside joints, curves are not evaluated at the ends of legs, as they are for legs that pass by a branch point.
     branch = start.branch if route.breaks.size == 0 else BranchPoint(0.0, inf)
+    width = start.width
     if start.v2 == 0.0 and start.blocks > 0:
-        if route.reading.what == PASSAGE:
+        if route.reading.what == PASSAGE and not passes_kinks(start):
             end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
             if end.what == END_PAUSE:
                 return end, blocks, branch
-        end, blocks, branch = run_whole(forces, start, branch, route, off, record)
-        if end.what == END_TURN:
-            return end, blocks, branch
+        if not passes_kinks(start):
+            end, blocks, branch = run_whole(forces, start, branch, route, off, record)
+            if end.what == END_TURN:
+                return end, blocks, branch
+            width = 2.0 * end.step
+    if start.v2 == 0.0 and start.kinks[0] > 0.0 and route.reading.what != PANELS:
+        end, branch = run_past_kinks(forces, start, branch, route, width, record)
+        if end.what != END_NONE:
+            return end, IN_PARTS, branch
     return run_to_end(forces, start, route, off, record), 0, branch
 
 
@@ -280,7 +301,7 @@ class Followed(NamedTuple):
     could_stay : bool
         At a turn, whether the body could stay there on some slope; otherwise True.
     blocks : int
-        The number of blocks of the leg (`whole_tables`) if it was one polynomial, else 0.
+        The number of blocks of the leg (`whole_tables`) if it was one polynomial; IN_PARTS, or else 0.
     branch : BranchPoint
         The branch point of ds that it has passed by.
     step, no_turn_until, v2 : float
@@ -328,7 +349,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), 0.0
     direction, could_stay = start.direction, True
     if what == END_TURN:
-        if not is_whole:
+        if blocks == 0:
             back = run_back(forces, end, breaks, off, route.reading, record, used)
             record[TIME_FROM_END] = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))

@@ -5,6 +5,7 @@ it is largest, because its singularities stay branches there. The law gives it a
 """
 
 from math import cos, fabs, inf, nan, sqrt
+from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.jit import Inner
@@ -20,6 +21,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HALF_C,
     HEAD,
     HEADING,
+    KNOWN_PEAK,
     NO_VALUES,
     NORMAL_LOAD,
     RIGHT,
@@ -32,10 +34,10 @@ from gqm_sym.runtime.legs.leg_record import (
     WHOLE_WIDTH,
     Y_ROW,
 )
-from gqm_sym.runtime.legs.panels.equation import copy
+from gqm_sym.runtime.legs.panels.equation import KAPPA, MEAN, N0, W, copy, load_per_mass_row
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, sum_and_slope
-from gqm_sym.runtime.legs.runs.leg_variable import distance_at, reversed_variable
+from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable
 from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, LOCATED_RATIO
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
 
@@ -195,6 +197,9 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
         first, last = 2.0 * (low - left) / width - 1.0, 2.0 * (high - left) / width - 1.0
         if first > 1.0 or last < -1.0 or record[at + TIME_ERROR] == NO_VALUES:
             continue
+        if record[at + TIME_ERROR] == KNOWN_PEAK:
+            best = max(best, record[at + Y_ROW])
+            continue
         for j in range(COUNT):
             growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
             values[j] = growth * record[at + Y_ROW + j] if function == SPEED else record[at + NORMAL_LOAD + j]
@@ -211,32 +216,45 @@ def place_in_rows(record, time):  # type: ignore[no-untyped-def]
     return cos(phase) if backwards else -cos(phase)
 
 
+class Stretch(NamedTuple):
+    """A part of the curve with a stretched variable.
+
+    Attributes
+    ----------
+    start, end : (float, float)
+        The places of its ends as two doubles.
+    direction : float
+        The sign of dlam/dt.
+    variable : LegVariable
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    direction: float
+    variable: LegVariable
+
+
 @Inner
-def force_at(forces, record, x):  # type: ignore[no-untyped-def]
-    """Return the contact force per mass at a place in [-1, 1] on a leg whose record has rows, by the law."""
-    blocks, speeds = int(record[WHOLE]), speed_buffer()
-    to_coefficients(blocks, record, HEAD + blocks * WIDE, speeds, 0)
-    speeds = speeds[: blocks * WIDE - 1]
-    point, v, variable = point_buffer(), record[HEADING], variable_of_rows(record, record[WHOLE_WIDTH])
+def force_at(forces, stretch, blocks, v2, x):  # type: ignore[no-untyped-def]
+    """Return the contact force per mass at a place in [-1, 1], by the law; ``v2`` begins with V**2 at the nodes."""
+    (start, end, v, variable), point, speeds = stretch, point_buffer(), speed_buffer()
+    to_coefficients(blocks, v2, 0, speeds, 0)
     if x <= 0.0:
-        place = record[START] + (record[START_LOW] + v * distance_at(variable, 0.5 * (1.0 + x)))
+        place = start[0] + (start[1] + v * distance_at(variable, 0.5 * (1.0 + x)))
     else:
         left = distance_at(reversed_variable(variable), 0.5 * (1.0 - x))
-        place = record[END] + (record[END_LOW] - v * left)
-    v2 = max(chebyshev_sum(speeds, x), LEAST_V2) if -1.0 < x < 1.0 else LEAST_V2
-    slope_of_v2(forces, place, v2, 0, point)
-    return point[5] + point[6] * v2
+        place = end[0] + (end[1] - v * left)
+    w = max(chebyshev_sum(speeds[: blocks * WIDE - 1], x), LEAST_V2) if -1.0 < x < 1.0 else LEAST_V2
+    slope_of_v2(forces, place, w, 0, point)
+    return point[5] + point[6] * w
 
 
 @Inner
-def peak_of_force(forces, record, last, sign, best):  # type: ignore[no-untyped-def]
+def peak_of_force(forces, stretch, blocks, values, v2, last, sign, best):  # type: ignore[no-untyped-def]
     """Return the larger of ``best`` and the largest value of ``sign`` times the contact force per mass up to a place in
-    [-1, 1], on a leg whose variable is stretched.
+    [-1, 1], given at nodes and with room behind as in `peak_of_values`; ``v2`` is as in `force_at`.
     """
-    blocks, values, size = int(record[WHOLE]), sample_buffer(), 0.0
-    count, wide = blocks * WIDE - 1, blocks * WIDE
-    for at in range(0, wide, WIDE):
-        copy(values, at, record, HEAD + 2 * wide + at)
+    size, count = 0.0, blocks * WIDE - 1
     if not may_exceed(blocks, values, sign, best)[0]:
         return best
     terms, shares = fill_series(blocks, values)
@@ -254,8 +272,29 @@ def peak_of_force(forces, record, last, sign, best):  # type: ignore[no-untyped-
         if is_cut or (is_top and here + fabs((before - here) + (after - here)) + margin > best):
             value, x = peak(terms, lo, min(hi, last), sign)
             if value + margin > best:
-                best = max(best, sign * force_at(forces, record, x))
+                best = max(best, sign * force_at(forces, stretch, blocks, v2, x))
     return best
+
+
+@Inner
+def peak_of_part(forces, stretch, blocks, reading, best, work):  # type: ignore[no-untyped-def]
+    """Return the larger of ``best`` and the extreme that is read of a part of a leg from a turn to a turn.
+
+    ``work`` has the rows of the part, one block after the other.
+    """
+    values, row = sample_buffer(), MEAN if reading.force else W
+    if reading.sign < 0.0 and not reading.force:
+        return max(best, 0.0)  # the body is slowest where it turns
+    for at in range(0, blocks * WIDE, WIDE):
+        load_per_mass_row(work, blocks * MEAN + at, blocks * N0 + at, blocks * KAPPA + at, blocks * W + at)
+        copy(values, at, work, blocks * row + at)
+    if reading.length:
+        return peak_of_function(blocks, values, (-1.0, 1.0), (LENGTH, reading.sign), best)
+    if reading.force and stretch.variable.extent > 0.0:
+        return peak_of_force(forces, stretch, blocks, values, work[blocks * W :], 1.0, reading.sign, best)
+    if reading.force:
+        return peak_of_values(blocks, values, -1.0, 1.0, reading.sign, best)
+    return max(best, sqrt(peak_of_values(blocks, values, -1.0, 1.0, 1.0, max(best, 0.0) ** 2)))
 
 
 @Inner
@@ -268,7 +307,9 @@ def peak_of_rows(forces, record, until, asked, best):  # type: ignore[no-untyped
         copy(values, at, record, HEAD + (1 if function == SPEED else 2) * blocks * WIDE + at)
     last = 1.0 if until >= record[TIME_FROM_START] + record[TIME_FROM_END] else place_in_rows(record, max(until, 0.0))
     if function == LOAD and record[EXTENT] > 0.0:
-        return peak_of_force(forces, record, last, sign, best)
+        ends = (record[START], record[START_LOW]), (record[END], record[END_LOW])
+        stretch = Stretch(*ends, record[HEADING], variable_of_rows(record, record[WHOLE_WIDTH]))
+        return peak_of_force(forces, stretch, blocks, values, record[HEAD + blocks * WIDE :], last, sign, best)
     if function != SPEED:
         return peak_of_function(blocks, values, (-1.0, last), asked, best)
     return max(best, sqrt(peak_of_values(blocks, values, -1.0, last, sign, max(best, 0.0) ** 2)))

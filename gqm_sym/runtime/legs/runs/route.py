@@ -42,6 +42,9 @@ class RunStart(NamedTuple):
         turn; 0 if it is not.
     branch : BranchPoint
         The branch point of ds that the leg before has passed by.
+    kinks : array
+        What is known of kinks (`kinks.places`); those found are added. It has a single element if no leg is followed
+        past them in parts.
     """
 
     place: float
@@ -54,6 +57,7 @@ class RunStart(NamedTuple):
     width: float
     blocks: int
     branch: BranchPoint
+    kinks: Array
 
 
 class Reading(NamedTuple):

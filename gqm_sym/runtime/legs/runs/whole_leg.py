@@ -12,12 +12,13 @@ where the time at a place is read, because with more nodes that takes longer tha
 solved motion the record gets rows from which panels are made when they are needed (`whole_panels`).
 """
 
-from math import fabs
+from math import fabs, sqrt
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.kinks.places import note_kinks
 from gqm_sym.runtime.legs.leg_record import (
     EXTENT,
     FALLING,
@@ -58,6 +59,8 @@ from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
+    HAS_KINKS,
+    NO_KINKS,
     are_rows_resolved,
     begin_leg,
     blocks_for,
@@ -104,7 +107,7 @@ ROUGH_STEP = 0.03
 CHECKED = 1e-9
 
 # What is sought of the variable of a leg: its width, roughly or to the last digit, or whether the one found with fewer
-# nodes is right.
+# nodes is right. With linear forces, the latter means the first width at which V**2 vanishes to rounding.
 ROUGH, FIND, CHECK = range(3)
 
 # The smallest and the largest factor by which the width grows if no turn is found on it.
@@ -130,18 +133,26 @@ def step_to_turn(work, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def factor_to_turn(blocks, work):  # type: ignore[no-untyped-def]
-    """Return an estimate of the factor by which the width must change if the turn is not near; NaN if there is none."""
+def factor_to_turn(blocks, start, work):  # type: ignore[no-untyped-def]
+    """Return an estimate of the factor by which the width must change if the turn is not near; NaN if there is none.
+
+    ``start`` is V**2 at the start over the width.
+    """
     at = blocks * MEAN
     to_means(blocks, work, blocks * FORCE, work, at)
     for j in range(blocks * WIDE):
-        mean = work[at + j]
+        mean = work[at + j] + start / work[blocks * NODES + j]
         if not mean > 0.0:
             if j == 0:
                 return np.nan
-            before, y = work[at + j - 1], work[blocks * NODES + j - 1]
+            y = work[blocks * NODES + j - 1]
+            before = work[at + j - 1] + start / y
             return y + (work[blocks * NODES + j] - y) * before / (before - mean)
     first, last = work[blocks * FORCE], work[blocks * TAILS + 1]
+    if start > 0.0:
+        square = first * first + 2.0 * (first - last) * start
+        factor = 2.0 * start / (sqrt(square) - first) if square >= 0.0 and first < 0.0 else MAX_GROWTH
+        return min(max(factor, MIN_GROWTH), MAX_GROWTH)
     # If the force were linear, the turn would be twice as far away as the zero of the force.
     factor = 2.0 * first / (first - last) if last < first else MAX_GROWTH
     return min(max(factor, MIN_GROWTH), MAX_GROWTH)
@@ -152,9 +163,10 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
     """Return the variable of a leg (`leg_variable`) whose width is about that of ``variable`` and at most ``room``, and
     fill FORCE and EXPM1_Q; the width is 0 if no turn is found.
 
-    With the ``aim`` ROUGH the width is the start for one with more nodes, and the rows are those of another width. If
-    the forces are not linear in V**2, the same steps are those of Newton's method for V**2, which the row W holds to
-    begin with; it has been found with fewer nodes, as the width has, if the aim is CHECK.
+    The leg may begin with a speed if the forces are linear (`kinks.parts`). With the ``aim`` ROUGH the width is the
+    start for one with more nodes, and the rows are those of another width. If the forces are not linear in V**2, the
+    same steps are those of Newton's method for V**2, which the row W holds to begin with; it has been found with fewer
+    nodes, as the width has, if the aim is CHECK.
     """
     variable, at = lengthened(variable, 1.0, room), blocks * TAILS
     last, change, settled = 0.0 if aim == CHECK else np.inf, 0.0, forces.linear
@@ -168,6 +180,7 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
             settled = is_settled(change, before, size, forces.squared_contact != 0)
             settled = settled or (aim == CHECK and before == 0.0 and change <= CHECKED * size)
         to_end_terms(blocks, work, blocks * FORCE, work, at)
+        work[at] += panel.v2 / h
         factor = 0.0
         if work[at + 1] < 0.0:
             step = step_to_turn(work, at)
@@ -178,12 +191,12 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
                 and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE)
             ):
                 return variable
-            last = fabs(step)
+            last = 0.0 if aim == CHECK and forces.linear else fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
             if aim == ROUGH and fabs(step) <= (ROUGH_STEP if forces.linear else LAST_STEP):
                 return lengthened(variable, factor, room)
         if factor == 0.0:
-            factor = factor_to_turn(blocks, work)
+            factor = factor_to_turn(blocks, panel.v2 / h, work)
         if not factor > 0.0 or (h == room and factor > 1.0):
             break
         if not forces.linear:
@@ -193,13 +206,16 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
 
 
 @Inner
-def is_whole(forces, panel, blocks, variable, reading, work):  # type: ignore[no-untyped-def]
+def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # type: ignore[no-untyped-def]
     """Fill the other rows; return whether all are resolved and V**2 and N each have one sign on the leg; the number of
-    blocks to try next, or 0; and the largest ratio of middle coefficients to sizes of the rows of the law.
+    blocks to try next, 0 for none, or HAS_KINKS; and the largest ratio of middle coefficients to sizes of the rows of
+    the law.
     """
     h, is_stretched, curve_fine, curve_ratio = variable.width, variable.extent > 0.0, True, 0.0
     if forces.kinked:
-        curve_fine, is_kept, curve_ratio = curvature_sign(is_stretched, blocks, work)
+        curve_fine, is_kept, curve_ratio = curvature_sign(is_stretched, blocks, NO_KINKS, work)
+        if not is_kept and note_kinks(forces, march, blocks, variable, kinks, work):
+            return False, HAS_KINKS, 1.0
         if curve_fine and not is_kept:
             return False, 0, 1.0
     fill_v2(blocks, h, work)
@@ -234,10 +250,12 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
         variable = variable_of_leg(forces, march, panel, blocks, room, variable, aim, work)
         if not variable.width > 0.0:
             break
-        fine, onwards, ratio = is_whole(forces, panel, blocks, variable, reading, work)
+        fine, onwards, ratio = is_whole(forces, march, panel, blocks, variable, reading, start.kinks, work)
         attempt = Attempt(blocks, variable, attempt.branch, attempt.plain_blocks, attempt.plain_ratio)
         if fine:
             return attempt
+        if onwards == HAS_KINKS:
+            break
         attempt = next_attempt(attempt, onwards, ratio, march, work)
         aim = CHECK if carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work) else FIND
         variable = attempt.variable
@@ -259,12 +277,12 @@ def enter_rows(record, blocks, route, is_read, work):  # type: ignore[no-untyped
     record[WHOLE] = blocks
     if is_read:
         to_coefficients(blocks, work, blocks * TIME_RATE, record, HEAD)
-    if reads == PEAKS or reads == PANELS:
+    if reads == PEAKS or reads >= PANELS:
         for at in range(0, wide, WIDE):
             load_per_mass_row(work, blocks * MEAN + at, blocks * N0 + at, blocks * KAPPA + at, blocks * W + at)
             copy(record, HEAD + 2 * wide + at, work, blocks * MEAN + at)
             copy(record, HEAD + wide + at, work, blocks * (W if reads == PEAKS else FORCE) + at)
-    if reads == PANELS:
+    if reads >= PANELS:
         for at in range(0, wide, WIDE):
             copy(record, HEAD + at, work, blocks * W_FACTOR + at)
             copy(record, HEAD + 3 * wide + at, work, blocks * DS + at)
@@ -277,7 +295,7 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
     to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
-    is_wanted = route.reading.what == PANELS or (route.reading.what == PEAKS and variable.extent > 0.0)
+    is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and variable.extent > 0.0)
     record[WHOLE_WIDTH] = h if is_wanted else 0.0
     record[RISING], record[FALLING], record[EXTENT] = variable.rising, variable.falling, variable.extent
     record[TIME_FROM_START], record[TIME_FROM_END] = first, second
@@ -292,7 +310,7 @@ def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-unt
     Returns
     -------
     end : End
-        Its code is END_NONE if the leg must be followed panel by panel.
+        Its code is END_NONE if the leg must be followed in another way. The step is then half of what may be its width.
     blocks : int
         The number of blocks (`whole_tables`) that resolve the leg; 0 if there is none.
     branch : BranchPoint
@@ -310,9 +328,8 @@ def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-unt
         work = whole_buffer()
         panel = Panel(0.0, 0.0, nu, span)
         found = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
-        blocks, variable, branch = found.blocks, found.variable, found.branch
+        blocks, variable, branch, h = found.blocks, found.variable, found.branch, found.variable.width
         if blocks > 0:
-            h = variable.width
             enter_leg(record, route, origin, v, blocks, variable, work)
             what, middle = END_TURN, located(origin, v, distance_at(variable, 0.5), breaks, upcoming)
     place = located(origin, v, h, breaks, upcoming)

@@ -84,8 +84,12 @@ slope_row = over_rows(lambda p, q, w, step: step * (p - q * w), WIDE)
 moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
 size_row = over_rows(lambda w: abs(w), WIDE)
 quotient_row = over_rows(lambda one, other: one / other, WIDE)
+quotient_before_end_row = over_rows(lambda one, y: one / (y - 1.0), WIDE)
 v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
+
+# The number of blocks to try next on a leg with a kink of the law, and the ends of a leg that are no kinks.
+HAS_KINKS, NO_KINKS = -1, (False, False)
 
 # Coefficients that decrease by the same factor with each degree as in their middle fall short of the expected size at
 # their end by this share of the nodes, because singularities of curves are mostly those of roots.
@@ -330,16 +334,21 @@ def fill_lengths(forces, blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def curvature_sign(is_stretched, blocks, work):  # type: ignore[no-untyped-def]
+def curvature_sign(is_stretched, blocks, kinks, work):  # type: ignore[no-untyped-def]
     """Return `sign_of_row` for the curvature, with a ratio that is compared with TAIL_RATIO; 0 if it is resolved.
 
     The law at the nodes has the curvature itself, and only its sign matters here. Along a graph its coefficients
-    decrease more slowly than those of all that the law is made of.
+    decrease more slowly than those of all that the law is made of. ``kinks`` says of the start and of the end whether
+    the curvature vanishes there; it is divided by the place with respect to them.
     """
     for at in range(0, blocks * WIDE, WIDE):
         product(work, blocks * LOAD + at, blocks * DS + at, blocks * KAPPA + at)
         if is_stretched:  # without the factor J, the bound of the sign is closer
             quotient_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * D + at)
+        if kinks[0]:
+            quotient_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * NODES + at)
+        if kinks[1]:
+            quotient_before_end_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * NODES + at)
     size = size_of_row(blocks, work, LOAD)
     sign = 1 if work[blocks * LOAD] > 0.0 else -1
     fine, kept, ratio = sign_of_row(blocks, work, LOAD, sign, (size, CANCELLATION_NOISE * size))

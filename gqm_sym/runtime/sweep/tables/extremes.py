@@ -68,24 +68,58 @@ def place_on(curve, k, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def load_on(curve, k, level, sought, x):  # type: ignore[no-untyped-def]
-    """Return V**2, the contact force per unit mass, or the square of its length, at a place of panel k.
-
-    ``level`` is the result of `level_on`, and ``sought`` is explained in `orbit_extremes.fill_force`.
-    """
+def v2_or_force_on(curve, k, level, function, x):  # type: ignore[no-untyped-def]
+    """Return V**2, or the contact force per unit mass, at a place of panel k; ``level`` is the result of `level_on`."""
     slack, at, edge = level
     v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
-    if sought[0] == FORCE:
+    if function == FORCE:
         return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
-    if sought[0] == FORCE_SQUARED:
-        places, values, frame = point_buffer(), point_buffer(), frame_buffer()
-        places[0], values[0] = place_on(curve, k, x), max(v2, 0.0)
-        if sought[1] != 0:
-            fill_squares(curve, sought[1], 1, places, values, values)
-        else:
-            fill_force(curve, sought, 1, places, values, frame, values)
-        return values[0] / curve.mass**2
     return v2
+
+
+@Inner
+def fill_squares_on(curve, k, level, direction, n, points, out):  # type: ignore[no-untyped-def]
+    """Fill the square of the contact force per unit mass at n places of panel k, for a direction of motion or for
+    both.
+    """
+    places, frame = point_buffer(), frame_buffer()
+    for i in range(n):
+        places[i], out[i] = place_on(curve, k, points[i]), max(v2_or_force_on(curve, k, level, V2, points[i]), 0.0)
+    if direction != 0:
+        fill_squares(curve, direction, n, places, out, out)
+    else:
+        fill_force(curve, FORCE_SQUARED, n, places, out, frame, out)
+    for i in range(n):
+        out[i] /= curve.mass**2
+
+
+@Inner
+def loads_on(curve, k, level, sought, x0, x1, x2):  # type: ignore[no-untyped-def]
+    """Return V**2, the contact force per unit mass, or the square of its length, at three places of panel k.
+
+    `orbit_extremes.is_loop` explains ``sought``.
+    """
+    if sought[0] != FORCE_SQUARED:
+        return (
+            v2_or_force_on(curve, k, level, sought[0], x0),
+            v2_or_force_on(curve, k, level, sought[0], x1),
+            v2_or_force_on(curve, k, level, sought[0], x2),
+        )
+    points, out = point_buffer(), point_buffer()
+    points[0], points[1], points[2] = x0, x1, x2
+    fill_squares_on(curve, k, level, sought[1], 3, points, out)
+    return out[0], out[1], out[2]
+
+
+@Inner
+def load_on(curve, k, level, sought, x):  # type: ignore[no-untyped-def]
+    """Return what `loads_on` returns, at one place."""
+    if sought[0] != FORCE_SQUARED:
+        return v2_or_force_on(curve, k, level, sought[0], x)
+    points, out = point_buffer(), point_buffer()
+    points[0] = x
+    fill_squares_on(curve, k, level, sought[1], 1, points, out)
+    return out[0]
 
 
 @Inner
@@ -111,7 +145,7 @@ def prepare_vectors(curve, k):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
-    """Fill the same as `load_on` at the samples of panel k, for V**2/2 at its left edge; the square of a length loses
+    """Fill the same as `loads_on` at the samples of panel k, for V**2/2 at its left edge; squares of lengths lose
     digits.
     """
     row, direction = curve.rows[k], float(sought[1])
@@ -156,19 +190,18 @@ def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[n
         left, right = max(u - step, low), min(u + step, high)
         if not left < u < right:
             u = 0.5 * (left + right)
-        f0 = load_on(curve, k, level, sought, place_at(left, ends, is_angle))
-        f1 = load_on(curve, k, level, sought, place_at(u, ends, is_angle))
-        f2 = load_on(curve, k, level, sought, place_at(right, ends, is_angle))
+        x0, x1 = place_at(left, ends, is_angle), place_at(u, ends, is_angle)
+        x2 = place_at(right, ends, is_angle)
+        f0, f1, f2 = loads_on(curve, k, level, sought, x0, x1, x2)
+        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2)
         before, after = (u - left) * (f1 - f2), (u - right) * (f1 - f0)
         if before != after:
             vertex = u - 0.5 * ((u - left) * before - (u - right) * after) / (before - after)
             u = min(max(vertex, left), right)
-        found = load_on(curve, k, level, sought, place_at(u, ends, is_angle))
-        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
         if step <= last:
             break
         step = min(step, max(step / STEP_RATIO, fabs(u - before_step)))
-    return best
+    return sign * max(sign * best, sign * load_on(curve, k, level, sought, place_at(u, ends, is_angle)))
 
 
 @Inner

@@ -1,0 +1,1 @@
+"""Legs past places at which the law has a kink."""

@@ -1,0 +1,107 @@
+"""Legs of a droplet past places where the curvature changes its sign, compared with closed forms of V**2."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+
+class Droplet:
+    """A droplet on the graph ``x**2/2 + sin(3 x)/8``, of which the curvature changes its sign at ``sin(3 x) = 8/9``.
+
+    The curvature times ds is the change of the tangent angle. So V**2 is what gravity gains, less 2 b times all changes
+    of that angle since the last turn, which are its differences between the places where the curvature changes sign.
+    """
+
+    def __init__(self, b: float) -> None:
+        first = mp.asin(mpf(8) / 9)
+        self.kinks = [(k - 2 * lap * mp.pi) / 3 for k in (first, mp.pi - first) for lap in (0, 1)]
+        self.b, self.g = mpf(b), mpf("9.81")
+
+    def height(self, x: Any) -> Any:
+        """Return z."""
+        return x * x / 2 + mp.sin(3 * x) / 8
+
+    def slope(self, x: Any) -> Any:
+        """Return dz/dx."""
+        return x + 3 * mp.cos(3 * x) / 8
+
+    def bend(self, x: Any) -> Any:
+        """Return the curvature."""
+        return (1 - 9 * mp.sin(3 * x) / 8) / (1 + self.slope(x) ** 2) ** 1.5
+
+    def v2(self, a: mpf, x: Any) -> Any:
+        """Return V**2 at x after a turn at a."""
+        between = [a, *sorted((k for k in self.kinks if min(a, x) < k < max(a, x)), reverse=x < a), x]
+        angles = [mp.atan(self.slope(place)) for place in between]
+        bent = mp.fsum(abs(one - other) for one, other in pairwise(angles))
+        return 2 * self.g * (self.height(a) - self.height(x)) - 2 * self.b * bent
+
+    def turn(self, a: mpf) -> Any:
+        """Return where the droplet turns after a turn at a: the first zero of V**2 on the other side of the well."""
+        places = np.linspace(float(a), -1.8 if a > -0.25 else 1.8, 100)[5:].tolist()
+        k = next(k for k, x in enumerate(places) if self.v2(a, mpf(x)) < 0)
+        return mp.findroot(lambda x: self.v2(a, x), (places[k - 1], places[k]))
+
+    def time(self, a: mpf, b: mpf, x: mpf) -> Any:
+        """Return the time from a turn at a to x, on the way to one at b."""
+
+        def rate(phase: mpf) -> Any:
+            place = a + (b - a) * mp.sin(phase / 2) ** 2
+            ds = mp.sqrt(1 + self.slope(place) ** 2)
+            return abs(b - a) * mp.sin(phase) / 2 * ds / mp.sqrt(self.v2(a, place))
+
+        phases = [2 * mp.asin(mp.sqrt((k - a) / (b - a))) for k in self.kinks if min(a, x) < k < max(a, x)]
+        ends = [0, *sorted(phases), 2 * mp.asin(mp.sqrt((x - a) / (b - a)))]
+        return mp.quad(rate, ends, method="gauss-legendre", maxdegree=5)
+
+    def load(self, a: mpf, x: mpf) -> Any:
+        """Return the contact force per mass."""
+        return self.g / mp.sqrt(1 + self.slope(x) ** 2) + self.bend(x) * self.v2(a, x)
+
+
+def largest(function: Callable[[Any], Any], a: mpf, b: mpf) -> float:
+    """Return the largest value of a function between two places; it has one peak where it is largest at 50 places."""
+    places = np.linspace(float(a), float(b), 52)[1:-1].tolist()
+    best = max(places, key=function)
+    return float(function(mp.findroot(lambda x: mp.diff(function, x), best)))
+
+
+# The turns after the first of these launches lie beyond both kinks, and those after the others next to them or between
+# them.
+@pytest.mark.parametrize("start", [1.125, 0.6875, 0.5, 0.375])
+def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
+    """Turns, times, extremes and places agree wherever the turns lie with respect to the kinks."""
+    model = gqm.derive(gqm.Curve.graph("x**2/2+sin(3*x)/8"), gqm.Gravity() + gqm.SurfaceTension())
+    module = gqm.build(model, name="droplet_past_kinks", folder=generated_folder)
+    given = {"gamma": 1.0, "ell_c": 0.25, "t_max": 10.0}
+
+    def swept(quantity: str, **more: Any) -> float:
+        return float(module.sweep(quantity, [start], 0.0, **given, **more).values[0])
+
+    with mp.workdps(28):
+        body, turns = Droplet(0.0625), [mpf(start)]
+        for _ in range(4):
+            turns.append(body.turn(turns[-1]))
+        times = [body.time(a, b, b) for a, b in pairwise(turns)]
+        ends = [float(mp.fsum(times[: k + 1])) for k in range(len(times))]
+        motion = module.solve(start, 0.0, **given)
+        assert [leg.lam_end for leg in motion.legs[:4]] == pytest.approx(
+            [float(x) for x in turns[1:]], rel=0.0, abs=4e-15
+        )
+        assert [leg.t_end for leg in motion.legs[:4]] == pytest.approx(ends, rel=2e-15)
+        a, b = turns[:2]
+        fastest = largest(lambda x: body.v2(a, x), a, b)
+        assert swept("v_max") == pytest.approx(fastest**0.5, rel=1e-15)
+        assert swept("normal_force_max") == pytest.approx(largest(lambda x: body.load(a, x), a, b), rel=2e-15)
+        for share in ("0.03125", "0.25", "0.5", "0.9375"):
+            place = mpf(float(a + (b - a) * mpf(share)))
+            time = float(body.time(a, b, place))
+            assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
+            assert abs(motion.lam(time) - place) <= min(motion.error_bound(time), 2e-15)
