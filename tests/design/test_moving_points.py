@@ -145,6 +145,16 @@ def half_period(spline: Spline) -> Any:
     return mp.quad(rate, [0, *edges, mp.pi], method="gauss-legendre")
 
 
+def time(spline: Spline) -> Any:
+    """Return the time from the first point to the last."""
+    height = spline.at(mpf(0))[1]
+
+    def rate(t: Any) -> Any:
+        return mp.hypot(*spline.at(t, 1)) / mp.sqrt(SPEED**2 + 2 * GRAVITY * (height - spline.at(t)[1]))
+
+    return spline.integral(rate, mpf(0), spline.knots[-1])
+
+
 def load(spline: Spline, place: Any, w: Any) -> Any:
     """Return the contact force."""
     _, angle, curvature = spline.bent(place)
@@ -189,6 +199,15 @@ def test_half_periods(tmp_path: Path) -> None:
     slopes = found.gradient("half_period", found.start)
     assert slopes is not None
     assert abs(slopes[0] - slope_of(half_period)) <= 1e-12 * abs(slopes[0])
+
+
+@pytest.mark.usefixtures("exact_lengths")
+def test_times(tmp_path: Path) -> None:
+    """The derivative of the time from the first point to the last is that of the integral."""
+    found = tracks(gqm.Gravity(), {"v0": 5}, tmp_path)
+    slopes = found.gradient("time_at", found.start)
+    assert slopes is not None
+    assert abs(slopes[0] - slope_of(time)) <= 1e-11 * abs(slopes[0])
 
 
 @pytest.mark.usefixtures("exact_lengths")
