@@ -236,3 +236,17 @@ def test_limits_with_friction(between: Any, tmp_path: Path) -> None:
 
         scale = np.abs(found.slopes["normal_force"]).max()
         assert abs(found.slopes["normal_force"][k, 0] - slope_of(force)) <= 1e-9 * scale, k
+
+
+def test_many_points(tmp_path: Path) -> None:
+    """Of more points than 64 the chart may leave some out; limits with friction are then left to difference
+    quotients.
+    """
+    places = np.linspace(0.0, 2.0, 65)
+    points = np.column_stack([places, -0.1 * places * (4.0 - places)])
+    track = _Points(points, FRICTION, [30], {"v0": 1}, str(tmp_path))
+    found = track.limited(track.start, None)
+    assert found is not None
+    assert np.isfinite(found.values["normal_force"]).all()
+    assert not found.slopes
+    assert track.gradient("normal_force_max", track.start) is None
