@@ -82,6 +82,19 @@ EXPONENTIAL = (
 # log 2 as the sum of two doubles. The first ends in zeros, so that its product with an integer below 2**11 is exact.
 LOG2, LOG2_LOW, ONE_OVER_LOG2 = 0.6931471803691238, 1.9082149292705877e-10, 1.4426950408889634
 
+# (log(m) - f + f**2/2)/s - f**2/2 in s**2 without its factor s**2, where m = 1 + f, s = f/(2 + f) and m is between
+# sqrt(1/2) and sqrt(2), highest power first. The coefficients are those of fdlibm (Sun Microsystems, 1993: s_log1p.c).
+LOGARITHM = (
+    1.479819860511658591e-01,
+    1.531383769920937332e-01,
+    1.818357216161805012e-01,
+    2.222219843214978396e-01,
+    2.857142874366239149e-01,
+    3.999999999940941908e-01,
+    6.666666666666735130e-01,
+)
+ROOT_HALF_BITS = 0x3FE6A09E667F3BCD
+
 # Beyond MAX_EXPONENT exp overflows or underflows; beyond MAX_HYPERBOLIC sinh and cosh overflow.
 MAX_EXPONENT, MAX_HYPERBOLIC = 1000.0, 710.4758600739439
 
@@ -265,6 +278,19 @@ def tanh(x):  # type: ignore[no-untyped-def]
     error = fma(value, below, high) + (rest + value * ((high - (below - 2.0)) + rest))
     value -= error / below
     return choose(x < 0.0, -value, choose(x == 0.0, x, value))
+
+
+@Inlined
+def log1p(x):  # type: ignore[no-untyped-def]
+    """Return log(1 + x) for x >= 0."""
+    whole = 1.0 + x
+    lost = choose(x < 1.0, x - (whole - 1.0), 1.0 - (whole - x))
+    k = (bits(whole) - ROOT_HALF_BITS) >> 52
+    f = from_bits(bits(whole) - (k << 52)) - 1.0
+    s, half, n = f / (2.0 + f), 0.5 * f * f, float(k)
+    rest = s * (half + (s * s) * polynomial(LOGARITHM, s * s))
+    value = fma(n, LOG2, f - (half - (rest + fma(n, LOG2_LOW, lost / whole))))
+    return choose(whole < inf, value, x)
 
 
 # Half the bits of a number, subtracted from this constant, are the bits of its inverse square root within 4 %

@@ -5,12 +5,22 @@ trusted to its last digit and never formed again from the points, which are only
 own rounding (MATHS, section 3).
 """
 
-from math import asinh, atan, atanh, expm1, fabs, log, log1p, sqrt
+from math import asinh, atan, atanh, expm1, fabs, log, sqrt
 from math import atan2 as angle
 from math import pow as power
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import cos, cos_of_sum, cosh, exp, expm1_below, sin, sin_of_sum, sinh
+from gqm_sym.runtime.arithmetic.elementary import (
+    cos,
+    cos_of_sum,
+    cosh,
+    exp,
+    expm1_below,
+    log1p,
+    sin,
+    sin_of_sum,
+    sinh,
+)
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
@@ -111,12 +121,12 @@ def divdiff1_exp(x, y, h):  # type: ignore[no-untyped-def]
     return exp(choose(x > y, x, y)) * expc(fabs(h))
 
 
-@Inner
+@Inlined
 def divdiff1_log(x, y, h):  # type: ignore[no-untyped-def]
     """log[x,y] = log1p(h/x)/h, x the smaller."""
-    gap, least = fabs(h), min(x, y)
+    gap, least = fabs(h), choose(x < y, x, y)
     ratio = gap / least
-    return log1p(ratio) / gap if ratio > 0.1 * TINY_ARGUMENT * TINY_ARGUMENT else 1.0 / least
+    return choose(ratio > 0.1 * TINY_ARGUMENT * TINY_ARGUMENT, log1p(ratio) / gap, 1.0 / least)
 
 
 @Inner

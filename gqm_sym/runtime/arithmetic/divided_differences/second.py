@@ -33,8 +33,9 @@ from gqm_sym.runtime.arithmetic.divided_differences.first import (
     root_below,
     root_beyond,
 )
-from gqm_sym.runtime.arithmetic.divided_differences.points import ordered, series_pair
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.arithmetic.divided_differences.points import around, ordered, series_pair
+from gqm_sym.runtime.compiled.intrinsics import choose
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 # Square of r up to which `divdiff2_of_quotients` may be used: the rest of its series is below 4e-18 there.
 NEAR_SQUARE = 1.0 / 9.0
@@ -49,13 +50,13 @@ NODES = tuple(float(0.5 + 0.5 * t) for t in _LEGENDRE[0])
 WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, strict=True))
 
 
-@Inner
+@Inlined
 def quotients_are_small(h1, h2, p, q):  # type: ignore[no-untyped-def]
     """Return whether `divdiff2_of_quotients` may be used: r1 = h1/P and r2 = h2/Q are small."""
-    return h1 * h1 <= NEAR_SQUARE * p * p and h2 * h2 <= NEAR_SQUARE * q * q
+    return (h1 * h1 <= NEAR_SQUARE * p * p) & (h2 * h2 <= NEAR_SQUARE * q * q)
 
 
-@Inner
+@Inlined
 def divdiff2_of_quotients(h1, h2, p, q, k, sign):  # type: ignore[no-untyped-def]
     """(A(r2)/h2 - A(r1)/h1)/(h1+h2) for r1 = h1/P, r2 = h2/Q, A = atanh (sign 1) or atan (sign -1).
 
@@ -73,14 +74,14 @@ def divdiff2_of_quotients(h1, h2, p, q, k, sign):  # type: ignore[no-untyped-def
     return 0.5 * (sign * slope * e * f * (total * uq) + both * k) * up * uq
 
 
-@Inner
+@Inlined
 def divdiff2_log(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """log[x,y,w], from log[x,y] = 2 atanh(h/(x+y))/h."""
+    """log[x,y,w], from log[x,y] = 2 atanh(h/(x+y))/h. There are no branches, so that loops fill vector registers."""
     p, q = x + y, y + w
-    if quotients_are_small(h1, h2, p, q):
-        return 2.0 * divdiff2_of_quotients(h1, h2, p, q, -1.0, 1.0)
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (divdiff1_log(b, c, v) - divdiff1_log(a, b, u)) / (u + v)
+    near = 2.0 * divdiff2_of_quotients(h1, h2, p, q, -1.0, 1.0)
+    a, b, first, c, d, second, whole = around(x, y, w, h1, h2)
+    far = (divdiff1_log(c, d, second) - divdiff1_log(a, b, first)) / whole
+    return choose(quotients_are_small(h1, h2, p, q), near, far)
 
 
 @Inner
