@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.design.limit_programs import POINT, rows_at, track_program
 from gqm_sym.design.limits import LIMITS, PLACES, Limited, inputs_of, places_between
-from gqm_sym.errors import SolutionError
+from gqm_sym.errors import GQMError, SolutionError
 from gqm_sym.runtime.charts.rail import Rail
 from gqm_sym.runtime.charts.tracing import Traced
 from gqm_sym.runtime.compiled.types import Array
@@ -109,7 +109,7 @@ def lossy_slopes(problem: Problem, places: Array, passed: NDArray[np.bool_]) -> 
     try:
         motion = dissipate(problem.formulas, problem.p, problem.launch)
         found[:, passed] = forces_at_places(motion, places[passed])
-    except SolutionError:
+    except GQMError:
         return None
     return found
 

@@ -145,6 +145,16 @@ def half_period(spline: Spline) -> Any:
     return mp.quad(rate, [0, *edges, mp.pi], method="gauss-legendre")
 
 
+def time(spline: Spline) -> Any:
+    """Return the time from the first point to the last."""
+    height = spline.at(mpf(0))[1]
+
+    def rate(t: Any) -> Any:
+        return mp.hypot(*spline.at(t, 1)) / mp.sqrt(SPEED**2 + 2 * GRAVITY * (height - spline.at(t)[1]))
+
+    return spline.integral(rate, mpf(0), spline.knots[-1])
+
+
 def load(spline: Spline, place: Any, w: Any) -> Any:
     """Return the contact force."""
     _, angle, curvature = spline.bent(place)
@@ -192,6 +202,15 @@ def test_half_periods(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("exact_lengths")
+def test_times(tmp_path: Path) -> None:
+    """The derivative of the time from the first point to the last is that of the integral."""
+    found = tracks(gqm.Gravity(), {"v0": 5}, tmp_path)
+    slopes = found.gradient("time_at", found.start)
+    assert slopes is not None
+    assert abs(slopes[0] - slope_of(time)) <= 1e-11 * abs(slopes[0])
+
+
+@pytest.mark.usefixtures("exact_lengths")
 def test_extremes(tmp_path: Path) -> None:
     """The derivative of the largest contact force is right for a body that runs along the whole track."""
     found = tracks(gqm.Gravity(), {"v0": 5}, tmp_path)
@@ -217,3 +236,17 @@ def test_limits_with_friction(between: Any, tmp_path: Path) -> None:
 
         scale = np.abs(found.slopes["normal_force"]).max()
         assert abs(found.slopes["normal_force"][k, 0] - slope_of(force)) <= 1e-9 * scale, k
+
+
+def test_many_points(tmp_path: Path) -> None:
+    """Of more points than 64 the chart may leave some out; limits with friction are then left to difference
+    quotients.
+    """
+    places = np.linspace(0.0, 2.0, 65)
+    points = np.column_stack([places, -0.1 * places * (4.0 - places)])
+    track = _Points(points, FRICTION, [30], {"v0": 1}, str(tmp_path))
+    found = track.limited(track.start, None)
+    assert found is not None
+    assert np.isfinite(found.values["normal_force"]).all()
+    assert not found.slopes
+    assert track.gradient("normal_force_max", track.start) is None

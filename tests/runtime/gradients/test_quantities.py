@@ -162,6 +162,31 @@ def test_a_cycloid_is_isochronous() -> None:
         assert abs(motion.period_slope) <= 1e-25
 
 
+def test_an_epicycloid_absorber(generated_folder: Path) -> None:
+    """In a frame with the angular velocity 3, swings along an epicycloid of the radii 1 and 1/4 have the order
+    1/(2 sqrt(5)/4) at any amplitude.
+    """
+    curve = gqm.Curve.parametric(
+        x="-(A + B)*cos(q) - B*cos((A + B)/B*q)",
+        z="(A + B)*sin(q) + B*sin((A + B)/B*q)",
+        parameter="q",
+        domain=("-pi*B/A", "pi*B/A"),
+        parameters={"A": 1, "B": "1/4"},
+    )
+    force = gqm.Potential("-w**2*(x**2 + z**2)/2", parameters={"w": 3})
+    module = gqm.build(gqm.derive(curve, force), name="absorber", folder=generated_folder)
+    order = 2 / mp.sqrt(5)
+    for lam0 in ("1/100", "1/5", "7/10"):
+        motion = module.solve(lam0=lam0)
+        found = motion.gradient("half_period", ("lam0", "w", "A", "B"))
+        assert is_near(motion.half_period, mp.pi / (3 * order))
+        assert abs(found["lam0"]) <= 1e-25
+        assert is_near(found["w"], -mp.pi / (9 * order))
+        # The order is A/(2 sqrt(B (A + B))).
+        assert is_near(found["A"], -(mp.pi / (3 * order)) * (1 - mpf(1) / 2 / mpf("1.25")))
+        assert is_near(found["B"], (mp.pi / (3 * order)) * (4 + 1 / mpf("1.25")) / 2)
+
+
 def test_extremes(circle: ModuleType, cubic: ModuleType) -> None:
     """By the envelope theorem extremes have derivatives where their place does not matter, at turning points, and at a
     horizon.

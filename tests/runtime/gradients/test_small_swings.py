@@ -37,3 +37,18 @@ def test_no_swing_is_too_small_for_derivatives(name: str, tmp_path: Path) -> Non
         assert (np.abs(found[:, 0] / distances / (found[2, 0] / distances[2]) - 1.0) <= allowed + allowed[2]).all()
     second = module.solve(bottom + 1e-11).gradient("half_period", wrt=("lam0",), order=2)["lam0"]["lam0"]
     assert second == pytest.approx(solved[2, 0] / distances[2], rel=1e-4)
+
+
+def test_compiled_code_suffices_next_to_a_bottom(tmp_path: Path) -> None:
+    """At 2e-5 of the bottom of a limacon no launch is solved, which takes 26 ms in extended precision.
+
+    The derivative by the launch place is proportional to the distance.
+    """
+    curve = gqm.Curve.polar("2 + cos(th)", parameter="th", period="2*pi")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="small_limacon", folder=tmp_path)
+    bottom = -math.acos((math.sqrt(3.0) - 1.0) / 2.0)
+    distances = np.array([-2.2e-5, 2.2e-5, 1e-4])
+    swept = module.sweep("half_period", bottom + distances, gradient=("lam0",))
+    assert "solve" not in swept.route_counts()
+    rates = swept.gradient[:, 0] / distances
+    np.testing.assert_allclose(rates, rates[2], rtol=3e-4)

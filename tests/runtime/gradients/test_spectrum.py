@@ -24,6 +24,18 @@ def test_a_pendulum() -> None:
     np.testing.assert_allclose(found.b, 0.0, atol=1e-15)
 
 
+def test_a_melnikov_integral() -> None:
+    """Along the separatrix of a pendulum of unit length and gravity, the integral of v cos(w t) over all times is 2 pi
+    sech(pi w/2). The trapezoidal rule converges like exp(-pi**2/h), because v has poles at half of pi.
+    """
+    motion = load(str(ROOT / "generated" / "circle.py"), "circle").solve(lam0=0, v0=2, L=1, g=1)
+    assert motion.kind == "asymptotic"
+    step = 0.125
+    times = step * np.arange(1, 280)
+    found = step * (2.0 + 2.0 * np.sum(motion.state(times).v * np.cos(1.3 * times)))
+    assert abs(found - 1.60366308118402222946135298272) < 2e-15
+
+
 @pytest.mark.parametrize("quantity", ["x", "z", "v", "normal_force"])
 @pytest.mark.parametrize("launch", [{"lam0": 2.5, "v0": 1.0, "direction": -1}, {"lam0": 0.4, "v0": 7.0}])
 def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:

@@ -24,6 +24,9 @@ from gqm_sym.runtime.compiled.jit import Inlined
 # |h1| + |h2| up to which `symmetric_parts` may be used: the rest of its series is below 1e-19 there.
 MAX_SPAN = 1.0
 
+# The same limit for sinh and cosh alone, about which bodies swing as widely.
+MAX_HYPERBOLIC_SPAN = 2.0
+
 # The same limit for sin and cos, whose parts do not cancel while the points span at most a whole turn, the widest
 # swing of a pendulum.
 MAX_WAVE_SPAN = 3.2
@@ -34,9 +37,10 @@ def _even(shift: int, terms: int) -> tuple[float, ...]:
     return tuple((-1.0) ** k / factorial(2 * k + shift) for k in reversed(range(terms)))
 
 
-# The series of sinc, and of sinc and cosine of half the argument, with as many terms as MAX_SPAN and MAX_WAVE_SPAN
-# require.
+# The series of sinc, and of sinc and cosine of half the argument, with as many terms as MAX_SPAN, MAX_HYPERBOLIC_SPAN
+# and MAX_WAVE_SPAN require.
 NEAR_SERIES = (_even(1, 10), _even(1, 8), _even(0, 9))
+HYPERBOLIC_SERIES = (_even(1, 13), _even(1, 10), _even(0, 11))
 WIDE_SERIES = (_even(1, 16), _even(1, 12), _even(0, 12))
 
 # sinc as a polynomial in the square of its argument, highest power first. It interpolates at Chebyshev nodes for
@@ -130,20 +134,20 @@ def divdiff2_cos(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
 
 @Inlined
 def divdiff2_sinh_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine; NaN beyond `MAX_SPAN`."""
+    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine; NaN beyond `MAX_HYPERBOLIC_SPAN`."""
     u, v = 0.5 * h1, 0.5 * h2
-    even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
+    even, odd = symmetric_parts(u, v, -1.0, HYPERBOLIC_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= MAX_SPAN, 0.5 * (odd * cosh(m) + even * sinh(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_HYPERBOLIC_SPAN, 0.5 * (odd * cosh(m) + even * sinh(m)), nan)
 
 
 @Inlined
 def divdiff2_cosh_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine; NaN beyond `MAX_SPAN`."""
+    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine; NaN beyond `MAX_HYPERBOLIC_SPAN`."""
     u, v = 0.5 * h1, 0.5 * h2
-    even, odd = symmetric_parts(u, v, -1.0, NEAR_SERIES)
+    even, odd = symmetric_parts(u, v, -1.0, HYPERBOLIC_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
-    return choose(fabs(u) + fabs(v) <= MAX_SPAN, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
+    return choose(fabs(u) + fabs(v) <= MAX_HYPERBOLIC_SPAN, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
 
 
 @Inlined

@@ -55,7 +55,7 @@ PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.
 
 # The largest error of a derivative of a small swing as a share of it. The values at its nodes all but cancel, because
 # its turning points move much farther than its half period changes.
-MAX_SHARE = 2.0**-56
+MAX_SHARE = 2.0**-54
 
 # A program without results.
 NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))

@@ -6,14 +6,20 @@ import random
 from mpmath import mp, mpf
 
 from gqm_sym.runtime.arithmetic.divided_differences.trigonometric import (
+    MAX_HYPERBOLIC_SPAN,
     MAX_WAVE_SPAN,
     divdiff1_cos_in_square,
     divdiff1_sinc_in_square,
+    divdiff2_cosh_near,
+    divdiff2_sinh_near,
     sinc_near,
 )
 
 # The absolute tolerances of values up to 1/2, 1/6 and 1. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
 EVEN, ODD, SINC = 1.5e-16, 8e-17, 3e-16
+# The relative tolerance of second differences of cosh, and of sinh for points of one sign. Worst on 1000 triples of
+# points: 8.0e-16, most of it from the rounding of exponential functions.
+HYPERBOLIC = 1e-15
 
 
 def pairs(count: int) -> list[tuple[float, float]]:
@@ -49,3 +55,20 @@ def test_wider_than_a_turn_it_is_nan() -> None:
         )
         truth = (mp.cos(v) - mp.cos(h)) / (v**2 - h**2)
         assert abs(divdiff1_cos_in_square(MAX_WAVE_SPAN, 0.999 * MAX_WAVE_SPAN) - truth) <= EVEN
+
+
+def test_second_differences_of_hyperbolic_functions() -> None:
+    """The closed forms keep their digits up to the widest orbits that they are for, and are NaN beyond."""
+    draw = random.Random(7)
+    for _ in range(1000):
+        left, right = (draw.random() * MAX_HYPERBOLIC_SPAN for _ in range(2))
+        middle = left + draw.uniform(0.5, 2.0)
+        points = (middle - left, middle, middle + right)
+        with mp.workdps(60):
+            x, y, w = mpf(middle) - mpf(left), mpf(middle), mpf(middle) + mpf(right)
+            for function, found in ((mp.cosh, divdiff2_cosh_near), (mp.sinh, divdiff2_sinh_near)):
+                slopes = (function(y) - function(x)) / (y - x), (function(w) - function(y)) / (w - y)
+                truth = (slopes[1] - slopes[0]) / (w - x)
+                assert abs(found(*points, left, right) / truth - 1) <= HYPERBOLIC
+    assert math.isnan(divdiff2_cosh_near(-2.1, 0.0, 2.1, 2.1, 2.1))
+    assert math.isnan(divdiff2_sinh_near(-2.1, 0.0, 2.1, 2.1, 2.1))
