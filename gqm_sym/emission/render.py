@@ -21,7 +21,7 @@ from gqm_sym.errors import EmissionError
 INTERFACE = 15
 
 # Functions that the runtime has in vectorised forms; all others are those of the standard library.
-_ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
+_ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh", "tanh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("CompiledFunctions", "CompiledModel")
 # The width of the emitted import list.

@@ -250,6 +250,23 @@ def sinh(x):  # type: ignore[no-untyped-def]
     return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))
 
 
+@Inlined
+def tanh(x):  # type: ignore[no-untyped-def]
+    """Return the hyperbolic tangent, -e/(2 + e) with e = exp(-2*abs(x)) - 1 as two doubles."""
+    falling = -2.0 * fabs(x)
+    lead, low, k = scaled_exp(choose(falling < NEGLIGIBLE_EXPONENT, NEGLIGIBLE_EXPONENT, falling))
+    unit, scale = power_of_two(-k), power_of_two(k)
+    gap = lead - unit
+    lost = low + (lead - (gap + unit))
+    total = gap + lost
+    high, rest = total * scale, (lost - (total - gap)) * scale
+    below = 2.0 + high
+    value = -high / below
+    error = fma(value, below, high) + (rest + value * ((high - (below - 2.0)) + rest))
+    value -= error / below
+    return choose(x < 0.0, -value, choose(x == 0.0, x, value))
+
+
 # Half the bits of a number, subtracted from this constant, are the bits of its inverse square root within 4 %
 # (Robertson, A Brief History of InvSqrt, 2012).
 ROOT_BITS = 0x5FE6EB50C7B537A9
