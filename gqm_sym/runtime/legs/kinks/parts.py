@@ -43,7 +43,7 @@ from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.runs.arrival import fill_v2_from_turn
 from gqm_sym.runtime.legs.runs.branch_points import branch_beside
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, END_TURN, End
-from gqm_sym.runtime.legs.runs.gaps import GAP_V2_RATIO, ROUNDINGS_OF_TIMES
+from gqm_sym.runtime.legs.runs.gaps import ROUNDINGS_OF_TIMES
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, unstretched, variable_for
 from gqm_sym.runtime.legs.runs.peaks import Stretch, peak_of_part
 from gqm_sym.runtime.legs.runs.whole_leg import CHECK, variable_of_leg
@@ -64,6 +64,10 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
 )
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_arrival_time, to_means
 
+# The least ratio of V**2 between two parts to the largest so far. A rounding of the latter has an effect on the time
+# that grows with the root of its inverse.
+LEAST_RATIO = 2.0**-9
+
 # The largest number of attempts for the parts of a leg.
 MAX_TRIES = 16
 
@@ -73,9 +77,10 @@ MIN_SHARE = 0.9
 # The share of the way to the next kink at which a turn is sought if V**2 vanishes before that.
 TO_SEEK = 0.75
 
-# The largest ratio of the length of a part to its distance from a turn behind or ahead of it. A longer one is divided
-# so that the rest has a smaller ratio, and the part next to the turn one of at most the last.
-MAX_GRADING, GRADING, NEXT_GRADING = 3.0, 2.7, 2.0
+# The largest ratio of the length of a part to its distance from a turn behind or ahead of it. A longer one is divided,
+# and what is not next to the turn then has a smaller ratio. For the other part the logarithm of the distance from the
+# turn is the variable.
+MAX_GRADING, GRADING = 3.0, 2.7
 
 # What is at the end of a part.
 AT_KINK, AT_TARGET, AT_LIMIT, BETWEEN = range(4)
@@ -256,17 +261,21 @@ def graded(near, far):  # type: ignore[no-untyped-def]
     """Return the length of the part next to a turn, at the distance ``near`` from it, that makes the part of the length
     ``far`` short enough as compared with its distance from the turn.
     """
-    enough = (far - GRADING * near) / (1.0 + GRADING)
-    return min(max(enough, near), NEXT_GRADING * near)
+    return max((far - GRADING * near) / (1.0 + GRADING), near)
 
 
 @Inner
 def divided(passed, room, rest):  # type: ignore[no-untyped-def]
-    """Return a distance at which a part may end, so that it is not much longer than its distances from turns."""
+    """Return a distance at which a part may end, so that it is not much longer than its distances from turns, or than
+    that from the one farther away if its variable is a logarithm of the other (`variable_between`).
+    """
     ahead = rest - room
-    if 0.0 < MAX_GRADING * ahead < room:
-        room -= graded(ahead, room)
-    return graded(passed, min(room, rest)) if 0.0 < MAX_GRADING * passed < min(room, rest) else room
+    if min(passed, ahead) > 0.0 and MAX_GRADING * max(passed, ahead) >= room:
+        return room
+    if passed > 0.0 and (ahead <= 0.0 or passed <= ahead):
+        far = min(room, rest)
+        return graded(passed, far) if MAX_GRADING * passed < far else room
+    return room - graded(ahead, room) if 0.0 < MAX_GRADING * ahead < room else room
 
 
 @Inner
@@ -357,7 +366,7 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
         if h == 0.0 or (stop == AT_LIMIT and not is_last):
             break
         end, largest = solve_part(part, blocks, h, is_last, work)
-        if not (is_last or end >= GAP_V2_RATIO * largest):
+        if not (is_last or end >= LEAST_RATIO * largest):
             if part.v2 == 0.0 or rest <= room:
                 break
             rest = TO_SEEK * room
@@ -385,7 +394,7 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
         if is_last or stop == AT_TARGET:
             what = END_TURN if is_last else END_PAUSE
             break
-    if reading.what == PEAKS and not route.until > part.time * (1.0 + ROUNDINGS_OF_TIMES):
+    if part.peak > reading.best and not route.until > part.time * (1.0 + ROUNDINGS_OF_TIMES):
         what = END_NONE  # only panels tell where the body is at that time
     record[HEAD + RIGHT], record[HEAD + TIME], record[HEAD + Y_ROW] = part.passed, part.time + part.time_low, part.peak
     record[HEAD + TIME_ERROR] = KNOWN_PEAK if reading.what == PEAKS else NO_VALUES

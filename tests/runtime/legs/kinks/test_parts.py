@@ -83,7 +83,7 @@ def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
     given = {"gamma": 1.0, "ell_c": 0.25, "t_max": 10.0}
 
     def swept(quantity: str, **more: Any) -> float:
-        return float(module.sweep(quantity, [start], 0.0, **given, **more).values[0])
+        return float(module.sweep(quantity, [start], 0.0, **(given | more)).values[0])
 
     with mp.workdps(28):
         body, turns = Droplet(0.0625), [mpf(start)]
@@ -99,6 +99,7 @@ def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
         a, b = turns[:2]
         fastest = largest(lambda x: body.v2(a, x), a, b)
         assert swept("v_max") == pytest.approx(fastest**0.5, rel=1e-15)
+        assert swept("v_max", t_max=0.5 * (ends[0] + ends[1])) == pytest.approx(fastest**0.5, rel=1e-15)
         assert swept("normal_force_max") == pytest.approx(largest(lambda x: body.load(a, x), a, b), rel=2e-15)
         for share in ("0.03125", "0.25", "0.5", "0.9375"):
             place = mpf(float(a + (b - a) * mpf(share)))
