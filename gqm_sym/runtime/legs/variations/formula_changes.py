@@ -117,7 +117,7 @@ def panelled(records, begins):  # type: ignore[no-untyped-def]
         record = records[begins[k] : begins[k + 1] if k + 1 < runs else records.size]
         parts.append(with_panels(record) if record[WHOLE_LEG] > 0.0 else record)
         total += parts[k + 1].size
-    line, starts, at = np.empty(total), np.empty_like(begins), 0
+    line, starts, at = np.empty(total), np.empty(runs, dtype=np.int64), 0
     for k in range(runs):
         starts[k], size = at, parts[k + 1].size
         line[at : at + size] = parts[k + 1]

@@ -10,6 +10,7 @@ from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import check_force
+from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
@@ -60,6 +61,7 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         check_force(self.problem.formulas, quantity)
+        selected(self.problem.formulas.parameters, wrt)
         if quantity in EXTREMES and not isfinite(getattr(self, quantity).value):
             raise SolutionError(
                 f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
