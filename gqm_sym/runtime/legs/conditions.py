@@ -16,8 +16,9 @@ from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
 # The number of panels for which a record has space in addition to one for each break; a leg with more is followed again
 # with a larger record. The number of legs that are followed in one call for a motion with a horizon, all legs of which
-# are needed.
-FEW_PANELS, LEGS_PER_CALL = 12, 8
+# are needed. The number of lines of a body that may have to be followed again past kinks: records without panels are
+# short, so that more of them have space.
+FEW_PANELS, LEGS_PER_CALL, LINES_PAST_KINKS = 12, 8, 24
 
 # The size of places along a chart below which their roundings do not decrease, as a share of a piece's mean length.
 PIECE_SHARE = 2.0**-6
@@ -79,9 +80,10 @@ def conditions_of(problem: Problem) -> Conditions:
         f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
         assert f.dissipation is not None
         track = Track(f.chart, f.joints, f.corners, f.liftoff_corners(only_sign)) if f.chart.size else SMOOTH
-        passes = track.is_kept(f.dissipation) or track.has_kinks(f.dissipation)
+        has_kinks = track.has_kinks(f.dissipation)
+        passes = track.is_kept(f.dissipation) or has_kinks
         given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0
-        lines = launched((given,), LEGS_PER_CALL if passes else 0)
+        lines = launched((given,), LINES_PAST_KINKS if has_kinks else LEGS_PER_CALL if passes else 0)
         if f.chart.size:
             lines[0, LEAST_SIZE] = PIECE_SHARE * float(f.chart[3] - f.chart[2]) / float(f.chart[1])
         space = FEW_PANELS + (0 if passes else track.breaks.size)

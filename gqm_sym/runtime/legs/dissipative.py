@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from math import inf, isnan
+from math import inf, isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -146,11 +146,19 @@ class DissipativeMotion(FollowedMotion):
 
     def _place_on_last_leg(self, t: float) -> float:
         record = self._driver.runs.last_turned
-        if record is None or not record[BEGIN] <= t:
+        place = self._place_on(record, t) if record is not None and record[BEGIN] <= t else nan
+        if isnan(place):
             run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
-            record = run.record if run.passed is None else run.passed
+            place = self._place_on(run.record if run.passed is None else run.passed, t)
+            if isnan(place):  # if the leg has no panels, it alone is followed once more
+                parts = [run] if run.before is None else self._driver.with_panels(run)
+                place = self._place_on(next(part.record for part in reversed(parts) if part.record[BEGIN] <= t), t)
+        return float(self.lam(t)) if isnan(place) else place
+
+    def _place_on(self, record: Array, t: float) -> float:
+        """Return the place at a time on a leg; NaN if its record does not determine it."""
         place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
-        return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
+        return float(place + record[LAPS_BEFORE] * self.problem.period)
 
     def lam(self, t: Any) -> Any:
         """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""

@@ -96,6 +96,9 @@ def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
             [float(x) for x in turns[1:]], rel=0.0, abs=4e-15
         )
         assert [leg.t_end for leg in motion.legs[:4]] == pytest.approx(ends, rel=2e-15)
+        last = motion.legs[-1].lam_end  # the last leg alone is followed for its place at the horizon
+        assert last == pytest.approx(motion.lam(10.0), rel=0.0, abs=2e-15)
+        assert last == motion.legs[-1].lam_end  # with all panels too
         a, b = turns[:2]
         fastest = largest(lambda x: body.v2(a, x), a, b)
         assert swept("v_max") == pytest.approx(fastest**0.5, rel=1e-15)
