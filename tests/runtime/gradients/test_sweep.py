@@ -39,6 +39,40 @@ def test_pendulums() -> None:
             assert abs(value - wanted) <= 2 * ULP * abs(wanted)
 
 
+@pytest.mark.parametrize("lam0", [0.6, 1.2, -0.5])
+def test_wells_of_two_shapes(lam0: float, generated_folder: Path) -> None:
+    """An attraction in a turning frame has wells about both ends of an ellipse's axis, which have different shapes.
+
+    Swept derivatives are those of the time between mirror images, as an integral with 40 digits.
+    """
+    force = gqm.CentralForce(centre=(0, "-1/3"), k=4) + gqm.RotatingFrame(Omega="3/10")
+    curve = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
+    module = gqm.build(gqm.derive(curve, force), name="two_wells", folder=generated_folder)
+    found = module.sweep("half_period", [lam0], gradient=("lam0", "k", "Omega"))
+
+    def half_period(start: mpf, k: mpf, omega: mpf) -> mpf:
+        def potential(u: mpf) -> mpf:
+            x, z = 2 * mp.cos(u), mp.sin(u) + mpf(1) / 3
+            return -k / mp.sqrt(x * x + z * z) - omega**2 * x * x / 2
+
+        middle = mp.pi / 2 if start > 0 else -mp.pi / 2
+        width = abs(middle - start)
+
+        def rate(phi: mpf) -> mpf:
+            u = middle + width * mp.sin(phi)
+            ds = mp.sqrt(4 * mp.sin(u) ** 2 + mp.cos(u) ** 2)
+            return ds * width * mp.cos(phi) / mp.sqrt(2 * (potential(start) - potential(u)))
+
+        return 2 * mp.quad(rate, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
+
+    with mp.workdps(40):
+        at, step = (mpf(lam0), mpf(4), mpf(3) / 10), mpf(10) ** -10
+        assert float(half_period(*at)) == pytest.approx(found.values[0], rel=4 * ULP)
+        for row in range(3):
+            sides = [half_period(*(x + sign * step * (i == row) for i, x in enumerate(at))) for sign in (1, -1)]
+            assert found.gradient[0, row] == pytest.approx(float((sides[0] - sides[1]) / (2 * step)), rel=1e-14)
+
+
 def test_turning_points_come_with_times() -> None:
     """A pendulum at rest turns at its mirror image; a thrown one turns where its energy ends; a lap has no turns."""
     module, lam0, v0 = generated("circle"), np.array([0.3, -1.2, 0.0, 0.5]), np.array([0.0, 0.0, 1.0, 12.0])

@@ -32,7 +32,8 @@ class Launches(NamedTuple):
     spans : (m, 2) array
         The turning points of each launch; NaN for a circulation.
     even : (m,) array
-        UNEVEN, or EVEN if the orbit is even about an axis of symmetry, or ABOUT_ONE_AXIS if it also contains no other.
+        UNEVEN, or EVEN if the orbit is even about an axis of symmetry, or ABOUT_ONE_AXIS if it also contains no other
+        and is an even number of steps away from the axis whose well has a closed form.
     from_axis : (m, n + 1) array
         The run-time parameters and lam0, the number of the axis, and the sign of the launch's distance from it.
     """
@@ -85,7 +86,9 @@ def fill_symmetry(places, steps, given, spans, found):  # type: ignore[no-untype
             number = number if number - number == 0.0 else 0.0
         axis = step * number
         is_even = fabs(middle - axis) <= EVEN_TOLERANCE * (fabs(low) + fabs(high) + fabs(place))
-        is_alone = step == 0.0 or high - low < 2.0 * fabs(step)
+        # Wells about axes that are an odd number of steps away may have another shape than the one that is known.
+        is_known = number == 2.0 * nearest_whole(0.5 * number)
+        is_alone = is_known and (step == 0.0 or high - low < 2.0 * fabs(step))
         even[i] = (ABOUT_ONE_AXIS if is_alone else EVEN) if is_even else UNEVEN
         for k in range(count):
             from_axis[i, k] = given[i, k]
