@@ -61,12 +61,13 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         check_force(self.problem.formulas, quantity)
-        selected(self.problem.formulas.parameters, wrt)
-        if quantity in EXTREMES and not isfinite(getattr(self, quantity).value):
-            raise SolutionError(
-                f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
-                "which this motion ends"
-            )
+        if quantity in EXTREMES:
+            selected(self.problem.formulas.parameters, wrt)  # names are checked before anything is computed
+            if not isfinite(getattr(self, quantity).value):
+                raise SolutionError(
+                    f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
+                    "which this motion ends"
+                )
         found = self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
         self._check_known(f"gradient of {quantity}", found, found.values())
         return found
