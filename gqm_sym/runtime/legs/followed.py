@@ -187,11 +187,8 @@ class FollowedMotion(Motion):
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
-        if self._horizon < inf:
-            driver = self._driver
-            while not driver.ending and driver.elapsed < self._horizon:
-                driver.go_on()
-            return
+        if isfinite(self._horizon):
+            self._follow(self._horizon)
         while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
             self._follow_next()
 
