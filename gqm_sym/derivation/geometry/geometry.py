@@ -248,6 +248,8 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
     tangent = direction_of(curve)
     algebra = tangent.algebra
     root = root_of_sum(tangent, signs)
+    if differentiate(curve.x, lam) == 1 and _is_written_out(tangent, root):
+        return _graph(curve, signs)
     scale = tangent.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
     rate = _turning_rate(tangent, root, (0, 1))
@@ -271,6 +273,30 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
         cusp=_cusp(signs, scale, lam),
         positive=signs.positive,
     )
+
+
+def _is_written_out(tangent: Direction, root: Root) -> bool:
+    """Return whether the slope of a graph, z(x), is better left as the derivative of the declared height.
+
+    Over a common denominator the terms of a numerator may grow so much more than the slope that its divided differences
+    lose all digits, and powers of an exponential or a hyperbolic cosine overflow. A slope without a denominator, and
+    one with which ds needs no root, are left in their normal form.
+    """
+    along, across = tangent.parts
+    if along.is_ground or not any(base.is_Pow and base.exp == sp.S.Half for base, _ in root.powers):
+        return False
+    slope = spell_ratio(tangent.algebra, across, along)
+    divides_sum = any(base.is_Add and power > 0 for base, power in slope)
+    return divides_sum or any(base.has(sp.exp, sp.sinh, sp.cosh) for base, power in slope if power < 0)
+
+
+def _graph(curve: Curve, signs: Signs) -> Geometry:
+    """Return the shape of a graph z(x) by the derivatives of z as it is declared."""
+    slope = differentiate(curve.z, curve.parameter)
+    square = 1 + slope**2
+    rate = differentiate(slope, curve.parameter) / square
+    first = (sp.S.One, sp.S.Zero, slope)
+    return _undivided(first, sp.sqrt(square), rate, positive=signs.positive, angle=sp.atan(slope))
 
 
 def _in_space(curve: Curve, signs: Signs) -> Geometry:

@@ -16,7 +16,9 @@ def offset_curve(x: sp.Expr, z: sp.Expr, shape: Geometry, radius: sp.Expr) -> tu
     """
     if not radius:
         return x, z, shape
-    share = sp.together(1 - shape.kappa * radius)
+    share = 1 - shape.kappa * radius
+    if not share.has(sp.exp, sp.sinh, sp.cosh):  # powers of these overflow in a common denominator
+        share = sp.together(share)
     centre = replace(
         shape,
         size=tidy(shape.size * share),
