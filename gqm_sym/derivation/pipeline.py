@@ -29,7 +29,7 @@ from gqm_sym.derivation.forces.dissipation import (
     dissipation,
 )
 from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
-from gqm_sym.derivation.forces.rider import has_upward_direction, rider, upright_force
+from gqm_sym.derivation.forces.rider import rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
@@ -139,10 +139,10 @@ def derive(
     law = of_train(body, kernel, lam) if kernel.cars else body
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
-    upright = upright_force(curve.banking, shape, body) if curve.banking else None
+    upright = upright_force(curve.banking, shape, body) if curve.banking else ()
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
-        loss = _losses(curve, kernel, (x, y, z), law, shape, upright or ())
+        loss = _losses(curve, kernel, (x, y, z), law, shape, upright)
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.in_other_forms + law.static_normal_load
     dxds, dyds, dzds = shape.tangent
@@ -198,7 +198,7 @@ def derive(
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
-        sided=not law.loads or upright is not None or (kernel.conservative and has_upward_direction(curve.banking)),
+        sided=not law.loads or bool(upright),
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
         common_factor=shape.size,
     )
@@ -279,7 +279,7 @@ def _losses(
         **dict(zip(TURNS, shape.turning, strict=False)),
         **dict(zip(LOADS, law.loads, strict=False)),
         **dict(zip(CORIOLIS, law.coriolis, strict=False)),
-        **dict(zip(UPRIGHT, reversed(upright), strict=False)),
+        **dict(zip(UPRIGHT, upright, strict=False)),
     }
     mean_car_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
     loss = dissipation(kernel, pieces, coordinates, signs, mean_car_load)

@@ -93,17 +93,23 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     )
 
 
-def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, sp.Expr] | None:
-    """Return κ and n₀ for which κ W + n₀ is the component of N/m along the rider's upward direction.
+def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, ...]:
+    """Return n₀ and κ for which κ W + n₀ is the component of N/m along the rider's upward direction; in a rotating
+    frame a third number, which is added to it for each unit of ds/dt.
 
-    The result is None in a vertical plane, where N has a sign; if that direction depends on the motion; and in a
-    rotating frame, where that component also depends on the direction of motion.
+    There are none in a vertical plane, where N has a sign, and if that direction depends on the motion.
     """
-    if shape.heading is not None or law.coriolis or not has_upward_direction(banking):
-        return None
+    if shape.heading is not None or not has_upward_direction(banking):
+        return ()
     upright = _in_space(banking, shape, law).vertical
     load = upright.xreplace({W: sp.S.Zero})
-    return differentiate(upright, W), load
+    if not law.coriolis:
+        return load, differentiate(upright, W)
+    return (
+        load,
+        differentiate(upright.xreplace({DIRECTION: sp.S.Zero}), W),
+        differentiate(upright, DIRECTION) / sp.sqrt(W),
+    )
 
 
 def has_upward_direction(banking: Banking | None) -> bool:
