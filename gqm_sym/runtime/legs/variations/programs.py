@@ -41,16 +41,20 @@ def rates_program(law: ExactLaw, parameters: int) -> Program:
 
 
 @lru_cache(maxsize=64)
-def law_in_doubles(law: ExactLaw, parameters: int) -> LaneProgram:
-    """Return the program of `law_program` in double precision.
+def law_in_doubles(law: ExactLaw, parameters: int, *, timed: bool) -> LaneProgram:
+    """Return the program of `law_program` in double precision; unless ``timed``, without ds/dlam and its derivatives.
 
     The inputs are the run-time parameters. The coordinates of a place are those of a state (`law.states_of`), of which
     the low double of the place does not matter.
     """
     op = LaneRecorder(parameters, 5)
     (lam, _, w, *signs), p = op.places, op.values
-    ds, slope = op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
-    return assemble_lanes(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
+    slope = op.number(law.speed_slope(op, lam, w, *signs, p))
+    outputs = [slope, *gradient(op, slope, [lam, w, *p])]
+    if timed:
+        ds = op.number(law.ds(op, lam, p))
+        outputs = [ds, *gradient(op, ds, [lam, *p]), *outputs]
+    return assemble_lanes(op, outputs)
 
 
 @lru_cache(maxsize=64)
