@@ -224,10 +224,11 @@ def _force_slopes(
         except GQMError:
             return None
         return found
-    if model.directed:
+    if model.directed and getattr(model.exact, "coriolis_loads", None) is None:
         return None
     problem = Problem(model, read_launch(model, p, request), p, model.domain(p))
-    rows = results(extreme_program(source_of(model), of_speed=False), variables_of(problem), places)[:, 0]
+    program = extreme_program(source_of(model), of_speed=False, direction=problem.launch.direction)
+    rows = results(program, variables_of(problem), places)[:, 0]
     found[0], found[1:] = rows[1], rows[3:-1]
     return found
 

@@ -31,13 +31,20 @@ _NAMES = {
     **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
     **{symbol: f"turn_{axis}" for symbol, axis in zip(TURNS, "xyz", strict=True)},
     **{symbol: f"load_{axis}" for symbol, axis in zip(LOADS, "xyz", strict=True)},
-    **dict(zip(UPRIGHT, ("n0_upright", "kappa_upright"), strict=True)),
+    **dict(zip(UPRIGHT, ("n0_upright", "kappa_upright", "coriolis_upright"), strict=True)),
     **{symbol: f"coriolis_{axis}" for symbol, axis in zip(CORIOLIS, "xyz", strict=True)},
 }
 """The names in emitted code of the geometric forms in a force law."""
 
 # The description of a scalar product that the square of a contact force in space is made of.
 ALONG_CURVATURE = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
+
+# The same in a rotating frame, and what odd powers of the velocity V = ds/dt add to it.
+ALONG_CURVATURE_TURNING = (
+    "c, where |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2 + odd powers of V), n0 = |N|/m at rest."
+)
+CORIOLIS_LOADS = "a and b, so that the odd powers of V = ds/dt in |N|**2 are m**2*2*V*(a + b*V**2)."
+CORIOLIS_VECTOR = "The vector that V = ds/dt adds to t x N/m for each unit of V, t being the tangent."
 
 
 @dataclass(frozen=True)
@@ -72,8 +79,9 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     contact, force = "n0, kappa", ", N = m*(kappa*V**2 + n0)"
     if lowering.model.loads:
         contact, force = ("|n0|, |kappa|" if loss.linear else "|N|/m, 0"), ""
-        if loss.contact == UPRIGHT:
-            contact = "n0 and kappa along the upward direction of riders"
+        if UPRIGHT[0] in loss.contact[0].free_symbols:
+            contact = "n0 and kappa" if loss.contact[1] else "N/m and 0"
+            contact += " along the upward direction of riders"
     doc = (
         f"ds/d{lam}, P, Q, {contact}: dV**2/d{lam} = P - Q*V**2{linearised}{force} (paper, eq. 19); "
         "v = sgn(ds/dt), nu = sgn(N)."
@@ -113,9 +121,26 @@ def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
     return lowering.exact_function("speed_slope", doc, (form,), (lowering.place, w, v, nu))
 
 
-def load_along_curvature(model: Model) -> Expr:
-    """Return the scalar product of the vectors whose lengths are kappa and n0, for a curve in no vertical plane."""
-    return sympy.Add(*(bend * load for bend, load in zip(model.curvature_binormal, model.loads, strict=True)))
+def contact_products(model: Model) -> tuple[tuple[str, str, tuple[Expr, ...]], ...]:
+    """Return the formulas from which ``|N|**2`` follows besides kappa and n0, each with its name and description;
+    nothing in a vertical plane.
+
+    With t × N/m = W b + ℓ + V a it is a polynomial in the velocity V.
+    """
+    if not model.loads:
+        return ()
+    bend, load, aside = model.curvature_binormal, model.loads, model.coriolis
+    if not aside:
+        return (("load_along_curvature", ALONG_CURVATURE, (_dot(bend, load),)),)
+    even = _dot(bend, load) + _dot(aside, aside) / 2
+    return (
+        ("load_along_curvature", ALONG_CURVATURE_TURNING, (even,)),
+        ("coriolis_loads", CORIOLIS_LOADS, (_dot(load, aside), _dot(bend, aside))),
+    )
+
+
+def _dot(one: Sequence[Expr], other: Sequence[Expr]) -> Expr:
+    return sympy.Add(*(a * b for a, b in zip(one, other, strict=True)))
 
 
 def _planar_point(place: Symbol) -> tuple[Expr, ...]:
@@ -146,10 +171,11 @@ def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
         lowering.exact_function("static_normal_load", "n0 = N/m of a body at rest (paper, eq. 15).", (load,), point),
         lowering.exact_function("speed_slope", doc, (slope,), (*point, w, v, nu)),
     )
-    if not model.loads or model.coriolis:
-        return found
-    product = load_along_curvature(model).xreplace(known)
-    return (*found, lowering.exact_function("load_along_curvature", ALONG_CURVATURE, (product,), point))
+    products = (
+        lowering.exact_function(name, text, tuple(form.xreplace(known) for form in forms), point)
+        for name, text, forms in contact_products(model)
+    )
+    return (*found, *products)
 
 
 def _in_pieces(

@@ -9,9 +9,9 @@ from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import FORWARDS, Lowering
 from gqm_sym.emission.dissipative import (
-    ALONG_CURVATURE,
+    CORIOLIS_VECTOR,
     chart_law,
-    load_along_curvature,
+    contact_products,
     speed_equation,
     speed_slope,
     squared_contact,
@@ -24,6 +24,7 @@ from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import exact_axis_orbits
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
+from gqm_sym.sympy_charts import AXES, SPACE_ROWS
 
 FLAGS = ("friction", "kinked", "linear")
 """The parts of a module for a force law that is not conservative."""
@@ -243,10 +244,7 @@ class _ModelLowering(Lowering):
         model = self.model
         if not model.curve.in_space:
             return ()
-        found: list[tuple[str, str, tuple[Expr, ...]]] = [("y", "Second horizontal coordinate.", (model.y,))]
-        if model.loads and not model.coriolis:
-            found.append(("load_along_curvature", ALONG_CURVATURE, (load_along_curvature(model),)))
-        return tuple(found)
+        return (("y", "Second horizontal coordinate.", (model.y,)), *contact_products(model))
 
     def exact_potential(self) -> tuple[ExactIR, ...]:
         """Return the effective potential and its gradient in terms of coordinates; nothing if it depends on more than
@@ -258,7 +256,12 @@ class _ModelLowering(Lowering):
         outputs = (potential, *(differentiate(potential, coordinate) for coordinate in places))
         named = "x, y and z" if self.model.curve.in_space else "x and z"
         doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
-        return (self.exact_function("effective_potential", doc, outputs, places),)
+        found = self.exact_function("effective_potential", doc, outputs, places)
+        if not self.model.coriolis:
+            return (found,)
+        tangent = {SPACE_ROWS[axis][1](self.place): self.names.symbol(f"d{axis}ds") for axis in AXES}
+        aside = tuple(form.xreplace(tangent) for form in self.model.coriolis)
+        return found, self.exact_function("coriolis", CORIOLIS_VECTOR, aside, tuple(tangent.values()))
 
     def domain(self) -> ExactIR:
         """Return the formula for the range of the curve's parameter."""

@@ -28,7 +28,11 @@ _RUNTIME = ("CompiledFunctions", "CompiledModel")
 _WIDTH = 116
 
 # Formulas for speed that only some modules have, by the names under which the record of formulas has them.
-_BY_KEYWORD = {"exact_agm_arguments": "agm_arguments", "exact_time_integrand": "time_integrand"}
+_BY_KEYWORD = {
+    "exact_agm_arguments": "agm_arguments",
+    "exact_coriolis_loads": "coriolis_loads",
+    "exact_time_integrand": "time_integrand",
+}
 # The functions of one motion, as the interface orders them.
 _COMPILED_FUNCTIONS = (
     "path_and_contact_force",

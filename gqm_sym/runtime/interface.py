@@ -275,10 +275,13 @@ class SeparatedTerms(NamedTuple):
 class ExactPotential(NamedTuple):
     """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives with respect to x and z.
 
-    In space it is ``f(op, x, y, z, p)``, with the derivatives with respect to x, y and z.
+    In space it is ``f(op, x, y, z, p)``, with the derivatives with respect to x, y and z. In a rotating frame there,
+    ``coriolis`` gives the vector that V = ds/dt adds to t x N/m for each unit of V, along x, y and z, where t is the
+    tangent: ``f(op, dxds, dyds, dzds, p)``.
     """
 
     effective_potential: Callable[..., Any]
+    coriolis: Callable[..., Any] | None = None
 
 
 class ExactChartLaw(NamedTuple):
@@ -287,22 +290,23 @@ class ExactChartLaw(NamedTuple):
     ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
     V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N). In space x, y and z take the
     place of x and z, so that there are three derivatives too, and their second derivatives that of kappa; n0 then is
-    the length |N|/m at rest, and ``load_along_curvature`` is that of `ExactFormulas`.
+    the length |N|/m at rest, and ``load_along_curvature`` and ``coriolis_loads`` are those of `ExactFormulas`.
     """
 
     static_normal_load: Callable[..., Any]
     speed_slope: Callable[..., Any]
     load_along_curvature: Callable[..., Any] | None = None
+    coriolis_loads: Callable[..., Any] | None = None
 
 
 class ExactFormulas(NamedTuple):
     """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``.
 
     ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. A space curve has ``y``; one
-    that lies in no vertical plane also has ``load_along_curvature``, the scalar product [1/s2] of the vectors whose
-    lengths are kappa and n0. Where the time of orbits about an axis of symmetry has a closed form, the formulas of
-    ``agm_arguments_batch``, ``f(op, half, p)``, or of ``time_integrand_batch``, ``f(op, half, sine2, cosine2, p)``,
-    follow.
+    that lies in no vertical plane also has ``load_along_curvature``, half of the factor [1/s2] of V**2 in (N/m)**2. In
+    a rotating frame ``coriolis_loads`` has half of the factors of V = ds/dt [m/s3] and of V**3 [1/(m s)]. Where the
+    time of orbits about an axis of symmetry has a closed form, the formulas of ``agm_arguments_batch``, ``f(op, half,
+    p)``, or of ``time_integrand_batch``, ``f(op, half, sine2, cosine2, p)``, follow.
     """
 
     x: Callable[..., Any]
@@ -314,6 +318,7 @@ class ExactFormulas(NamedTuple):
     effective_potential_slope: Callable[..., Any]
     y: Callable[..., Any] | None = None
     load_along_curvature: Callable[..., Any] | None = None
+    coriolis_loads: Callable[..., Any] | None = None
     agm_arguments: Callable[..., Any] | None = None
     time_integrand: Callable[..., Any] | None = None
 
@@ -333,3 +338,4 @@ class ExactLaw(NamedTuple):
     speed_slope: Callable[..., Any]
     y: Callable[..., Any] | None = None
     load_along_curvature: Callable[..., Any] | None = None
+    coriolis_loads: Callable[..., Any] | None = None

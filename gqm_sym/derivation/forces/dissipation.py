@@ -17,7 +17,7 @@ from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, Kernel, W
 SIGMA, TURN, PUSH, LOAD, TILT = (sp.Symbol(name, real=True) for name in ("σ", "dΘ/dλ", "F·t", "n₀", "dx/ds"))
 TURNS = tuple(sp.Symbol(f"(t × dt/dλ)_{axis}", real=True) for axis in "xyz")
 LOADS = tuple(sp.Symbol(f"-(t × F)_{axis}", real=True) for axis in "xyz")
-UPRIGHT = tuple(sp.Symbol(name, real=True) for name in ("n₀·u", "κ·u"))
+UPRIGHT = tuple(sp.Symbol(name, real=True) for name in ("n₀·u", "κ·u", "2 Ω (ẑ × t)·u"))
 CORIOLIS = tuple(sp.Symbol(f"2 Ω (t × (ẑ × t))_{axis}", real=True) for axis in "xyz")
 
 
@@ -40,7 +40,8 @@ class Dissipation:
     contact
         The contact force per unit mass in terms of the pieces: its value at rest, and the factor of W. For a curve in
         no vertical plane it has no sign, and if the law is not linear in W the first is the whole force; on a banked
-        curve both are components along the upward direction of riders.
+        curve both are components along the upward direction of riders, and in a rotating frame the first is the whole
+        component.
     squared_contact
         On a curve in no vertical plane, for one body: the coefficients of 1, W and W² in (N/m)², and the factor of
         -v |N|/m in dW/dλ, all in terms of the pieces. Apart from friction the law is linear in W. Empty for other laws.
@@ -107,11 +108,13 @@ def dissipation(
         other -= v * kernel.friction * sp.sqrt((LOAD + KAPPA * W) ** 2 + sideways**2 * W)
         sliding = sp.S.Zero
     if UPRIGHT[0] in pieces:
-        contact = UPRIGHT
+        still, turn, aside = UPRIGHT
+        contact = (still + turn * W + v * sp.sqrt(W) * aside, sp.S.Zero) if kernel.spin else (still, turn)
     slope = differentiate(other, W)
     linear = W not in sp.expand(slope).free_symbols
     squared = _squared_contact(kernel) if linear and mean_car_load is None and TURNS[0] in pieces else ()
-    linear = linear and not rubbing
+    # A contact force that is not linear in W is evaluated at the W of each step, as the law is.
+    linear = linear and not rubbing and not (kernel.spin and UPRIGHT[0] in pieces)
     if linear:
         slope = sp.expand(slope)
     constant_part = sp.expand(other - slope * W) if linear else other - slope * W

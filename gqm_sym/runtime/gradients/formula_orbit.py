@@ -248,8 +248,6 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         """Return `path_rows` at places."""
         return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)
 
-    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
-        """Return half of V**2, or the contact force, at places, with two derivatives with respect to the place and
-        those with respect to all variables.
-        """
-        return values(extreme_program(self.source, of_speed), self.variables, place)[:, 0]
+    def extreme_rows(self, place: Array, *, of_speed: bool, direction: int = 1) -> Array:
+        """Return what `OrbitDerivatives.extreme_rows` does."""
+        return values(extreme_program(self.source, of_speed, direction), self.variables, place)[:, 0]

@@ -41,8 +41,12 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     SolutionError
         If the quantity depends on the contact force, and that has neither a sign nor a formula.
     """
-    has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
-    has_force = has_force or (isinstance(formulas.exact, ExactPotential) and not formulas.directed)
+    exact = formulas.exact
+    has_force = formulas.signed or isinstance(exact, ExactPotential)
+    has_force = has_force or getattr(exact, "load_along_curvature", None) is not None
+    if formulas.directed:
+        aside = "coriolis" if isinstance(exact, ExactPotential) else "coriolis_loads"
+        has_force = getattr(exact, aside, None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
             f"gradients: there are none of {quantity}, because the contact force has no known derivatives on a space "
@@ -107,9 +111,9 @@ class OrbitDerivatives(ABC):
         """Return `path_rows` at places."""
 
     @abstractmethod
-    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
+    def extreme_rows(self, place: Array, *, of_speed: bool, direction: int = 1) -> Array:
         """Return half of V**2, or the contact force, at places, with two derivatives with respect to the place and
-        those with respect to all variables.
+        those with respect to all variables; ``direction`` is the sign of ds/dt.
         """
 
     @abstractmethod

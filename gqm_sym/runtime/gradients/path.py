@@ -12,7 +12,7 @@ from gqm_sym.runtime.gradients.programs import path_program
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 
 # The quantities of a path (`programs.path_program`).
-X, Z, DS, CURVATURE, LOAD, POTENTIAL, SPACE_Y, PRODUCT = range(8)
+X, Z, DS, CURVATURE, LOAD, POTENTIAL, SPACE_Y, PRODUCT, ASIDE, ASIDE_TURN = range(10)
 
 # The rows of changes of states along a path. The change of the velocity is given.
 CHANGED_X, CHANGED_Z, CHANGED_V, CHANGED_FORCE, CHANGED_Y = range(5)
@@ -26,7 +26,8 @@ class PathRows(NamedTuple):
     rows : (k, m + 2, n) array
         For x, z, ds/dlam, m*kappa, m*n0 and U (0 of a motion with losses) the values, and the derivatives with respect
         to m parameters and the place. Those of y follow for a space curve, and those of m**2 times
-        ``load_along_curvature`` for one in no vertical plane.
+        ``load_along_curvature`` for one in no vertical plane, and of m**2 times both ``coriolis_loads`` in a rotating
+        frame.
     """
 
     rows: Array
@@ -57,6 +58,17 @@ def path_rows(
     count = parameters.shape[1]
     found = values(path_program(formulas, count, mass), parameters, high, low, parts=1)
     return PathRows(found.reshape(len(found) // (count + 2), count + 2, high.size))
+
+
+def squared_force_rate(path: PathRows, v: Array) -> Array:
+    """Return half of d(N**2)/dt along a space curve in a rotating frame, given velocities ds/dt along the path."""
+    ds, along, w = path.ds[0], path.rows[:, -1] * (v / path.ds[0]), v * v
+    kinds = CURVATURE, LOAD, PRODUCT, ASIDE, ASIDE_TURN
+    (kappa, load, product, aside, turning), rates = path.rows[kinds, 0], along[list(kinds)]
+    factors = np.array([kappa * w * w, load, w, v, v * w])
+    by_speed = 2.0 * v * (kappa * kappa * w + product) + aside + 3.0 * turning * w
+    rate: Array = (factors * rates).sum(axis=0) - by_speed * path.rows[POTENTIAL, -1] / ds
+    return rate
 
 
 @Inner
@@ -90,6 +102,7 @@ def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
     """
     in_space, signed, spare = path.shape[0] > SPACE_Y, path.shape[0] <= PRODUCT, np.empty((2, v.size))
     kappa, still, kappa_change, product = path[CURVATURE, 0], path[LOAD, 0], spare[0], spare[1]
+    turns, aside, aside_turn = path.shape[0] > ASIDE, np.empty(v.size), np.empty(v.size)
     for j in range(places.shape[0]):
         faster, force = found[CHANGED_V, j], found[CHANGED_FORCE, j]
         fill_changed(path[X], j, places[j], found[CHANGED_X, j])
@@ -105,9 +118,17 @@ def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
                 force[i] += v[i] * v[i] * kappa_change[i] + 2.0 * v[i] * kappa[i] * faster[i]
         else:
             fill_changed(path[PRODUCT], j, places[j], product)
+            if turns:
+                fill_changed(path[ASIDE], j, places[j], aside)
+                fill_changed(path[ASIDE_TURN], j, places[j], aside_turn)
             for i in range(v.size):
                 w, level = v[i] * v[i], path[PRODUCT, 0, i]
                 half_square = kappa[i] * w * w * kappa_change[i] + w * product[i] + still[i] * force[i]
                 half_square += 2.0 * v[i] * (kappa[i] * kappa[i] * w + level) * faster[i]
+                square = (kappa[i] * w) ** 2 + 2.0 * level * w + still[i] * still[i]
+                if turns:
+                    at_rest, turning = path[ASIDE, 0, i], path[ASIDE_TURN, 0, i]
+                    half_square += v[i] * (aside[i] + aside_turn[i] * w) + (at_rest + 3.0 * turning * w) * faster[i]
+                    square += 2.0 * v[i] * (at_rest + turning * w)
                 # |N| has a kink where it vanishes.
-                force[i] = half_square / sqrt((kappa[i] * w) ** 2 + 2.0 * level * w + still[i] * still[i])
+                force[i] = half_square / sqrt(square)

@@ -287,8 +287,8 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
-    ds/dlam, m*kappa, m*n0, U (0 with losses), y of a space curve, and m**2 times ``load_along_curvature`` of one in no
-    vertical plane.
+    ds/dlam, m*kappa, m*n0, U (0 with losses), y of a space curve, m**2 times ``load_along_curvature`` of one in no
+    vertical plane, and m**2 times both ``coriolis_loads`` of one in a rotating frame.
     """
     op = Recorder(parameters)
     arguments, m = (op, op.place, op.values), op.values[mass]
@@ -300,6 +300,8 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
         quantities.append(formulas.y(*arguments))
     if formulas.load_along_curvature is not None:
         quantities.append(m * m * formulas.load_along_curvature(*arguments))
+    if formulas.coriolis_loads is not None:
+        quantities += [m * m * part for part in formulas.coriolis_loads(*arguments)]
     return with_derivatives(op, quantities, [*op.values, op.place])
 
 
@@ -315,25 +317,53 @@ def range_program(domain: Callable[..., Any], parameters: int) -> Program:
     return with_derivatives(op, numbers, op.values)
 
 
-def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, w: Any) -> Any:
-    """Record N/m for V**2 = ``w``; for a curve that lies in no vertical plane, ``|N|/m``."""
-    curvature, load = (f(op, lam, op.values) for f in (formulas.kappa, formulas.static_normal_load))
-    if formulas.load_along_curvature is None:
+class ContactForms(NamedTuple):
+    """The parts of the contact force at a place, per unit mass.
+
+    Attributes
+    ----------
+    curvature, load
+        kappa, and N/m at rest.
+    product
+        ``load_along_curvature``; None in a vertical plane.
+    aside
+        ``coriolis_loads``; None in a frame that does not turn.
+    """
+
+    curvature: Any
+    load: Any
+    product: Any = None
+    aside: Any = None
+
+
+def contact_forms(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, p: Any) -> ContactForms:
+    """Record the parts of the contact force at a place by the formulas of a module."""
+    known = formulas.kappa, formulas.static_normal_load, formulas.load_along_curvature, formulas.coriolis_loads
+    return ContactForms(*(None if formula is None else formula(op, lam, p) for formula in known))
+
+
+def length_of_contact(op: Recorder, forms: ContactForms, w: Any, direction: Any) -> Any:
+    """Record N/m for V**2 = ``w`` and the sign of ds/dt; for a curve that lies in no vertical plane, ``|N|/m``."""
+    curvature, load, product, aside = forms
+    if product is None:
         return curvature * w + load
-    product = formulas.load_along_curvature(op, lam, op.values)
-    return op.sqrt(curvature * curvature * w * w + 2 * product * w + load * load)
+    square = curvature * curvature * w * w + 2 * product * w + load * load
+    if aside is not None:
+        square = square + 2 * direction * op.sqrt(w) * (aside[0] + aside[1] * w)
+    return op.sqrt(square)
 
 
 @lru_cache(maxsize=64)
-def extreme_program(source: Source, of_speed: bool) -> Program:
+def extreme_program(source: Source, of_speed: bool, direction: int = 1) -> Program:
     """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative
     with respect to the place.
 
-    The inputs are the variables; the derivatives with respect to them follow.
+    The inputs are the variables; the derivatives with respect to them follow. ``direction`` is the sign of ds/dt.
     """
     op = Recorder(source.variables)
     quantity = source.half(op, op.place)
     if not of_speed:
-        quantity = op.values[source.mass] * load_per_mass(op, source.formulas, op.place, 2 * quantity)
+        forms = contact_forms(op, source.formulas, op.place, op.values)
+        quantity = op.values[source.mass] * length_of_contact(op, forms, 2 * quantity, direction)
     slope, *partials = gradient(op, quantity, [op.place, *op.values])
     return assemble(op, [quantity, slope, *gradient(op, slope, [op.place]), *partials])

@@ -12,6 +12,7 @@ from gqm_sym.arguments import names, one_of, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.path import squared_force_rate
 from gqm_sym.runtime.gradients.second_programs import pairs_of
 from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 
@@ -21,6 +22,10 @@ PERIODS = ("half_period", "period")
 # An extreme that is nearer to a turning point than this share of the orbit's width counts as being there. The place of
 # any other extreme is improved by Newton's method, whose steps may be at most this share of the width.
 AT_TURN, MAX_STEP, NEWTON_STEPS = 1e-12, 1e-5, 3
+
+# Where V**2 is below this share of its largest value, extremes of a contact force that depends on the direction of
+# motion are improved in time; their second derivative is a difference over this share of the period.
+SLOW, STEP_IN_TIME = 1e-6, 1e-4
 
 # An extreme that is nearer to a break of the curve than the first share of the orbit's width counts as being there. At
 # a distance of the second share, a place is on one side of the break.
@@ -114,13 +119,19 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
 
     Inside the orbit the extreme changes as the quantity does at a fixed place, because the quantity is stationary there
     (envelope theorem). At a turning point, or where a horizon cuts the motion, the place changes too. At a break of the
-    curve the extreme stays there, as the limit from one of its sides.
+    curve the extreme stays there, as the limit from one of its sides. Where the contact force depends on the direction
+    of motion, it is smooth in time at turning points but not in the place: there it is stationary in time.
     """
     extreme, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     found = np.zeros(derivatives.source.variables)
     if of_speed and extreme.value == 0.0:
         return found
-    place = np.array([extreme.lam])
+    place, heading = np.array([extreme.lam]), 1
+    if motion.problem.formulas.directed and not of_speed:
+        state = motion.state(extreme.t)
+        heading = -1 if state.v < 0.0 else 1
+        if state.v2 <= SLOW * motion.v_max.value**2:
+            return _force_change(derivatives, motion, extreme.t)
     width, moved = abs(motion.problem.period), found
     if not derivatives.direction:
         ends = derivatives.turning_points
@@ -131,18 +142,33 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
     if moved is found:
         sides = _beside_break(motion, extreme.lam, width)
         if sides is not None:
-            rows = derivatives.extreme_rows(sides, of_speed=of_speed)
+            rows = derivatives.extreme_rows(sides, of_speed=of_speed, direction=heading)
             wanted = 0.5 * extreme.value**2 if of_speed else extreme.value
             near, far = rows.reshape(-1, 2, 2)[3:, np.abs(rows[0, ::2] - wanted).argmin()].T
             on_side: Array = (2.0 * near - far) / (extreme.value if of_speed else 1.0)
             return on_side
-        place, is_stationary = _improved(derivatives, of_speed, place, width)
+        place, is_stationary = _improved(derivatives, of_speed, heading, place, width)
         if not is_stationary and motion.t_end < motion.period:
             everything = (*motion.problem.formulas.parameters, "lam0", "v0")
             moved = derivatives.relative_change(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
-    (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
+    (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed, direction=heading)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total
+
+
+def _force_change(derivatives: OrbitDerivatives, motion: Any, t: float) -> Array:
+    """Return the derivatives of the contact force with respect to all variables at a time near ``t`` at which it is
+    stationary; at ``t`` itself, if there is none.
+    """
+    everything, step = (*motion.problem.formulas.parameters, "lam0", "v0"), STEP_IN_TIME * motion.period
+    for _ in range(NEWTON_STEPS):
+        states = motion.state(t + step * np.array([-1.0, 0.0, 1.0]))
+        before, rate, after = squared_force_rate(derivatives.at_places(states.lam), states.v)
+        moved = -2.0 * step * rate / (after - before) if after != before else 0.0
+        if not abs(moved) <= step or not 0.0 < t + moved < motion.t_end:
+            break
+        t += moved
+    return np.append(motion._sensitivity(t, everything).normal_force, 0.0)
 
 
 def _beside_break(motion: Any, place: float, width: float) -> Array | None:
@@ -162,14 +188,16 @@ def _beside_break(motion: Any, place: float, width: float) -> Array | None:
     return sides
 
 
-def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width: float) -> tuple[Array, bool]:
+def _improved(
+    derivatives: OrbitDerivatives, of_speed: bool, direction: int, place: Array, width: float
+) -> tuple[Array, bool]:
     """Return the place of an extreme inside an orbit by Newton's method, and whether the quantity is stationary there.
 
     If the quantity is constant, or nearly so, the place does not matter and is not changed.
     """
     found = place
     for _ in range(NEWTON_STEPS):
-        _, slope, curvature, *_ = derivatives.extreme_rows(found, of_speed=of_speed)
+        _, slope, curvature, *_ = derivatives.extreme_rows(found, of_speed=of_speed, direction=direction)
         step = np.divide(slope, curvature, where=curvature != 0.0, out=np.zeros(1))
         if not abs(step[0]) <= MAX_STEP * width:
             return place, False

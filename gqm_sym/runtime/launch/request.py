@@ -147,9 +147,6 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
             f"contact: {contact!r} needs to know which side of this space curve the body is on: declare the upward "
             "direction by Curve.space(..., roll=...), as an angle (0 is level) or for a speed; without it the body is "
             "held from all sides, which is 'bilateral'"
-            if not (formulas.directed and formulas.dissipation)
-            else f"contact: {contact!r} is not known of bodies that lose energy on a space curve in a frame that "
-            "turns; leave it 'bilateral'"
         )
 
 

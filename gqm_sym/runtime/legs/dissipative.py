@@ -38,7 +38,7 @@ from gqm_sym.runtime.legs.variations.answers import (
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import computed_once, locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.rows import Rows
@@ -300,7 +300,7 @@ class DissipativeMotion(FollowedMotion):
         rows = selected(self.problem.formulas.parameters, wrt)
         self._look_ahead()
         if quantity == "turning_points":
-            columns = list(zip(*turning_points(self), strict=True))
+            columns = self._turning_changes
             return {name: columns[row] if columns else () for name, row in rows.items()}
         found = gradient(self, quantity).tolist()
         return {name: found[row] for name, row in rows.items()}
@@ -364,15 +364,20 @@ class DissipativeMotion(FollowedMotion):
             self._follow_again()
         return self._all_runs
 
-    def _turns_and_changes(self) -> tuple[list[int], Changes | None]:
+    @computed_once
+    def _turning_changes(self) -> list[tuple[float, ...]]:
+        """The derivatives of the turning points with respect to each variable; empty if there are no such points."""
+        return list(zip(*turning_points(self), strict=True))
+
+    def _turns_with_runs(self) -> tuple[list[int], list[Run]]:
         """Return the numbers of the runs at the ends of which are the turning points of the motion, without the launch,
-        and the derivatives of the runs up to there; None if there are no such turns.
+        and the runs up to the last of them.
         """
         runs = self._varied_runs
         turns = [k for k, run in enumerate(runs[: self._beginning or None]) if run.end == TURN]
         if turns and turns[-1] + 1 == len(runs) and self._driver.elapsed > self._horizon:
             turns.pop()
-        return turns, self._changes_along(runs[: turns[-1] + 1]) if turns else None
+        return turns, runs[: turns[-1] + 1] if turns else []
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""

@@ -171,7 +171,8 @@ class Driver:
     @property
     def elapsed(self) -> float:
         """The time in s up to which the body has been driven."""
-        return self.number(ELAPSED)
+        elapsed: float = self.body.item(ELAPSED)
+        return elapsed
 
     def number(self, at: int) -> float:
         """Return one of the numbers of the body (`legs.body`)."""
@@ -203,16 +204,19 @@ class Driver:
         if what != END_TURN and not number(DIRECTION) and not number(TURNS):
             return  # the body stays where it is
         count, at = int(number(VALUE)), int(number(LAST_AT))
-        line = records.reshape(-1)[: int(number(TOTAL))].copy()  # most legs take a small part of the space
-        before = self.body[1 : 1 + count].copy() if self._conditions.passes and self._frame is None else None
+        line = records.reshape(-1)[: int(number(TOTAL))]
+        if 2 * line.size < records.size:  # many legs take a small part of the space
+            line = line.copy()
+        conditions, frame = self._conditions, self._frame
+        before = self.body[1 : 1 + count].copy() if conditions.passes and frame is None else None
         self._last_record = last = line[at:]
-        if what == END_TURN and self._frame is None and not number(STATUS):
-            self.runs.append(TurnedLegs(line, count, at, before))
+        if what == END_TURN and frame is None and not number(STATUS):
+            # This avoids the constructor of a named tuple, which is slow.
+            self.runs.append(tuple.__new__(TurnedLegs, (line, count, at, before)))
             return
         if count > 1:
             self.runs.append(TurnedLegs(line, count - 1, -1, before))
-        if what == END_PAUSE and self._frame is None and not number(STATUS) and not self._creeps(number):
-            # This avoids the constructor of a named tuple, which is slow.
+        if what == END_PAUSE and frame is None and not number(STATUS) and not self._creeps(number):
             self.runs.append(tuple.__new__(Run, (last, what, "", None, None, None)))
         else:
             self._end_run(what, last, None if before is None else before[-1])

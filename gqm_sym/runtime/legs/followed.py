@@ -162,14 +162,17 @@ class FollowedMotion(Motion):
         """The number of runs that `_look_ahead` computes of a motion for which it finds no end; 0 as long as that is
         not known.
         """
+        if self._known_beginning or self._horizon < inf:
+            return self._known_beginning
         driver = self._driver
-        if not self._known_beginning and self._horizon == inf and not driver.ending and driver.is_endless:
+        if not driver.ending and driver.is_endless:
             self._known_beginning = len(self._layout.runs) + len(driver.runs)
         return self._known_beginning
 
     def _follow_next(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        self._known_beginning = self._beginning  # before it can change
+        if self._horizon == inf:
+            self._known_beginning = self._beginning  # before it can change
         self._driver.go_on()
 
     def _follow(self, reach: float) -> None:
@@ -187,9 +190,12 @@ class FollowedMotion(Motion):
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
-        if isfinite(self._horizon):
-            self._follow(self._horizon)
-        while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
+        driver, horizon = self._driver, self._horizon
+        if horizon < inf:
+            while not driver.ending and driver.elapsed < horizon:
+                driver.go_on()
+            return
+        while not driver.ending and not self._beginning:
             self._follow_next()
 
     def _follow_again(self) -> None:

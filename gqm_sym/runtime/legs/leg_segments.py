@@ -274,7 +274,10 @@ class TurnedLegs(NamedTuple):
 
     def runs(self) -> list[Run]:
         """Return a run for each leg."""
-        line, size, _, lines_before = self
+        line, size, last_at, lines_before = self
+        if last_at == 0:  # there is one
+            before = None if lines_before is None else lines_before[0]
+            return [tuple.__new__(Run, (line, END_TURN, TURN, None, before, None))]
         runs, at = [], 0
         for k in range(size):
             end = at + int(line.item(at + USED))

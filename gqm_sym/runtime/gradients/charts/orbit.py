@@ -42,7 +42,7 @@ from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_p
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
-from gqm_sym.runtime.gradients.path import PRODUCT, PathRows
+from gqm_sym.runtime.gradients.path import ASIDE, ASIDE_TURN, CURVATURE, LOAD, PRODUCT, PathRows
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
@@ -101,8 +101,9 @@ def source_along(problem: Problem) -> ChartSource:
     formulas = problem.formulas
     assert isinstance(formulas.exact, ExactPotential)
     names = list(formulas.parameters)
-    kind, potential = ChartSource if formulas.path_in_space is None else SpaceSource, formulas.exact.effective_potential
-    return kind(potential, formulas.inertia, len(names), names.index("m"), shaping_of(formulas))
+    kind, exact = ChartSource if formulas.path_in_space is None else SpaceSource, formulas.exact
+    of_module = formulas.inertia, len(names), names.index("m"), shaping_of(formulas)
+    return kind(exact.effective_potential, *of_module, exact.coriolis)
 
 
 class ChartOrbitDerivatives(OrbitDerivatives):
@@ -351,9 +352,9 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         in_space = isinstance(self.source, SpaceSource)
         program = space_path_program(self.source) if in_space else chart_path_program(self.source)
         found = values(program, self.parameters, path[0], None, *path[1:], parts=1)
-        return PathRows(found.reshape(8 if in_space else 6, self.source.parameters + 2, lam.size))
+        return PathRows(found.reshape(-1, self.source.parameters + 2, lam.size))
 
-    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
+    def extreme_rows(self, place: Array, *, of_speed: bool, direction: int = 1) -> Array:
         """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
         difference quotient.
         """
@@ -370,7 +371,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             partials = [np.vstack([row[1:-1], by_variables]) for row in (mass_curvature, load)]
             of_variables = 2.0 * (rows[2:] * mass_curvature[0] + rows[0] * partials[0]) + partials[1]
             if isinstance(self.source, SpaceSource):
-                force, of_variables = _length_rows(path, rows)
+                force, of_variables = _length_rows(path, rows, direction)
             rows = np.vstack([*force, of_variables])
         here, before, after = np.moveaxis(rows.reshape(len(rows), 3, place.size), 1, 0)
         curvature = (after[1] - before[1]) / (steps[2] - steps[1])
@@ -383,23 +384,24 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return moved
 
 
-def _length_rows(path: PathRows, rows: Array) -> tuple[list[Array], Array]:
+def _length_rows(path: PathRows, rows: Array, direction: int) -> tuple[list[Array], Array]:
     """Return the length of the contact force along a path and its derivative with respect to the place, and those with
-    respect to all variables, given half of V**2 with its derivatives in the same order.
+    respect to all variables, given half of V**2 with its derivatives in the same order, and the sign of ds/dt.
     """
-    curvature, load, product, w = path.curvature, path.load, path.rows[PRODUCT], 2.0 * rows[0]
-    length = np.sqrt((curvature[0] * w) ** 2 + 2.0 * product[0] * w + load[0] ** 2)
-    by_half = 2.0 * (curvature[0] ** 2 * w + product[0])
-
-    def change(of_curvature: Array, of_product: Array, of_load: Array, of_half: Array) -> Array:
-        at_rest = curvature[0] * of_curvature * w**2 + of_product * w + load[0] * of_load
-        changed: Array = (at_rest + by_half * of_half) / length
-        return changed
-
-    none = np.zeros((LAUNCH_VARIABLES, length.size))
-    bent, mixed, still = (np.vstack([row[1:-1], none]) for row in (curvature, product, load))
-    along = change(curvature[-1], product[-1], load[-1], rows[1])
-    return [length, along], change(bent, mixed, still, rows[2:])
+    w = 2.0 * rows[0]
+    v = direction * np.sqrt(w)
+    kappa, load, product = path.curvature[0], path.load[0], path.rows[PRODUCT, 0]
+    # Half of the square of N, and of its derivative with respect to half of V**2, have a term for each of these rows.
+    kinds, factors = [CURVATURE, PRODUCT, LOAD], [kappa * w**2, w, load]
+    square, by_half = (kappa * w) ** 2 + 2.0 * product * w + load**2, 2.0 * (kappa**2 * w + product)
+    if len(path.rows) > ASIDE:
+        kinds, factors = [*kinds, ASIDE, ASIDE_TURN], [*factors, v, v * w]
+        aside, turning = path.rows[ASIDE, 0], path.rows[ASIDE_TURN, 0]
+        square, by_half = square + 2.0 * v * (aside + turning * w), by_half + (aside / v + 3.0 * turning * v)
+    length, of_path = np.sqrt(square), np.einsum("kn,kmn->mn", np.array(factors), path.rows[kinds])
+    along = (of_path[-1] + by_half * rows[1]) / length
+    by_variables = np.vstack([of_path[1:-1], np.zeros((LAUNCH_VARIABLES, length.size))])
+    return [length, along], (by_variables + by_half * rows[2:]) / length
 
 
 def _sum(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:

@@ -37,6 +37,8 @@ class ChartSource(NamedTuple):
         The number of run-time parameters, and the index of the mass among them.
     shaping : tuple of int
         The parameters that shape the curve.
+    coriolis : callable or None
+        That of `interface.ExactPotential`, for a curve in space in a rotating frame.
     """
 
     potential: Callable[..., Any]
@@ -44,6 +46,7 @@ class ChartSource(NamedTuple):
     parameters: int
     mass: int
     shaping: tuple[int, ...]
+    coriolis: Callable[..., Any] | None = None
 
     @property
     def dimension(self) -> int:

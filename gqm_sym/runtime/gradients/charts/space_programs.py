@@ -48,10 +48,30 @@ class SpaceSource(ChartSource):
         return [(k, -scalar_product(bend, _across(moved, rates))) for k, moved in moves]
 
 
+def _contact_products(
+    op: Recorder,
+    source: SpaceSource,
+    bend: Sequence[TapeNumber],
+    load: Sequence[TapeNumber],
+    rates: Sequence[TapeNumber],
+) -> list[TapeNumber]:
+    """Return half of the factor of V**2, and in a rotating frame of those of V and V**3, in the square of N/m.
+
+    N/m is the length of V**2 K + L + V A.
+    """
+    product, speed = scalar_product(bend, load), op.sqrt(scalar_product(rates, rates))
+    if source.coriolis is None:
+        return [product]
+    t = [rate / speed for rate in rates]
+    a = [op.number(part) for part in source.coriolis(op, *t, op.values[: source.parameters])]
+    across = [a[i] * t[j] - a[j] * t[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return [product + scalar_product(a, a) / 2, scalar_product(load, across), scalar_product(bend, across)]
+
+
 @lru_cache(maxsize=64)
 def space_path_program(source: SpaceSource) -> Program:
-    """Return the program of states at a point of a chart in space, as `programs.chart_path_program` does; y and the
-    product of ``path.PRODUCT`` follow.
+    """Return the program of states at a point of a chart in space, as `programs.chart_path_program` does; y, the
+    product of ``path.PRODUCT`` and in a rotating frame the quantities of ``path.ASIDE`` follow.
 
     The coordinates are x, y and z with their first three derivatives with respect to u, and for each parameter that
     shapes the curve the displacement of these with its first two.
@@ -67,8 +87,9 @@ def space_path_program(source: SpaceSource) -> Program:
     load = [source.one_plus_beta(op) * part for part in _across(by_place, rates)]
     curvature, still = (op.sqrt(scalar_product(part, part) + LEAST_SQUARE) for part in (bend, load))
     outputs: list[Any] = []
-    quantities = place[0], place[2], None, mass * curvature, mass * still, value, place[1]
-    for quantity in (*quantities, mass * mass * scalar_product(bend, load)):
+    quantities = [place[0], place[2], None, mass * curvature, mass * still, value, place[1]]
+    quantities += [mass * mass * product for product in _contact_products(op, source, bend, load, rates)]
+    for quantity in quantities:
         partials = [op.number(0)] * (p + 9) if quantity is None else gradient(op, quantity, [*values, *places[:9]])
         by_values, by_places = partials[:p], partials[p:]
         along = sum((a * b for a, b in zip(by_places, following, strict=True)), op.number(0)) / speed

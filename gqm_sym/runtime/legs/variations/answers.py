@@ -16,7 +16,7 @@ from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece
 from gqm_sym.runtime.legs.variations.chain import ARC, DELAY, SIGMA
-from gqm_sym.runtime.legs.variations.changes import Changes
+from gqm_sym.runtime.legs.variations.changes import Changes, changes_of_turns
 from gqm_sym.runtime.legs.variations.law import LawRows
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
@@ -198,20 +198,20 @@ def gradient(motion: Any, quantity: str) -> Array:
 
 def turning_points(motion: Any) -> list[list[float]]:
     """Return the derivatives of the turning points of a motion: a list for each, with respect to all variables."""
-    turns, changes = motion._turns_and_changes()
-    found: list[list[float]] = []
-    if motion.problem.w0 == 0.0:  # the launch is one
-        found.append([*[0.0] * len(motion.problem.p), 1.0, 0.0])
-    if changes is None:
+    turns, runs = motion._turns_with_runs()
+    problem, found = motion.problem, list[list[float]]()
+    if problem.launch.v0.value == 0.0:  # the launch is one
+        found.append([*[0.0] * len(problem.p), 1.0, 0.0])
+    if not turns:
         return found
-    ends, law = changes.ends, changes.law
-    if law.by_arc_length or motion.problem.period:
-        laps = np.array([changes.runs[k].laps for k in turns])
-        columns: Array = changes.parameter_change(ends[turns, SIGMA].T, ends[turns, ARC].T, laps)
-        found += columns.T.tolist()
+    if problem.formulas.chart is None:
+        rows = changes_of_turns(problem, runs).tolist()
+        found += [rows[k] for k in turns]
         return found
-    rows = ends[:, SIGMA].tolist()
-    found += [rows[k] for k in turns]
+    changes = motion._changes_along(runs)
+    laps, ends = np.array([changes.runs[k].laps for k in turns]), changes.ends
+    columns: Array = changes.parameter_change(ends[turns, SIGMA].T, ends[turns, ARC].T, laps)
+    found += columns.T.tolist()
     return found
 
 

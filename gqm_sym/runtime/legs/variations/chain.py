@@ -121,7 +121,7 @@ def launched(moves, thrown, heading, ds, force, origin):  # type: ignore[no-unty
 
 
 @Inner
-def follow(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-def]
+def follow(laid, law, moves, thrown, lap, breaks, timed):  # type: ignore[no-untyped-def]
     """Solve the variational equation on all panels, and carry the change of the launch from run to run.
 
     Parameters
@@ -137,6 +137,9 @@ def follow(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-de
         The change of the period of the curve's parameter.
     breaks : array
         The places at which the force may jump.
+    timed : bool
+        Whether times are needed. Otherwise the results are complete only as far as SIGMA of ``ends`` depends on them,
+        and so does what is needed of the law (`solving.solve_panels`).
 
     Returns
     -------
@@ -151,7 +154,7 @@ def follow(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-de
     solutions, origin = np.empty((panels.shape[0], 3 * n + 4, WIDE)), np.empty((ORIGIN_ROWS, n + 2))
     origins, ends = np.empty((2 * runs, ORIGIN_ROWS, n + 2)), np.empty((runs, ORIGIN_ROWS, n + 2))
     rows = solutions.shape[1] * WIDE
-    solve_panels(panels, first, law, n, breaks, solutions)
+    solve_panels(panels, first, law, n, breaks, solutions, timed)
     launched(moves, thrown, records[begins[0] + HEADING], law[0, 0], law[n + 2, 0], origin)
     forces, laps = law[n + 2, MARKS * runs :], 0.0
     for k in range(runs):
@@ -198,8 +201,8 @@ def lay(records, begins):  # type: ignore[no-untyped-def]
 
 @entry(FOLLOWED(PANELS_OF_RUNS, MATRIX, VECTOR, THROWN, VECTOR, VECTOR), checked=False)
 def follow_changes(laid, law, moves, thrown, lap, breaks):  # type: ignore[no-untyped-def]
-    """Return what `follow` does."""
-    return follow(laid, law, moves, thrown, lap, breaks)
+    """Return what `follow` does, with times."""
+    return follow(laid, law, moves, thrown, lap, breaks, True)
 
 
 @Inner

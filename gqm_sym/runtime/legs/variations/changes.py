@@ -16,11 +16,36 @@ from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.chain import ORIGIN_ROWS, STATE_ROWS, fill_along, fill_states
 from gqm_sym.runtime.legs.variations.chart_law import law_of
 from gqm_sym.runtime.legs.variations.equation import CONTACT_SIGN, end_speed
-from gqm_sym.runtime.legs.variations.law import states_of
+from gqm_sym.runtime.legs.variations.law import FormulaLaw, states_of
 from gqm_sym.runtime.motion.locking import computed_once
 
 # Where the record of a single run begins.
 FIRST = np.zeros(1, dtype=np.int64)
+
+
+def joined(runs: Sequence[Run]) -> tuple[Array, NDArray[np.int64]]:
+    """Return the records of runs, one after the other, and the indices at which they begin."""
+    if len(runs) == 1:
+        return runs[0].record, FIRST
+    records = [run.record for run in runs]
+    return np.concatenate(records), np.array([0, *accumulate([record.size for record in records[:-1]])])
+
+
+def changes_of_turns(problem: Problem, runs: Sequence[Run]) -> Array:
+    """Return the changes of the turns at which runs along a curve with formulas end, beginning with the run of the
+    launch: a row for each run, with respect to all variables.
+
+    Laps of a closed curve count. Of a run that does not end at a turn, the row has no meaning.
+    """
+    law = law_of(problem)
+    assert isinstance(law, FormulaLaw)
+    line, begins = joined(runs)
+    if not problem.period:
+        return law.turns(line, begins, problem.launch, law.no_change)
+    lap = np.append(law.ranges[2], [0.0, 0.0])
+    laps = np.array([run.laps for run in runs])
+    found: Array = law.turns(line, begins, problem.launch, lap) + laps[:, None] * lap
+    return found
 
 
 class ChangesAlong(NamedTuple):
@@ -64,14 +89,8 @@ class Changes:
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
         self.law, self._problem = law_of(problem), problem
         self.followed, self.runs = len(runs), [run for run in runs if run.what != END_ASYMPTOTE]
-        if len(self.runs) == 1:
-            line, begins = self.runs[0].record, FIRST
-        else:
-            records = [run.record for run in self.runs]
-            line = np.concatenate(records)
-            begins = np.array([0, *accumulate([record.size for record in records[:-1]])])
         lap = self.lap if problem.period else np.zeros(self.variables)
-        self._followed = self.law.followed(line, begins, problem.launch, lap, self.breaks)
+        self._followed = self.law.followed(*joined(self.runs), problem.launch, lap, self.breaks)
         self.ends = self._followed.ends
 
     @property

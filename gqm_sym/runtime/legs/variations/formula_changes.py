@@ -18,7 +18,7 @@ from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.whole_panels import with_panels
-from gqm_sym.runtime.legs.variations.chain import FOLLOWED, follow
+from gqm_sym.runtime.legs.variations.chain import FOLLOWED, SIGMA, follow
 from gqm_sym.runtime.legs.variations.equation import (
     MARKS,
     PLACE,
@@ -40,8 +40,8 @@ PROGRAMS = types.Tuple((LANE_PROGRAM, VECTOR, PROGRAM, VECTOR, PROGRAM, VECTOR))
 
 
 @Inner
-def fill_in_doubles(program, work, inputs, places, found):  # type: ignore[no-untyped-def]
-    """Fill the results of a program at places, in double precision.
+def fill_in_doubles(program, work, inputs, places, first, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program at places, in double precision, in the last rows.
 
     Parameters
     ----------
@@ -51,23 +51,25 @@ def fill_in_doubles(program, work, inputs, places, found):  # type: ignore[no-un
         The inputs: high and low doubles, and bounds on the errors.
     places : (k, n) array
         The coordinates of the places.
+    first : int
+        The first place for which results are needed.
     found : (m, n) array
-        Filled with the results.
+        Its last rows are filled with the results.
     """
-    count, lanes = places.shape[1], min(BLOCK, places.shape[1])
+    count, row, lanes = places.shape[1], found.shape[0] - program[5].size, min(BLOCK, places.shape[1] - first)
     fill_registers(inputs, inputs.shape[1], lanes, work)
     call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
-    for start in range(0, count, BLOCK):
+    for start in range(first, count, BLOCK):
         n = min(BLOCK, count - start)
         for k in range(places.shape[0]):
             at = program[4][k]
             for i in range(n):
                 work[at + i] = places[k, start + i]
         call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, n)
-        for k in range(found.shape[0]):
+        for k in range(program[5].size):
             at = program[5][k]
             for i in range(n):
-                found[k, start + i] = work[at + i]
+                found[row + k, start + i] = work[at + i]
 
 
 @Inner
@@ -92,13 +94,15 @@ def is_far(states, marks):  # type: ignore[no-untyped-def]
 
 @Inner
 def law_on_panels(programs, inputs, states, marks):  # type: ignore[no-untyped-def]
-    """Return the law in states; in the first ``marks`` of them ds/dlam and dW/dlam have all digits."""
+    """Return the law in states, as far as the programs have it; in the first ``marks`` of them, of which nothing else
+    is needed, ds/dlam and dW/dlam have all digits.
+    """
     doubles, doubles_work, exact, exact_work, rates, rates_work = programs
     if is_far(states, marks):
         return exact_values(exact, exact_work, inputs, states)
     parameters = inputs.shape[1] - 2
     found = np.empty((2 * parameters + 5, states.shape[1]))
-    fill_in_doubles(doubles, doubles_work, inputs[:, :parameters], states, found)
+    fill_in_doubles(doubles, doubles_work, inputs[:, :parameters], states, marks, found)
     both = exact_values(rates, rates_work, inputs, states[:, :marks].copy())
     found[0, :marks], found[parameters + 2, :marks] = both[0], both[1]
     return found
@@ -125,13 +129,27 @@ def panelled(records, begins):  # type: ignore[no-untyped-def]
     return line, starts
 
 
-@entry(
-    types.Tuple((WHOLE, MATRIX, FOLLOWED))(
-        *(VECTOR, WHOLE, PROGRAMS, MATRIX, types.UniTuple(types.float64, 2)),
-        *(VECTOR, VECTOR),
-    ),
-    checked=False,
-)
+@Inner
+def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed):  # type: ignore[no-untyped-def]
+    """Return the panels of runs, and the changes on them, as `chain.follow` does."""
+    records, begins = panelled(records, begins)
+    first, panels = lay_panels(records, begins)
+    states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
+    law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0
+    if v0 == 0.0 and direction != heading:
+        turned = states[:, :1].copy()
+        turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
+        other_force = exact_values(programs[4], programs[5], inputs, turned)[1, 0]
+    laid = records, begins, first, panels
+    thrown = v0, direction, other_force
+    return first, panels, follow(laid, law, moves, thrown, lap, np.empty(0), timed)
+
+
+# The arguments of the functions below.
+RUNS = VECTOR, WHOLE, PROGRAMS, MATRIX, types.UniTuple(types.float64, 2), VECTOR, VECTOR
+
+
+@entry(types.Tuple((WHOLE, MATRIX, FOLLOWED))(*RUNS), checked=False)
 def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap):  # type: ignore[no-untyped-def]
     """Return the panels of runs (`equation.lay_panels`), and the changes on them (`chain.follow`).
 
@@ -148,14 +166,14 @@ def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap
     moves, lap
         As for `chain.follow`.
     """
-    records, begins = panelled(records, begins)
-    first, panels = lay_panels(records, begins)
-    states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
-    law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0
-    if v0 == 0.0 and direction != heading:
-        turned = states[:, :1].copy()
-        turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
-        other_force = exact_values(programs[4], programs[5], inputs, turned)[1, 0]
-    laid = records, begins, first, panels
-    thrown = v0, direction, other_force
-    return first, panels, follow(laid, law, moves, thrown, lap, np.empty(0))
+    return along_formulas(records, begins, programs, inputs, launch, moves, lap, True)
+
+
+@entry(MATRIX(*RUNS), checked=False)
+def turns_along_formulas(records, begins, programs, inputs, launch, moves, lap):  # type: ignore[no-untyped-def]
+    """Return the changes of the places at which runs end, as far as they turn there: a row for each.
+
+    The arguments are those of `changes_along_formulas`, except that the first program is that without ds/dlam.
+    """
+    ends = along_formulas(records, begins, programs, inputs, launch, moves, lap, False)[2][2]
+    return ends[:, SIGMA].copy()

@@ -1,7 +1,6 @@
 """The law of a motion with losses in given states, with its derivatives, in double-double arithmetic."""
 
 from abc import ABC, abstractmethod
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
 from gqm_sym.runtime.legs.variations.chain import follow_changes, lay
 from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
-from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas
+from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas, turns_along_formulas
 from gqm_sym.runtime.legs.variations.programs import (
     force_program,
     law_in_doubles,
@@ -202,6 +201,11 @@ class FormulaLaw(Law):
         return moves
 
     @computed_once
+    def no_change(self) -> Array:
+        """Zero for each variable."""
+        return np.zeros(self.count + 2)
+
+    @computed_once
     def ranges(self) -> Array:
         """See `Law`."""
         assert self._domain is not None
@@ -227,11 +231,31 @@ class FormulaLaw(Law):
         )
         return Followed((records, begins, first, panels), *found)
 
+    def turns(self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array) -> Array:
+        """Return the changes of the labels of the turns at which runs end: a row for each run.
+
+        The arguments are those of `followed`. Changes of times are not needed for this, so that it takes less.
+        """
+        thrown = launch.v0.value, float(launch.direction)
+        found: Array = turns_along_formulas(
+            records, begins, self._untimed, self._inputs, thrown, self.launch_changes, lap
+        )
+        return found
+
     @computed_once
     def _programs(self) -> tuple[Any, ...]:
         """The programs of compiled code (`formula_changes.PROGRAMS`)."""
-        makers = law_in_doubles, law_program, rates_program
-        return tuple(part for make in makers for part in attrgetter("operands", "work")(make(self._exact, self.count)))
+        return self._with_doubles(timed=True)
+
+    @computed_once
+    def _untimed(self) -> tuple[Any, ...]:
+        """The programs for changes without times."""
+        return self._with_doubles(timed=False)
+
+    def _with_doubles(self, *, timed: bool) -> tuple[Any, ...]:
+        given = self._exact, self.count
+        programs = law_in_doubles(*given, timed=timed), law_program(*given), rates_program(*given)
+        return tuple(part for program in programs for part in (program.operands, program.work))
 
     @computed_once
     def _inputs(self) -> Array:

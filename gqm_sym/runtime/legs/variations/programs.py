@@ -9,7 +9,14 @@ from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
 from gqm_sym.runtime.gradients.lanes.assembly import assemble as assemble_lanes
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.programs import Program, assemble, load_per_mass, with_derivatives
+from gqm_sym.runtime.gradients.programs import (
+    ContactForms,
+    Program,
+    assemble,
+    contact_forms,
+    length_of_contact,
+    with_derivatives,
+)
 from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
 
 
@@ -34,16 +41,20 @@ def rates_program(law: ExactLaw, parameters: int) -> Program:
 
 
 @lru_cache(maxsize=64)
-def law_in_doubles(law: ExactLaw, parameters: int) -> LaneProgram:
-    """Return the program of `law_program` in double precision.
+def law_in_doubles(law: ExactLaw, parameters: int, *, timed: bool) -> LaneProgram:
+    """Return the program of `law_program` in double precision; unless ``timed``, without ds/dlam and its derivatives.
 
     The inputs are the run-time parameters. The coordinates of a place are those of a state (`law.states_of`), of which
     the low double of the place does not matter.
     """
     op = LaneRecorder(parameters, 5)
     (lam, _, w, *signs), p = op.places, op.values
-    ds, slope = op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
-    return assemble_lanes(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
+    slope = op.number(law.speed_slope(op, lam, w, *signs, p))
+    outputs = [slope, *gradient(op, slope, [lam, w, *p])]
+    if timed:
+        ds = op.number(law.ds(op, lam, p))
+        outputs = [ds, *gradient(op, ds, [lam, *p]), *outputs]
+    return assemble_lanes(op, outputs)
 
 
 @lru_cache(maxsize=64)
@@ -55,7 +66,7 @@ def load_program(law: ExactLaw, parameters: int) -> Program:
     """
     op, _, slope = _law(law, parameters)
     lam, w = op.places
-    load = load_per_mass(op, law, lam, w)
+    load = length_of_contact(op, contact_forms(op, law, lam, op.values), w, op.values[parameters])
     by_place, by_w = gradient(op, load, [lam, w])
     load_slope = by_place + by_w * slope
     return with_derivatives(op, [load_slope], [lam, w])
@@ -130,10 +141,13 @@ class _ChartPoint:
             self.curvature = op.sqrt(scalar_product(curved, curved) + LEAST_SQUARE)
         point = (*place, *(rate / self._speed for rate in rates), *curved)
         self.place = place
-        self.load, product = op.number(forces.law.static_normal_load(op, *point, self.p)), None
-        if forces.law.load_along_curvature is not None:
-            product = op.number(forces.law.load_along_curvature(op, *point, self.p))
-        self.product = product
+        law, product, aside = forces.law, None, None
+        if law.load_along_curvature is not None:
+            product = op.number(law.load_along_curvature(op, *point, self.p))
+        if law.coriolis_loads is not None:
+            aside = [op.number(part) for part in law.coriolis_loads(op, *point, self.p)]
+        load = op.number(law.static_normal_load(op, *point, self.p))
+        self.forms, self._direction = ContactForms(self.curvature, load, product, aside), signs[0]
         self.slope = op.number(forces.law.speed_slope(op, *point, self.w, *signs, self.p))
         self.strains = [op.number(0)] * forces.parameters
         for k, moved in self._displacements():
@@ -148,10 +162,8 @@ class _ChartPoint:
     @property
     def contact(self) -> TapeNumber:
         """N/m, or |N|/m in space."""
-        op, curvature, load, w = self.op, self.curvature, self.load, self.w
-        if self.product is None:
-            return curvature * w + load
-        return op.sqrt(curvature * curvature * w * w + 2 * self.product * w + load * load)
+        found: TapeNumber = length_of_contact(self.op, self.forms, self.w, self._direction)
+        return found
 
     def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
         """Return the derivatives of a quantity of a point with respect to arc length, V**2, and the run-time
@@ -207,9 +219,10 @@ def chart_path_program(forces: ChartForces) -> Program:
     """Return the program of states at a point, as `gradients.programs.path_program`."""
     chart_point = _ChartPoint(forces)
     op, m, outputs, place = chart_point.op, chart_point.p[forces.mass], list[TapeNumber](), chart_point.place
-    quantities = [place[0], place[-1], None, m * chart_point.curvature, m * chart_point.load, op.number(0)]
+    curvature, load, product, aside = chart_point.forms
+    quantities = [place[0], place[-1], None, m * curvature, m * load, op.number(0)]
     quantities += [place[1]] if forces.dimension > 2 else []
-    quantities += [m * m * chart_point.product] if chart_point.product is not None else []
+    quantities += [m * m * part for part in ((product,) if product is not None else ()) + tuple(aside or ())]
     for quantity in quantities:
         if quantity is None:
             outputs += [op.number(1), *chart_point.strains, op.number(0)]

@@ -3,6 +3,9 @@
 The solutions on a panel are rows of WIDE numbers, for its nodes and for its end: for each solution the change of the
 time from the origin, then for each solution y/W at the nodes and y at the end, then for each parameter the integral of
 the derivative of ds/dlam from the origin. A row of the law that is zero at all nodes takes no integral.
+
+Where only the places of turns and ends are asked for, only y at the ends of panels is needed (`solve_end`), and no
+times.
 """
 
 from math import fabs, inf
@@ -12,7 +15,15 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.elementary import exp
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import copied, on_stack, opaque, over_rows
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, ENDS_BY_NODE, WIDE, to_graded_means, to_means
+from gqm_sym.runtime.legs.panels.polynomials import (
+    COUNT,
+    ENDS_BY_NODE,
+    GRADED_MEANS,
+    MEANS,
+    WIDE,
+    to_graded_means,
+    to_means,
+)
 from gqm_sym.runtime.legs.variations.equation import (
     MOVES,
     OUTWARD,
@@ -27,6 +38,10 @@ from gqm_sym.runtime.legs.variations.equation import (
     place_on,
     value_at_end,
 )
+
+# The weights by which the values at the nodes of a panel give the mean over it, and that with respect to the square of
+# the share.
+MEAN_WEIGHTS, GRADED_WEIGHTS = (np.append(table[COUNT], 0.0) for table in (MEANS, GRADED_MEANS))
 
 # A panel that begins this near to a break of the curve, as a share of the place, counts as beginning there.
 AT_BREAK = 1e-12
@@ -48,7 +63,7 @@ AT_BREAK = 1e-12
 # TIME_RATE  dt/dw
 # STRAIN     the derivative of ds/dlam
 # SOURCE     that of the force, then what is integrated
-# MEAN       its means, then the integral
+# MEAN       its means, then the integral; in `solve_end` the weights of an integral over the panel
 # GRADED     its means with the measure of the march variable
 # Y          y, then y/W
 # ========== ====================================================================================
@@ -113,8 +128,8 @@ def fill_integral(panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def prepare(panel, law, step, at, parameters, work):  # type: ignore[no-untyped-def]
-    """Fill the rows up to TIME_RATE; the law is a line whose rows begin ``step`` apart, ``at`` a number in each."""
+def fill_factor(panel, law, at, work):  # type: ignore[no-untyped-def]
+    """Fill the rows OFFSET to GROWTH, FACTOR and INVERSE; F_W at the nodes is in the law, a line, from an index on."""
     half_c, width = panel[PANEL_HALF_C], panel[PANEL_WIDTH]
     twice = 1.0 if half_c == inf else 2.0
     product_row(work, OFFSET, NODES, width)
@@ -123,8 +138,7 @@ def prepare(panel, law, step, at, parameters, work):  # type: ignore[no-untyped-
         constant_row(work, GROWTH, 1.0)
     else:
         linear_row(work, GROWTH, OFFSET, panel[PANEL_BEGIN] + half_c, 1.0)
-    copy(work, SPEED, panel, SPEEDS)
-    copy(work, SOURCE, law, (parameters + 4) * step + at)
+    copy(work, SOURCE, law, at)
     # Integrals are over w and not over the distance: laws with the square root of W have a pole at a turn, which the
     # growth of the distance with w cancels.
     triple_row(work, SOURCE, GROWTH, SOURCE, twice)
@@ -133,6 +147,14 @@ def prepare(panel, law, step, at, parameters, work):  # type: ignore[no-untyped-
     for j in range(opaque(WIDE)):
         work[FACTOR + j] = exp(work[FACTOR + j])
     inverse_row(work, INVERSE, FACTOR, 1.0)
+
+
+@Inner
+def prepare(panel, law, step, at, parameters, work):  # type: ignore[no-untyped-def]
+    """Fill the rows up to TIME_RATE; the law is a line whose rows begin ``step`` apart, ``at`` a number in each."""
+    twice = 1.0 if panel[PANEL_HALF_C] == inf else 2.0
+    fill_factor(panel, law, (parameters + 4) * step + at, work)
+    copy(work, SPEED, panel, SPEEDS)
     inverse_square_row(work, PER_W, SPEED, GROWTH, 1.0)
     copy(work, SOURCE, law, at)
     inverse_row(work, PER_DS, SOURCE, 1.0)
@@ -206,8 +228,47 @@ def solve_panel(panel, law, step, at, state, out, work):  # type: ignore[no-unty
 
 
 @Inner
-def solve_panels(panels, first, law, parameters, breaks, solutions):  # type: ignore[no-untyped-def]
-    """Fill the solutions on all panels."""
+def weighted_sum(law, at, work):  # type: ignore[no-untyped-def]
+    """Return the sum of numbers of the law, from an index on, times the weights in the row MEAN."""
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    for j in range(0, WIDE, 4):
+        first += work[MEAN + j] * law[at + j]
+        second += work[MEAN + j + 1] * law[at + j + 1]
+        third += work[MEAN + j + 2] * law[at + j + 2]
+        fourth += work[MEAN + j + 3] * law[at + j + 3]
+    return (first + second) + (third + fourth)
+
+
+@Inner
+def solve_end(panel, law, step, at, state, out, work):  # type: ignore[no-untyped-def]
+    """Fill y at the end of a panel for all solutions, and zeros for what depends on times; the arguments are those of
+    `solve_panel`.
+    """
+    n = state.shape[1] - 2
+    fill_factor(panel, law, (n + 4) * step + at, work)
+    half_c, width, reach, factor = panel[PANEL_HALF_C], work[OFFSET + COUNT], work[REACH + COUNT], work[FACTOR + COUNT]
+    if half_c == inf:
+        for j in range(WIDE):
+            work[MEAN + j] = work[INVERSE + j] * (reach * MEAN_WEIGHTS[j])
+    else:
+        slope = 2.0 * (panel[PANEL_BEGIN] + half_c)
+        for j in range(WIDE):
+            work[MEAN + j] = work[INVERSE + j] * (reach * (slope * MEAN_WEIGHTS[j] + width * GRADED_WEIGHTS[j]))
+    for row in range(n + 2):
+        gained = 0.0
+        if row < n or (row == n and panel[MOVES] > 0.0):
+            gained = weighted_sum(law, (n + 5 + row if row < n else n + 3) * step + at, work)
+        state[0, row] = factor * (gained + state[0, row])
+        out[row * WIDE + COUNT], out[(n + 2 + row) * WIDE + COUNT] = 0.0, state[0, row]
+        if row < n:
+            out[(2 * n + 4 + row) * WIDE + COUNT] = 0.0
+
+
+@Inner
+def solve_panels(panels, first, law, parameters, breaks, solutions, timed):  # type: ignore[no-untyped-def]
+    """Fill the solutions on all panels; unless they are ``timed``, only what the places of ends follow from, for which
+    the law needs ds/dlam only where runs begin and end.
+    """
     n, step, size = parameters, law.shape[1], solutions.shape[1] * WIDE
     marks = step - WIDE * panels.shape[0]
     line, forces, state, work = law.reshape(law.size), law[n + 2, marks:], np.zeros((3, n + 2)), solution_buffer()
@@ -221,7 +282,11 @@ def solve_panels(panels, first, law, parameters, breaks, solutions):  # type: ig
                 state[0, n] += jump(panels, forces, breaks, k - 1, k, TO_START)
             elif k > first[half] and panels[k - 1, MOVES] > 0.0:
                 state[0, n] -= value_at_end(TO_END, forces, (k - 1) * WIDE)
-                ds = value_at_end(TO_END, law[0, marks:], (k - 1) * WIDE)
-                state[1, n] -= panels[k, PANEL_HEADING] * ds / end_speed(panels[k - 1])
+                if timed:
+                    ds = value_at_end(TO_END, law[0, marks:], (k - 1) * WIDE)
+                    state[1, n] -= panels[k, PANEL_HEADING] * ds / end_speed(panels[k - 1])
             out = solutions[k].reshape(size)
-            solve_panel(panels[k], line, step, marks + k * WIDE, state, out, work)
+            if timed:
+                solve_panel(panels[k], line, step, marks + k * WIDE, state, out, work)
+            else:
+                solve_end(panels[k], line, step, marks + k * WIDE, state, out, work)

@@ -126,18 +126,30 @@ class Damped:
         place = shrinks * (a * cosine + b * sine)
         return [place, shrinks * self.rate * (b * cosine - a * sine) - self.decay * place]
 
+    def turns(self, count: int) -> list[mpf]:
+        """Return the first places, after the launch, at which the velocity vanishes."""
+        a, b = self.cosine, self.sine
+        angle = mp.atan2(self.rate * b - self.decay * a, self.rate * a + self.decay * b) % mp.pi
+        angle += mp.pi if angle < mpf(10) ** -30 else 0
+        return [self.at((angle + k * mp.pi) / self.rate)[0] for k in range(count)]
+
 
 @pytest.mark.parametrize(
     "launch", [{"lam0": "0.8", "v0": "0"}, {"lam0": "-0.4", "v0": "2"}, {"lam0": "0.3", "v0": "1e-4"}]
 )
 def test_a_law_that_is_not_linear(build: Build, launch: Launch) -> None:
-    """With a resistance that grows with the speed itself, states have the right derivatives over forty turns."""
+    """With a resistance that grows with the speed itself, states and forty turns have the right derivatives."""
     force = gqm.Potential("k*x**2/2") + gqm.Kernel.law("-c*direction*sqrt(W)")
     module = build("changing_damper", gqm.Curve.graph("0*x"), force)
     launch = {**launch, "k": "3", "c": "0.06"}
     motion = module.solve(**launch, t_max=80)
     times = [0.02, 0.4, 1.1, 2.3, 9.0, 30.0, 79.0]
     assert_states(motion, times, lambda t, **at: Damped(**at).at(t), launch, ("lam", "v"))
+    turns = motion.gradient("turning_points", names := [name for name in launch if launch[name] != "0"])
+    released = int(launch["v0"] == "0")
+    for name in names:
+        wanted = derivative(lambda **at: Damped(**at).turns(40), launch, name)
+        assert_close(turns[name][released : released + 40], wanted, name)
 
 
 @pytest.mark.parametrize(
