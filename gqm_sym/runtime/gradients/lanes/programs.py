@@ -105,7 +105,7 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     the phase angle. The results are Q and the derivatives of the time per phase angle. It is None if the potential
     contains an operation without a rule for divided differences.
     """
-    op = LaneRecorder(swing_inputs(source, plan), 2)
+    op = LaneRecorder(swing_inputs(source, plan), 2, by_inverses=True)
     p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
@@ -148,7 +148,8 @@ class Orbits(NamedTuple):
         n, half = self.source.parameters, Fraction(1, 2)
         if not self.at_rest:
             _, _, (a, b), moves = swing_of(op, self.source, self.plan)
-            return (b - a) * half, [[(high - low) * half, *move] for low, high, *move in moves]
+            # As a product with a constant, the width would be joined with other constants, and no derivative found.
+            return (b - a) / 2, [[(high - low) * half, *move] for low, high, *move in moves]
         p, (lam0, number, sign) = op.values[:n], op.values[n:]
         variables = self.plan.moves(n)
         moves = [[op.number(int(i == k)) for i in range(n)] for k in variables]
@@ -182,7 +183,7 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 2)
+    op = LaneRecorder(orbits.inputs, 2, by_inverses=True)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     square, divisor = formula(op, half, *op.places, p)
     rate = op.sqrt(square)
