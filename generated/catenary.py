@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 15, input 2558bd3a8d44, body 51ccabe14fda
+# interface 15, input 2558bd3a8d44, body a35524f0cc98
 """Bead on a hanging chain
 
 x              = x
@@ -28,11 +28,11 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=15)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
-    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
-    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cosh, divdiff1_cosh,
-    divdiff2_cosh, divdiff2_cosh_near, iconst, icosh, idiv, imul, isinh, place_from_ends, sinh,
-    speed_squared_from_potential,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1,
+    cosh, divdiff1_cosh, divdiff1_cosh_in_square, divdiff1_sinhc_in_square, divdiff2_cosh, iconst, icosh, idiv, imul,
+    isinh, place_from_ends, sinh, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -291,14 +291,30 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
-        c, g, a, b, da, db = p[0, i], p[1, i], lows[i], highs[i], left[i], right[i]
+        c, g, _c0, _c1, a, b, da, db = p[0, i], p[1, i], p[3, i], p[4, i], lows[i], highs[i], left[i], right[i]
         x = place_from_ends(a, b, da, db)
         _t0 = 1/c
-        _t1 = _t0*x
-        out[0, i] = _t0*g*divdiff2_cosh_near(_t0*a, _t1, _t0*b, _t0*da, _t0*db)
-        out[1, i] = cosh(_t1)
+        _t1 = _t0*da
+        _t2 = _t0*db
+        out[0, i] = _t0*g*(_c0*(_t1/2 - _t2/2)*divdiff1_sinhc_in_square(_t1, _t2) + _c1*divdiff1_cosh_in_square(_t1, _t2))
+        out[1, i] = cosh(_t0*x)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH)
+def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
+    """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        c, middle, rest = p[0, i], middles[i], rests[i]
+        _t0 = 1/c
+        _t1 = _t0*middle
+        _t2 = sinh(_t1)
+        _t3 = cosh(_t1)
+        _t4 = _t0*rest
+        out[0, i] = _t2 + _t3*_t4
+        out[1, i] = _t2*_t4 + _t3
 
 
 @compiled(TIME_INTEGRAND_BATCH)
@@ -376,8 +392,9 @@ MODEL = CompiledModel(
     ),
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
-        turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=4,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
+        orbit_rows=2, integrand_rows=4,
     ),
     domain_of=exact_domain, load_map=load_map, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(

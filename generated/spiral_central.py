@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 15, input cd2a37956d84, body e1b7aa71e01d
+# interface 15, input cd2a37956d84, body 30788dda1fdf
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -30,8 +30,9 @@ compiled = compiler(__file__, interface=15)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, divdiff1_exp, divdiff2_exp, exp, iabs, iadd, iconst,
-    idiv, iexp, imul, ipow, isqrt, place_from_ends, sin, speed_squared_from_potential,
+    CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, divdiff1_cosh_in_square, divdiff1_exp,
+    divdiff1_sinhc_in_square, divdiff2_exp, exp, iabs, iadd, iconst, idiv, iexp, imul, ipow, isqrt, place_from_ends,
+    sin, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -300,24 +301,28 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (6, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (7, n)), carray(out, (2, n))
     for i in range(n):
-        r0, b, k, _c0, _c1, a, _b, da = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], lows[i], highs[i], left[i]
-        db = right[i]
+        r0, b, k, _c0, _c1, _c2, a, _b = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], lows[i], highs[i]
+        da, db = left[i], right[i]
         theta = place_from_ends(a, _b, da, db)
-        _t0 = b*theta
-        out[0, i] = -b**2*k*divdiff2_exp(-a*b, -_t0, -_b*b, -b*da, -b*db)/_c0
-        out[1, i] = _c1*r0*exp(_t0)
+        _t0 = b*da
+        _t1 = -_t0
+        _t2 = -b*db
+        out[0, i] = -_c2*b**2*k*((-_t0/2 + b*db/2)*divdiff1_sinhc_in_square(_t1, _t2) + divdiff1_cosh_in_square(_t1, _t2))/_c0
+        out[1, i] = _c1*r0*exp(b*theta)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
-        r0, b = p[0, i], p[1, i]
+        r0, b, middle, rest = p[0, i], p[1, i], middles[i], rests[i]
+        _t0 = exp(-b*middle)
         out[0, i] = fabs(r0)
         out[1, i] = sqrt(b**2 + 1)
+        out[2, i] = -_t0*b*rest + _t0
 
 
 @compiled(BOUNDS_BATCH)
@@ -340,7 +345,7 @@ MODEL = CompiledModel(
     ),
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,
+        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=3,
     ),
     domain_of=exact_domain, load_map=load_map,
     exact=ExactFormulas(

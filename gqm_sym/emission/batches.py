@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Function, S, Symbol, cos, expand, sin
+from sympy import Expr, Function, S, Symbol, cos, cosh, exp, expand, sin, sinh
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.angles import of_sum
@@ -15,25 +15,20 @@ from gqm_sym.emission.sharing import hoist
 from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import axis_orbits_batch
 
-_HYPERBOLIC = frozenset({"divdiff2_cosh", "divdiff2_sinh"})
-"""Divided differences that are replaced by their closed form for points near each other. It is NaN for other points,
-and a sweep then computes the orbit in another way.
+_CIRCULAR = frozenset({"divdiff2_cos", "divdiff2_sin"})
+_HYPERBOLIC = frozenset({"divdiff2_cosh", "divdiff2_exp", "divdiff2_sinh", "divdiff2_tanh"})
+"""Divided differences that are split into factors of the orbit and factors of the place (MATHS, section 3). The latter
+are NaN for points too far apart, and a sweep then computes the orbit in another way.
 """
 
-_CIRCULAR = frozenset({"divdiff2_cos", "divdiff2_sin"})
-"""Divided differences that are split into factors of the orbit and factors of the place (MATHS, section 3)."""
 
-
-def _near(form: Expr) -> Expr:
-    return form.replace(
-        lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _HYPERBOLIC,
-        lambda t: Function(f"{t.func.__name__}_near")(*t.args),
-    )
+_NARROW_FIRST = {"divdiff1_sinh": cosh, "divdiff1_cosh": sinh, "divdiff1_exp": exp}
+"""First differences that are these functions of the mean of both arguments, times sinh(h/2)/(h/2)."""
 
 
 @dataclass(frozen=True)
 class _Middle:
-    """The argument of a sine or cosine at one end x of an orbit, at a place y and at the other end w.
+    """The argument of a function at one end x of an orbit, at a place y and at the other end w.
 
     It is measured from the middle m of both ends: y = m + v and w = m + h.
     """
@@ -61,6 +56,26 @@ class _Middle:
         even, odd = self.parts
         return self._turned(sin if name == "divdiff2_sin" else cos, even, odd)
 
+    def hyperbolic_second(self, name: str, y: Expr) -> Expr:
+        """Return the second difference of sinh, cosh, exp or tanh.
+
+        As tanh[x,y] = sinhc(h)/(cosh x cosh y), that of tanh has factors of both ends, of the gaps and of the place.
+        """
+        if name == "divdiff2_tanh":
+            odd = Function("mean_sech")(self.x, self.w) * Function("difference_of_sinhc")(*self.gaps)
+            even = (
+                Function("difference_of_sech")(self.x, self.w, self.w - self.x)
+                / 2
+                * Function("sum_of_sinhc")(*self.gaps)
+            )
+            return (odd + even) / cosh(y)
+        even = Function("divdiff1_cosh_in_square")(*self.gaps)
+        odd = self.v * Function("divdiff1_sinhc_in_square")(*self.gaps)
+        if name == "divdiff2_exp":
+            return exp(self.m) * (even + odd)
+        across, along = (sinh, cosh) if name == "divdiff2_sinh" else (cosh, sinh)
+        return across(self.m) * even + along(self.m) * odd
+
     def value(self, head: type[Expr]) -> Expr:
         """Return the sine or cosine of y, from cos v = cos h + (v**2 - h**2) * even and the same for the sine."""
         even, odd = self.parts
@@ -76,15 +91,23 @@ class _Middle:
 def _with_constant_factors(
     forms: Sequence[Expr], place: Symbol, ends: tuple[Symbol, Symbol], gaps: tuple[Symbol, Symbol]
 ) -> list[Expr]:
-    """Write sines, cosines and their second differences in terms of factors most of which are constant along an
-    orbit.
-    """
-    known = set[tuple[Expr, Expr]]()
+    """Write sines, cosines and second differences in terms of factors most of which are constant along an orbit."""
+    known, narrow = set[tuple[Expr, Expr]](), set[Expr]()
 
     def second(t: Expr) -> Expr:
         x, _y, w, *both = t.args
         known.add((both[0], both[1]))
         return _Middle(x, w, (both[0], both[1])).second(t.func.__name__)
+
+    def hyperbolic_second(t: Expr) -> Expr:
+        x, y, w, *both = t.args
+        if t.func.__name__ != "divdiff2_tanh":
+            narrow.update(both)
+        return _Middle(x, w, (both[0], both[1])).hyperbolic_second(t.func.__name__, y)
+
+    def narrow_first(t: Expr) -> Expr:
+        head = _NARROW_FIRST[t.func.__name__]
+        return head((t.args[0] + t.args[1]) / 2) * Function("sinhc_near")(t.args[2] / 2)
 
     def value(t: Expr) -> Expr:
         argument = t.args[0]
@@ -96,6 +119,17 @@ def _with_constant_factors(
         return _Middle(x, w, scaled).value(t.func)
 
     forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR, second) for f in forms]
+    forms = [
+        f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _HYPERBOLIC, hyperbolic_second)
+        for f in forms
+    ]
+    forms = [
+        f.replace(
+            lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _NARROW_FIRST and t.args[2] in narrow,
+            narrow_first,
+        )
+        for f in forms
+    ]
     return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
@@ -106,6 +140,21 @@ def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
         lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in names,
         lambda t: of_sum(t, (start,), (start, gap)),
     )
+
+
+def _at_middle(value: Expr, ends: tuple[Symbol, Symbol], middle: Symbol, rest: Symbol) -> Expr:
+    """Write sinh, cosh or exp of a multiple of the mean of both ends by the mean as two numbers, because all nodes of
+    an orbit have its rounding in common.
+    """
+    if not isinstance(value, sinh | cosh | exp):
+        return value
+    a, b = ends
+    rate = value.args[0].diff(a)
+    if rate != value.args[0].diff(b) or rate.has(a, b):
+        return value
+    argument = value.args[0].xreplace({a: middle, b: middle})
+    moved = value.func(argument)
+    return moved + 2 * rate * rest * {sinh: cosh, cosh: sinh, exp: exp}[value.func](argument)
 
 
 def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
@@ -134,7 +183,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
     potential = in_single_waves(model.effective_potential, place)
-    forms = _with_constant_factors((_near(differences.second(potential)), model.ds), place, (a, b), (da, db))
+    forms = _with_constant_factors((differences.second(potential), model.ds), place, (a, b), (da, db))
     outputs, held = hoist(forms, {place, da, db})
     ends = [(a, at(lows)), (b, at(highs))]
     middle, rest = names.symbol("middle"), names.symbol("rest")
@@ -150,6 +199,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
         (symbol, of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
         for symbol, value in held
     ]
+    held = [(symbol, _at_middle(value, (a, b), middle, rest)) for symbol, value in held]
     held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]
     behind = len(lowering.order)
     second = lowering.function(

@@ -17,9 +17,10 @@ _NAMES_BY_HOME = {
         "divdiff2_ipow divdiff2_log divdiff2_rpow"
     ),
     "arithmetic.divided_differences.trigonometric": (
-        "divdiff1_cos_in_square divdiff1_sinc_in_square divdiff2_cos divdiff2_cos_near divdiff2_cosh "
+        "difference_of_sech difference_of_sinhc divdiff1_cos_in_square divdiff1_cosh_in_square "
+        "divdiff1_sinc_in_square divdiff1_sinhc_in_square divdiff2_cos divdiff2_cos_near divdiff2_cosh "
         "divdiff2_cosh_near divdiff2_exp divdiff2_sin divdiff2_sin_near divdiff2_sinh divdiff2_sinh_near "
-        "divdiff2_tan divdiff2_tanh sinc_near"
+        "divdiff2_tan divdiff2_tanh mean_sech sinc_near sinhc_near sum_of_sinhc"
     ),
     "arithmetic.elementary": "atan cos cos_of_sum cosh exp sin sin_of_sum sinh tanh",
     "arithmetic.intervals": (

@@ -186,7 +186,7 @@ def launch_gradients(
         Of shape (m, k), or (m, 2, k) for turning points.
     """
     if quantity in PERIODS:
-        slopes = period_gradients(formulas, launches, rows)
+        slopes = period_gradients(formulas, launches, values.reshape(-1) / PERIODS[quantity], rows)
         if PERIODS[quantity] != 1.0:
             slopes *= np.where(launches.circulates, 1.0, PERIODS[quantity])[:, np.newaxis]
         return slopes

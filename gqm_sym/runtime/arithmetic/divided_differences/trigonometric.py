@@ -43,6 +43,9 @@ NEAR_SERIES = (_even(1, 10), _even(1, 8), _even(0, 9))
 HYPERBOLIC_SERIES = (_even(1, 13), _even(1, 10), _even(0, 11))
 WIDE_SERIES = (_even(1, 16), _even(1, 12), _even(0, 12))
 
+# The series of sinh(h)/h for arguments up to MAX_HYPERBOLIC_SPAN, and up to twice that.
+SINHC, WIDE_SINHC = (tuple(map(fabs, _even(1, terms))) for terms in (13, 17))
+
 # sinc as a polynomial in the square of its argument, highest power first. It interpolates at Chebyshev nodes for
 # arguments up to MAX_WAVE_SPAN, and its error with rounded coefficients is below 3e-17.
 SINC = (
@@ -148,6 +151,51 @@ def divdiff2_cosh_near(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     even, odd = symmetric_parts(u, v, -1.0, HYPERBOLIC_SERIES)
     m = 0.25 * (x + w + 2.0 * y)
     return choose(fabs(u) + fabs(v) <= MAX_HYPERBOLIC_SPAN, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
+
+
+@Inlined
+def sinhc_near(h):  # type: ignore[no-untyped-def]
+    """sinh(h)/h, for ``|h|`` <= `MAX_HYPERBOLIC_SPAN`."""
+    return polynomial(SINHC, h * h)
+
+
+@Inlined
+def divdiff1_cosh_in_square(h1, h2):  # type: ignore[no-untyped-def]
+    """(cosh v - cosh h)/(v**2 - h**2), as `divdiff1_cos_in_square`; NaN where h is beyond `MAX_HYPERBOLIC_SPAN`."""
+    u, v = 0.5 * h1, 0.5 * h2
+    return choose(fabs(u) + fabs(v) <= MAX_HYPERBOLIC_SPAN, 0.5 * sinhc_near(u) * sinhc_near(v), nan)
+
+
+@Inlined
+def divdiff1_sinhc_in_square(h1, h2):  # type: ignore[no-untyped-def]
+    """(sinh(v)/v - sinh(h)/h)/(v**2 - h**2), as `divdiff1_sinc_in_square`."""
+    h, v = 0.5 * (h1 + h2), 0.5 * (h1 - h2)
+    return series_pair(SINHC, h * h, v * v)[1]
+
+
+@Inlined
+def sum_of_sinhc(h1, h2):  # type: ignore[no-untyped-def]
+    """sinh(h1)/h1 + sinh(h2)/h2; NaN where the gaps together are beyond twice `MAX_HYPERBOLIC_SPAN`."""
+    both = series_pair(WIDE_SINHC, h1 * h1, h2 * h2)[0]
+    return choose(fabs(h1) + fabs(h2) <= 2.0 * MAX_HYPERBOLIC_SPAN, both, nan)
+
+
+@Inlined
+def difference_of_sinhc(h1, h2):  # type: ignore[no-untyped-def]
+    """(sinh(h2)/h2 - sinh(h1)/h1)/(h1 + h2)."""
+    return (h2 - h1) * series_pair(WIDE_SINHC, h1 * h1, h2 * h2)[1]
+
+
+@Inlined
+def mean_sech(x, w):  # type: ignore[no-untyped-def]
+    """(1/cosh x + 1/cosh w)/2."""
+    return 0.5 / cosh(x) + 0.5 / cosh(w)
+
+
+@Inlined
+def difference_of_sech(x, w, h):  # type: ignore[no-untyped-def]
+    """sech[x,w] = -cosh[x,w]/(cosh x cosh w)."""
+    return -divdiff1_cosh(x, w, h) / cosh(x) / cosh(w)
 
 
 @Inlined

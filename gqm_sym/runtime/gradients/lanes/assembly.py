@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, INTERPRETER, LOW, ROW
+from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.lanes import rounding
 from gqm_sym.runtime.gradients.lanes.interpreter import (
     FROM_PAIR,
@@ -26,6 +27,7 @@ from gqm_sym.runtime.gradients.lanes.interpreter import (
     TIMES_PAIR,
 )
 from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, RESULTS, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.scaling import Terms, combined
 
 Codes = NDArray[np.int64]
 
@@ -73,12 +75,33 @@ class LaneProgram(NamedTuple):
         return (INTERPRETER.address, LANES_INTERPRETER.address, LANES_INTERPRETER.address), *self[:-1]
 
 
-def assemble(
-    op: LaneRecorder, results: Sequence[Any], measured: Sequence[Any] = (), places: Array = NOWHERE
+def assemble_rates(
+    op: LaneRecorder, factor: TapeNumber, rates: Sequence[TapeNumber], terms: Sequence[Terms], places: Array
 ) -> LaneProgram:
-    """Return the program of results, and of the variances of the ``measured`` ones, for nodes at ``places``."""
-    outputs, uncertain = ([op.register(result) for result in some] for some in (results, measured))
-    noise = [op.register(v) for v in rounding.variances(op, uncertain)] if uncertain else []
+    """Return the program of a factor and of sums of products, and of the variances of the latter.
+
+    Parameters
+    ----------
+    op : LaneRecorder
+        The tape.
+    factor : TapeNumber
+        The first result.
+    rates : sequence of TapeNumber
+        The numbers that the products contain.
+    terms : sequence of Terms
+        The products.
+    places : (k, n) array
+        The coordinates of the nodes.
+    """
+    results = [factor, *combined(op, terms, rates)]
+    return assemble(op, results, rounding.variances(op, rates, terms), places)
+
+
+def assemble(
+    op: LaneRecorder, results: Sequence[Any], variances: Sequence[TapeNumber] = (), places: Array = NOWHERE
+) -> LaneProgram:
+    """Return the program of results, and of the ``variances`` of some of them, for nodes at ``places``."""
+    outputs, noise = ([op.register(result) for result in some] for some in (results, variances))
     live = _live(op, outputs) | _live(op, noise)
     pairs = [k for k in sorted(live | set(range(len(op.values)))) if not op.depends(k)]
     slots = {k: ROW * slot for slot, k in enumerate(pairs)}

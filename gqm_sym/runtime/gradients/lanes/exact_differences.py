@@ -13,7 +13,8 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
-from gqm_sym.runtime.gradients.lanes.programs import total_change
+from gqm_sym.runtime.gradients.lanes.programs import swing_inputs, swing_of, total_change
+from gqm_sym.runtime.gradients.lanes.scaling import Plan, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source, assemble
 
 # The series of sin(t)/t in t**2, highest power first. For squares up to 1 its rest is below 1e-36.
@@ -52,25 +53,22 @@ class SeriesRecorder(Recorder):
 
 
 @lru_cache(maxsize=64)
-def exact_swing_program(source: Source, wanted: tuple[int, ...]) -> Program | None:
+def exact_swing_program(source: Source, plan: Plan) -> Program | None:
     """Return dt/dphi and the derivatives of `programs.swing_program` as a program in double-double arithmetic.
 
     The coordinate of a place is the square of the sine of half the phase angle. On orbits that are too wide for the
     series the results are NaN. It is None if the formulas are too long, or contain an operation without a rule for
     divided differences.
     """
-    n, count = source.parameters, len(wanted)
-    op = SeriesRecorder(n + 2 + 2 * count)
-    p, (a, b), moves = op.values[:n], op.values[n : n + 2], op.values[n + 2 :]
+    op = SeriesRecorder(swing_inputs(source, plan))
+    p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.place, 1 - op.place))
     try:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
         rate = ds / op.sqrt(2 * factor)
         by_inputs, reach = gradient(op, rate, [a, b, *p]), op.sqrt(1 - op.squares)
-        moved = [
-            (moves[j], moves[count + j], *(op.number(int(i == k)) for i in range(n))) for j, k in enumerate(wanted)
-        ]
-        changes = [total_change(op, by_inputs, move) for move in moved]
+        rates = [rate, *(total_change(op, by_inputs, move) for move in moves)]
+        changes = combined(op, terms_of(op, source, plan, launch), rates)
         return assemble(op, [result * (reach / reach) for result in (rate, *changes)])
     except (WithoutRuleError, SolutionError):
         return None

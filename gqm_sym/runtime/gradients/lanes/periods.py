@@ -1,5 +1,6 @@
 """Gradients of half periods and times of laps of many launches, by the fastest program that keeps its digits.
 
+Where a derivative is a multiple of the half period, it takes no program (`scaling`).
 About an axis of symmetry that is an arithmetic-geometric mean or an integral without divided differences. For other
 librations it is an integral in double precision, and for what remains and for laps one in double-double arithmetic,
 for the smallest swings with divided differences.
@@ -37,8 +38,10 @@ from gqm_sym.runtime.gradients.lanes.programs import (
     end_programs,
     exact_axis_program,
     mean_program,
+    moved_variables,
     swing_program,
 )
+from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -106,7 +109,7 @@ def end_program(end: int, source: Source, rows: tuple[int, ...]) -> Program:
     return end_programs(source, rows)[end]
 
 
-def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Array:
+def period_gradients(formulas: Formulas, launches: Launches, values: Array, rows: tuple[int, ...]) -> Array:
     """Return the derivatives of half periods, or of times of laps, with NaN where no program keeps its digits.
 
     Parameters
@@ -115,58 +118,143 @@ def period_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ..
         The model of a generated module.
     launches : Launches
         The launches.
+    values : (m,) array
+        The half periods; those of laps are not used.
     rows : tuple of int
         The variables of differentiation.
     """
     found = np.full((len(launches.given), len(rows)), nan)
-    is_open = np.full(len(found), bool(rows))
-    for stage in stages(formulas, launches, rows):
+    source, circulates = source_of(formulas), launches.circulates
+    if not rows:
+        return found
+    for group in groups_of(source, launches, rows):
+        direct, plan = plan_of(source, rows, at_rest=group.at_rest, is_scaled=group.is_scaled)
+        which: Any = slice(None) if group.serves.all() else group.serves
+        for position, k, exponent in direct.scaled:
+            found[which, position] = values[which] * float(exponent) / launches.given[which, k]
+        for position in direct.zeros:
+            found[which, position] = 0.0
+        if plan.wanted:
+            fill_by_stages(stages(formulas, launches, group, plan), launches, direct.others, group.serves, found)
+    if circulates.any():
+        everything = tuple(range(len(rows)))
+        fill_by_stages(lap_stages(source, launches, rows), launches, everything, circulates, found)
+    return found
+
+
+class Group(NamedTuple):
+    """Librations whose derivatives are found in the same way.
+
+    Attributes
+    ----------
+    serves : (m,) array
+        Which of the launches they are.
+    at_rest : bool
+        Whether they are launched from rest.
+    is_scaled : bool
+        Whether derivatives follow from others (`scaling`).
+    """
+
+    serves: NDArray[np.bool_]
+    at_rest: bool
+    is_scaled: bool
+
+
+def groups_of(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Group]:
+    """Yield the groups of librations that are not empty."""
+    swings, at_rest = ~launches.circulates, launches.given[:, -1] == 0.0
+    is_scaled = np.ones(len(swings), dtype=np.bool_)
+    for k in scalings(source, rows):
+        is_scaled &= launches.given[:, k] != 0.0
+    for are_scaled in (True, False):
+        for are_at_rest in (True, False):
+            serves = swings & (at_rest == are_at_rest) & (is_scaled == are_scaled)
+            if serves.any():
+                yield Group(serves, are_at_rest, are_scaled)
+
+
+def fill_by_stages(
+    programs: Iterator[Stage],
+    launches: Launches,
+    columns: tuple[int, ...],
+    serves: NDArray[np.bool_],
+    found: Array,
+) -> None:
+    """Fill derivatives of some of the launches by the first program that keeps its digits.
+
+    Parameters
+    ----------
+    programs : iterator of Stage
+        The programs.
+    launches : Launches
+        The launches.
+    columns : tuple of int
+        The positions of the derivatives among all.
+    serves : (m,) array
+        Which of the launches are asked for.
+    found : (m, n) array
+        The derivatives of all launches.
+    """
+    is_open, first, stop = serves.copy(), columns[0], columns[-1] + 1
+    which: Any = slice(first, stop) if stop - first == len(columns) else list(columns)
+    for stage in programs:
         if not is_open.any():
             break
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
         for most in () if program is None else PASSES if isinstance(program, LaneProgram) else (0,):
-            if chosen.size:
-                out, states = carried_out(stage, program, rows, (chosen, launches.even[chosen] != UNEVEN), most)
-                is_answered = states == ANSWERED
-                if is_answered.all():
-                    if chosen.size == len(found):
-                        return out
-                    found[chosen], is_open[chosen] = out, False
-                    break
-                found[chosen[is_answered]], is_open[chosen[is_answered]] = out[is_answered], False
-                chosen = chosen[states == OPEN]
-    return found
+            if not chosen.size:
+                break
+            out, states = carried_out(stage, program, len(columns), (chosen, launches.even[chosen] != UNEVEN), most)
+            is_answered = states == ANSWERED
+            answered = chosen[is_answered]
+            if answered.size == len(found):
+                found[:, which] = out
+                return
+            found[answered if isinstance(which, slice) else answered[:, np.newaxis], which] = out[is_answered]
+            is_open[answered] = False
+            chosen = chosen[states == OPEN]
 
 
-def stages(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
-    """Yield the programs for half periods and laps, the fastest first."""
-    source, swings = source_of(formulas), ~launches.circulates
-    n, about_axis = source.parameters, launches.even == ABOUT_ONE_AXIS
+def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> Iterator[Stage]:
+    """Yield the programs for the half periods of a group, the fastest first."""
+    source, serves, at_rest = source_of(formulas), group.serves, group.at_rest
+    n, table = source.parameters, launches.table
+    about_axis = serves & (launches.even == ABOUT_ONE_AXIS)
     has_form = source.formulas.agm_arguments is not None or source.formulas.time_integrand is not None
-    if has_form and formulas.axes_of is not None:
-        at_rest = launches.given[:, -1] == 0.0
-        for chosen, are_at_rest in ((about_axis & at_rest, True), (about_axis & ~at_rest, False)):
-            if not chosen.any():
-                continue
-            orbits = Orbits(source, formulas.axes_of, are_at_rest, rows)
-            launched = launches.from_axis if are_at_rest else launches.table
-            for make in (mean_program, axis_program, exact_axis_program):
-                yield Stage(chosen, make, (orbits,), launched, n + 3 if are_at_rest else n, not are_at_rest)
-    table = launches.table
-    uneven = swings if source.formulas.time_integrand is None else swings & ~about_axis
-    yield Stage(uneven, swing_program, (source, rows), table, n, True)
-    yield Stage(swings, libration_program, (source, rows), table, source.variables, True)
-    yield Stage(swings, exact_swing_program, (source, rows), table, n, True)
+    if has_form and formulas.axes_of is not None and about_axis.any():
+        given = (Orbits(source, formulas.axes_of, at_rest, plan),)
+        launched, inputs = (launches.from_axis, n + 3) if at_rest else (table, n + 2)
+        for make in (mean_program, axis_program, exact_axis_program):
+            yield Stage(about_axis, make, given, launched, inputs, not at_rest)
+    uneven = serves if source.formulas.time_integrand is None else serves & ~about_axis
+    yield Stage(uneven, swing_program, (source, plan), table, n + 2, True)
+    yield Stage(serves, libration_program, (source, plan.wanted), table, source.variables, True)
+    yield Stage(serves, exact_swing_program, (source, plan), table, n + 2, True)
+
+
+def lap_stages(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
+    """Yield the programs for the times of laps."""
+    n, table = source.parameters, launches.table
     laps = np.hstack([table[:, : source.variables], table[:, n : n + 1]])  # a lap begins at lam0
     for direction in (1, -1):
-        chosen = ~swings & (launches.directions == direction)
-        given = (source, direction, rows)
-        yield Stage(chosen, circulation_program, given, laps, source.variables + 1, False, CIRCULATION)
+        chosen = launches.circulates & (launches.directions == direction)
+        yield Stage(
+            chosen, circulation_program, (source, direction, rows), laps, source.variables + 1, False, CIRCULATION
+        )
+
+
+def moves_of(stage: Stage) -> tuple[Source, tuple[int, ...]]:
+    """Return the source of a program, and the variables by which turning points are differentiated for it."""
+    source, *given = stage.given
+    if isinstance(source, Orbits):
+        return source.source, moved_variables(source.source, source.plan)
+    plan = given[-1]
+    return source, moved_variables(source, plan) if isinstance(plan, Plan) else plan
 
 
 def carried_out(
-    stage: Stage, program: Any, rows: tuple[int, ...], which: tuple[NDArray[np.intp], NDArray[np.bool_]], most: int
+    stage: Stage, program: Any, count: int, which: tuple[NDArray[np.intp], NDArray[np.bool_]], most: int
 ) -> tuple[Array, NDArray[np.int8]]:
     """Return the derivatives of some launches, and the states of their orbits.
 
@@ -176,17 +264,17 @@ def carried_out(
         The program.
     program : Program or LaneProgram
         The program itself.
-    rows : tuple of int
-        The variables of differentiation.
+    count : int
+        The number of derivatives.
     which : pair of arrays
         The launches, and whether each orbit is a mirror image of itself.
     most : int
         The largest number of intervals of the trapezoidal rule, for a program in double precision.
     """
-    (chosen, mirrored), source = which, stage.given[0]
+    (chosen, mirrored), (source, moved) = which, moves_of(stage)
     launched = stage.launched if chosen.size == len(stage.launched) else stage.launched[chosen]
-    out, states = np.empty((chosen.size, len(rows))), np.full(chosen.size, ANSWERED, dtype=np.int8)
-    turns = [(end_program, end, getattr(source, "source", source), rows) for end in range(2)] if stage.has_turns else []
+    out, states = np.empty((chosen.size, count)), np.full(chosen.size, ANSWERED, dtype=np.int8)
+    turns = [(end_program, end, source, moved) for end in range(2)] if stage.has_turns else []
     makers = [*turns, (stage.make, *stage.given)]
     programs = [make(*given) for make, *given in makers]
     so_far = launches_so_far(*makers[-1])

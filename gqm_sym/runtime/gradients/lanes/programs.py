@@ -20,9 +20,10 @@ import numpy as np
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient, partials
-from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble
+from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble_rates
 from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
+from gqm_sym.runtime.gradients.lanes.scaling import Plan, Terms, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.gradients.programs import assemble as in_double_double
 from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, OFFSETS_FROM_A, OFFSETS_TO_B, SINES_SQUARED
@@ -40,7 +41,7 @@ MEAN_STEPS = 4
 @lru_cache(maxsize=64)
 def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Program]:
     """Return the programs of the Newton step from the place to a turning point, and of the turning point's derivatives
-    with respect to the ``wanted`` variables.
+    with respect to the ``wanted`` variables (of which the energy is the third after the parameters).
     """
     programs = []
     for variables in ((), wanted):
@@ -51,27 +52,69 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
     return programs[0], programs[1]
 
 
+class Swing(NamedTuple):
+    """The inputs of the program of a libration on its tape.
+
+    Attributes
+    ----------
+    parameters : sequence of TapeNumber
+        The run-time parameters.
+    launch : pair of TapeNumber
+        The launch place and the launch speed.
+    ends : pair of TapeNumber
+        Both turning points.
+    moves : sequence of sequences
+        The derivatives of the turning points and the parameters with respect to each of the variables by which the
+        formulas are differentiated (`Plan.moves`).
+    """
+
+    parameters: Sequence[TapeNumber]
+    launch: tuple[TapeNumber, TapeNumber]
+    ends: tuple[TapeNumber, TapeNumber]
+    moves: Sequence[Sequence[TapeNumber]]
+
+
+def swing_inputs(source: Source, plan: Plan) -> int:
+    """Return the number of inputs of the program of a libration."""
+    return source.parameters + 4 + 2 * len(moved_variables(source, plan))
+
+
+def swing_of(op: Recorder, source: Source, plan: Plan) -> Swing:
+    """Return the inputs of the program of a libration: the run-time parameters, lam0 and v0, both turning points, and
+    the derivatives of the lower and then of the upper turning point.
+    """
+    n, variables = source.parameters, moved_variables(source, plan)
+    p, (lam0, v0, a, b), moves = op.values[:n], op.values[n : n + 4], op.values[n + 4 :]
+    moved = [
+        (moves[j], moves[len(variables) + j], *(op.number(int(i == k)) for i in range(n)))
+        for j, k in enumerate(variables)
+    ]
+    return Swing(p, (lam0, v0), (a, b), moved)
+
+
+def moved_variables(source: Source, plan: Plan) -> tuple[int, ...]:
+    """Return the variables by which turning points are differentiated: the energy, and parameters."""
+    return plan.moves(source.parameters + 2)
+
+
 @lru_cache(maxsize=64)
-def swing_program(source: Source, wanted: tuple[int, ...]) -> LaneProgram | None:
+def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     """Return the program of the time per phase angle of a libration, differentiated at the same phase angle.
 
-    The inputs are the run-time parameters, both turning points, and the derivatives of the lower and then of the upper
-    turning point with respect to each of the ``wanted`` variables. A place has two coordinates: the squares of the sine
-    and of the cosine of half the phase angle. The results are Q and the derivatives of the time per phase angle. It is
-    None if the potential contains an operation without a rule for divided differences.
+    Its inputs are those of `swing_of`. A place has two coordinates: the squares of the sine and of the cosine of half
+    the phase angle. The results are Q and the derivatives of the time per phase angle. It is None if the potential
+    contains an operation without a rule for divided differences.
     """
-    n, count = source.parameters, len(wanted)
-    op = LaneRecorder(n + 2 + 2 * count, 2)
-    p, (a, b), moves = op.values[:n], op.values[n : n + 2], op.values[n + 2 :]
+    op = LaneRecorder(swing_inputs(source, plan), 2)
+    p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
     except WithoutRuleError:
         return None
     rate = ds / op.sqrt(2 * factor)
-    moved = [(moves[j], moves[count + j], *(op.number(int(i == k)) for i in range(n))) for j, k in enumerate(wanted)]
-    found = changes(op, rate, (a, b, *p), moved)
-    return assemble(op, [factor, *found], found, ALONG)
+    rates = [rate, *changes(op, rate, (a, b, *p), moves)]
+    return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch), ALONG)
 
 
 class Orbits(NamedTuple):
@@ -86,36 +129,42 @@ class Orbits(NamedTuple):
     at_rest : bool
         Whether the launches are from rest. The inputs are then the run-time parameters, the launch place, the number of
         the axis, and the sign of the place's distance from it; otherwise those of `swing_program`.
-    wanted : tuple of int
-        The variables of differentiation.
+    plan : Plan
+        How derivatives are found.
     """
 
     source: Source
     axes: Callable[..., Any]
     at_rest: bool
-    wanted: tuple[int, ...]
+    plan: Plan
 
     @property
     def inputs(self) -> int:
         """The number of inputs."""
-        return self.source.parameters + (3 if self.at_rest else 2 + 2 * len(self.wanted))
+        return self.source.parameters + 3 if self.at_rest else swing_inputs(self.source, self.plan)
 
     def widths(self, op: Recorder) -> tuple[TapeNumber, list[list[TapeNumber]]]:
-        """Record half the width of an orbit, and for each wanted variable its change and those of the parameters."""
-        n, count = self.source.parameters, len(self.wanted)
-        p, others = op.values[:n], op.values[n:]
-        moves = [[op.number(int(i == k)) for i in range(n)] for k in self.wanted]
+        """Record half the width of an orbit, and its changes and those of the parameters (`Plan.moves`)."""
+        n, half = self.source.parameters, Fraction(1, 2)
         if not self.at_rest:
-            ends = others[2:]
-            changes = [(ends[count + j] - ends[j]) * Fraction(1, 2) for j in range(count)]
-            return (others[1] - others[0]) * Fraction(1, 2), [[c, *m] for c, m in zip(changes, moves, strict=True)]
-        lam0, number, sign = others
+            _, _, (a, b), moves = swing_of(op, self.source, self.plan)
+            return (b - a) * half, [[(high - low) * half, *move] for low, high, *move in moves]
+        p, (lam0, number, sign) = op.values[:n], op.values[n:]
+        variables = self.plan.moves(n)
+        moves = [[op.number(int(i == k)) for i in range(n)] for k in variables]
         place, step = self.axes(op, p)
         axis = op.number(place) if step is None else place + number * step
-        changes = []
-        for move, k in zip(moves, self.wanted, strict=True):
-            changes.append(sign * (int(k == n) - total_change(op, gradient(op, axis, p), move)))
-        return sign * (lam0 - axis), [[c, *m] for c, m in zip(changes, moves, strict=True)]
+        found = []
+        for move, k in zip(moves, variables, strict=True):
+            change = sign * (int(k == n) - total_change(op, gradient(op, axis, p), move))
+            found.append([change, *move])
+        return sign * (lam0 - axis), found
+
+    def terms(self, op: Recorder) -> list[Terms]:
+        """Record the derivatives that are wanted as sums (`scaling.terms_of`)."""
+        n = self.source.parameters
+        launch = op.values[n], op.number(0) if self.at_rest else op.values[n + 1]
+        return terms_of(op, self.source, self.plan, launch)
 
 
 def total_change(op: Recorder, by_inputs: Sequence[TapeNumber], move: Sequence[TapeNumber]) -> TapeNumber:
@@ -136,8 +185,8 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     op = LaneRecorder(orbits.inputs, 2)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     square, divisor = formula(op, half, *op.places, p)
-    found = changes(op, op.sqrt(square), (half, *p), moves)
-    return assemble(op, [divisor, *found], found, FROM_AXIS)
+    rate = op.sqrt(square)
+    return assemble_rates(op, divisor, [rate, *changes(op, rate, (half, *p), moves)], orbits.terms(op), FROM_AXIS)
 
 
 @lru_cache(maxsize=64)
@@ -154,7 +203,8 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
     share, tilt = op.place, 1 - 2 * op.place
     rate = op.sqrt(formula(op, half, tilt * tilt, 4 * (share * (1 - share)), p)[0])
     by_inputs = gradient(op, rate, [half, *p])
-    return in_double_double(op, [rate, *(total_change(op, by_inputs, move) for move in moves)])
+    rates = [rate, *(total_change(op, by_inputs, move) for move in moves)]
+    return in_double_double(op, [rate, *combined(op, orbits.terms(op), rates)])
 
 
 @lru_cache(maxsize=64)
@@ -191,7 +241,7 @@ def mean_program(orbits: Orbits) -> Program | None:
     for j, move in enumerate(moves):
         for weight, parts in zip(weights, partials_of, strict=True):
             found[j] = found[j] - weight * total_change(op, parts, move)
-    return in_double_double(op, [difference / a, *found])
+    return in_double_double(op, [difference / a, *combined(op, orbits.terms(op), [half_period, *found])])
 
 
 def changes(

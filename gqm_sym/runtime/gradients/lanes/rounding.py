@@ -13,6 +13,7 @@ from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import partials
 from gqm_sym.runtime.gradients.lanes.operations import SINC, SINC_PAIR, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.scaling import Terms
 
 # The second derivative of S(p) at 0, and the derivatives of S[p, p, q], by the operations and the numbers of the
 # results whose derivatives they are. These derivatives are not on the tape.
@@ -29,17 +30,27 @@ SLOPES = {
 POWERS = {Fraction(2) ** k for k in range(-6, 7)}
 
 
-def variances(op: LaneRecorder, wanted: Sequence[int]) -> list[TapeNumber]:
-    """Return the variances of the rounding errors of some registers.
+def variances(op: LaneRecorder, rates: Sequence[TapeNumber], terms: Sequence[Terms]) -> list[TapeNumber]:
+    """Return the variances of the rounding errors of sums of products.
+
+    The errors of terms may be correlated, so that the variance of a sum is at most that of its terms times their
+    number.
 
     Parameters
     ----------
     op : LaneRecorder
         The tape, to which the variances are added.
-    wanted : sequence of int
-        The registers.
+    rates : sequence of TapeNumber
+        The numbers that the products contain.
+    terms : sequence of Terms
+        The products.
     """
-    return [_variance(op, k) for k in wanted]
+    needed = sorted({which for some in terms for _, which in some})
+    by_rate = {which: _variance(op, op.register(rates[which])) for which in needed}
+    return [
+        sum(((len(some) * (number * number)) * by_rate[which] for number, which in some), op.number(0))
+        for some in terms
+    ]
 
 
 def _variance(op: LaneRecorder, wanted: int) -> TapeNumber:

@@ -11,6 +11,7 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, INTERPRETER, LOW
 from gqm_sym.runtime.gradients.lanes.assembly import assemble
 from gqm_sym.runtime.gradients.lanes.interpreter import LANES_INTERPRETER
 from gqm_sym.runtime.gradients.lanes.operations import ROUNDING, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.rounding import variances
 
 # Formulas of a place u between 0 and 1 and a parameter p. In the last two, numerator and denominator have errors in
 # common, most of which cancel.
@@ -32,7 +33,7 @@ def test_variances(name: str) -> None:
     """Over random places, rounding errors are as large as their variances say."""
     op = LaneRecorder(1, 2)
     result = op.number(FORMULAS[name](op, op.places[0], op.values[0]))
-    program = assemble(op, [result], [result])
+    program = assemble(op, [result], variances(op, [result], [[(op.number(1), 0)]]))
     shares, work, ratios = np.random.default_rng(2).uniform(0, 1, (SAMPLES, BLOCK)), program.work.copy(), []
     work[:LOW] = P
     INTERPRETER.call(program.before.ctypes.data, 0, len(program.before), work.ctypes.data, BLOCK)
