@@ -30,16 +30,19 @@ class Banking:
         The speed at which it vanishes; None if that is the speed of the motion.
     heartline
         The height of the declared curve, which the riders follow, over the track.
+    up
+        The upward direction, of a curve that was derived from another one with an angle; otherwise empty.
     """
 
     angle: sp.Expr | None
     speed: sp.Expr | None
     heartline: sp.Expr
+    up: tuple[sp.Expr, ...] = ()
 
     @property
     def forms(self) -> tuple[sp.Expr, ...]:
         """The expressions in it."""
-        return tuple(form for form in (self.angle, self.speed, self.heartline) if form is not None)
+        return tuple(form for form in (self.angle, self.speed, self.heartline, *self.up) if form is not None)
 
 
 def _is_coordinated(given: Any) -> bool:

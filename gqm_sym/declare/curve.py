@@ -416,12 +416,11 @@ class Curve(Declaration):
         z
             The heights of the points in m, if ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
-            "spline": the interpolating quintic spline. "linear", for planar tracks: straight lines between the points
-            (paper, eq. 1). At their corners the speed is kept. A body at rest on a corner stays if both lines rise from
-            it or friction holds it; on a ridge from which it can slide down on either side it starts in the direction
-            of launch. A moving body that only one side of the track holds (``contact="above"`` or ``"below"``) leaves
-            it at a corner that bends away from the body, with the event "liftoff", and passes a corner that bends
-            towards it.
+            "spline": the interpolating quintic spline. "linear": straight lines between the points (paper, eq. 1). At
+            their corners the speed is kept. A body at rest on a corner stays if both lines rise from it or friction
+            holds it; on a ridge from which it can slide down on either side it starts in the direction of launch. A
+            moving body that only one side of a planar track holds (``contact="above"`` or ``"below"``) leaves it at a
+            corner that bends away from the body, with the event "liftoff", and passes a corner that bends towards it.
         closed
             Whether the track is closed; by default it is if its last point equals its first.
         smoothing

@@ -131,10 +131,10 @@ def read_track(
     if joined and repeated:
         del texts[-1], places[-1]
     in_space = bool(places) and len(places[0]) == IN_SPACE
-    if in_space and kind != "spline":
+    if in_space and kind != "spline" and (angles or roll is not None):
         raise DeclarationError(
-            f"sampled: kind {kind!r} is so far only for tracks of x and z; in space declare a spline, of points dense "
-            "enough where the track bends"
+            f"sampled: roll: a track of kind {kind!r} has corners, at which its upward direction jumps; leave roll "
+            "out, or declare a spline"
         )
     rows = list(range(1, len(places) + 1))
     if deviation is not None:  # a recorder repeats its last value until there is a new one

@@ -31,6 +31,7 @@ from gqm_sym.derivation.forces.dissipation import (
 from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
 from gqm_sym.derivation.forces.rider import rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.geometry.centre_in_space import centre_in_space
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
 from gqm_sym.derivation.geometry.offset_curve import offset_curve
@@ -112,6 +113,10 @@ def derive(
         curve = curve.in_arc_length()
         lam = curve.parameter
     defaults = join(curve, kernel, given)
+    may_be_positive = tuple(name for name, value in defaults if is_positive(value))
+    if curve.in_space and kernel.radius:
+        curve = centre_in_space(curve, kernel.radius, dict(defaults)[str(kernel.radius)], may_be_positive)
+        kernel = replace(kernel, radius=sp.S.Zero)
     check_measured(dict(defaults), units_of(curve, kernel), where="derive", final=True)
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
@@ -131,7 +136,6 @@ def derive(
                 "Curve.space, whose contact force is a vector"
             )
         heading = None
-    may_be_positive = tuple(name for name in values if is_positive(values[name]))
     track = geometry(curve, may_be_positive=may_be_positive, heading=heading)
     x, z, shape = offset_curve(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
     y = without_poles(curve.y)
@@ -139,7 +143,7 @@ def derive(
     law = of_train(body, kernel, lam) if kernel.cars else body
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
-    upright = upright_force(curve.banking, shape, body) if curve.banking else ()
+    upright = upright_force(curve.banking, shape, body, lam) if curve.banking else ()
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
         loss = _losses(curve, kernel, (x, y, z), law, shape, upright)
@@ -214,23 +218,11 @@ def derive(
 
 def _refuse_planar_forces(kernel: Kernel) -> None:
     """Refuse forces that are defined for planar curves only."""
-    refused = (
-        (
-            "rolling: radius",
-            kernel.radius,
-            "the path of the centre of a rolling body",
-            "leave it out and declare that path, with roll= and heartline= for the track under it",
-        ),
-        (
-            "surface_tension: form",
-            kernel.resistance and not kernel.resistance.has(sp.Abs),
-            "the printed form's sign",
-            "leave it out",
-        ),
-    )
-    for name, given, what, remedy in refused:
-        if given:
-            raise DeclarationError(f"derive: {name}: {what} is so far known for planar curves only; {remedy}")
+    if kernel.resistance and not kernel.resistance.has(sp.Abs):
+        raise DeclarationError(
+            "derive: surface_tension: form: the printed form's sign is so far known for planar curves only; leave it "
+            "out"
+        )
 
 
 def _refuse_of_train(kernel: Kernel) -> None:

@@ -68,6 +68,7 @@ def _source(model: Model, name: str) -> str:
         parts += [
             "banked",
             *(exact(form) for form in (curve.banking.angle, curve.banking.speed, curve.banking.heartline)),
+            *(exact(form) for form in curve.banking.up),
         ]
     if curve.charted:
         parts.append(repr(curve.definition))

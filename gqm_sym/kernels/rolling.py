@@ -17,8 +17,9 @@ def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static
         The moment of inertia over mass and radius squared (sphere 2/5, cylinder 1/2, ring 1), or another name for it.
     radius
         The radius of the body in m, or another name for it. With it the curve is the track, and the centre of the body
-        moves beside it, to the left of increasing λ, or to the right if the radius is negative. Without it the curve is
-        the path of the centre.
+        moves beside it, to the left of increasing λ, or to the right if the radius is negative; in space it moves above
+        the track, along the upward direction of a track with a declared roll. Without it the curve is the path of the
+        centre.
     mu_static
         The coefficient of static friction, or another name for it. With it, events of the kind "slip" mark the places
         where a conservative motion needs more friction; the motion continues as if the body still rolled.

@@ -400,7 +400,7 @@ FORCES = (
         gqm.SurfaceTension(form="printed"),
         "surface_tension: form: the printed form's sign is so far known for planar curves only",
     ),
-    (gqm.Rolling(radius="1/10"), "is so far known for planar curves only; leave it out and declare that path"),
+    (gqm.Rolling(radius="1/10"), "on which side of a track in space the body rolls is not known"),
     (gqm.Potential("k*y", parameters={"y": 1, "k": 1}), "'y' is a coordinate on a space curve"),
 )
 

@@ -6,6 +6,7 @@ angle. In a vertical plane u₀ is the normal, so that it is also defined where 
 without lateral force, u is parallel to N at the speed of the motion or at a declared speed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -13,6 +14,7 @@ import sympy as sp
 from gqm_sym.declare.banking import Banking
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.forces.forces import Forces, Place, turned_force
+from gqm_sym.derivation.geometry.centre_in_space import frame_of, upward
 from gqm_sym.derivation.geometry.geometry import Geometry, cross
 from gqm_sym.kernels.base import DIRECTION, W
 
@@ -75,7 +77,7 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     lam
         The curve's parameter.
     """
-    seat = _in_plane(banking, shape, law) if shape.heading is not None else _in_space(banking, shape, law)
+    seat = _in_plane(banking, shape, law) if shape.heading is not None else _in_space(banking, shape, law, lam)
     # The longitudinal load contains all forces except that of the potential.
     felt = (seat.vertical, seat.lateral, acceleration - law.push)
     vertical, lateral, ahead = (load / STANDARD_GRAVITY for load in felt)
@@ -93,7 +95,7 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     )
 
 
-def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Expr, ...]:
+def upright_force(banking: Banking, shape: Geometry, law: Forces, lam: sp.Symbol) -> tuple[sp.Expr, ...]:
     """Return n₀ and κ for which κ W + n₀ is the component of N/m along the rider's upward direction; in a rotating
     frame a third number, which is added to it for each unit of ds/dt.
 
@@ -101,7 +103,7 @@ def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Ex
     """
     if shape.heading is not None or not has_upward_direction(banking):
         return ()
-    upright = _in_space(banking, shape, law).vertical
+    upright = _in_space(banking, shape, law, lam).vertical
     load = upright.xreplace({W: sp.S.Zero})
     if not law.coriolis:
         return load, differentiate(upright, W)
@@ -114,25 +116,20 @@ def upright_force(banking: Banking, shape: Geometry, law: Forces) -> tuple[sp.Ex
 
 def has_upward_direction(banking: Banking | None) -> bool:
     """Return whether the upward direction of riders is that of the track, whatever the motion."""
-    return banking is not None and not (banking.angle is None and banking.speed is None)
+    return banking is not None and not (banking.angle is None and banking.speed is None and not banking.up)
 
 
 def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     """Return the force on a rider in a vertical plane, where the contact force is along the normal and has no lateral
     component.
     """
-    assert shape.heading is not None
-    cosine, sine = shape.heading
-    angle = sp.S.Zero if banking.angle is None else banking.angle
-    force, left = shape.kappa * W + law.static_normal_load, (-sine, cosine, sp.S.Zero)
-    upright, tilted = sp.cos(angle), sp.sin(angle)
-    along_x, along_y, along_z = (n * upright + side * tilted for n, side in zip(shape.normal, left, strict=True))
-    return _Seat(
-        vertical=force * upright, lateral=-force * tilted, roll=(upright, tilted), up=(along_x, along_y, along_z)
-    )
+    force, (upright, tilted) = shape.kappa * W + law.static_normal_load, _roll(banking, shape)
+    return _Seat(vertical=force * upright, lateral=-force * tilted, roll=(upright, tilted), up=_upward(banking, shape))
 
 
-def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
+def _in_space(banking: Banking, shape: Geometry, law: Forces, lam: sp.Symbol) -> _Seat:
+    if banking.up:
+        return _along_derived_curve(banking, shape, law, lam)
     tangent = shape.tangent
     across, along, _ = tangent
     turned = _turned(shape, law, W)
@@ -148,17 +145,50 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     level = across**2 + along**2
     width = sp.sqrt(level)
     upwards, sideways = (turned[0] * along - turned[1] * across) / width, turned[2] / width
-    upright, tilted = sp.cos(banking.angle), sp.sin(banking.angle)
-    left = (-along / width, across / width, sp.S.Zero)
-    above = (-tangent[2] * across / width, -tangent[2] * along / width, width)
-    up_x, up_y, up_z = (one * upright + other * tilted for one, other in zip(above, left, strict=True))
+    upright, tilted = _roll(banking, shape)
     return _Seat(
         vertical=upwards * upright + sideways * tilted,
         lateral=sideways * upright - upwards * tilted,
         roll=(upright, tilted),
-        up=(up_x, up_y, up_z),
+        up=_upward(banking, shape),
         level=level,
     )
+
+
+def _along_derived_curve(banking: Banking, shape: Geometry, law: Forces, lam: sp.Symbol) -> _Seat:
+    """Return the force on a rider whose upward direction u is known, with K·u = -t·du/ds and K·l = dt/ds·(u × t)."""
+    tangent, up = shape.tangent, banking.up
+    first, left = [shape.ds * part for part in tangent], cross(up, tangent)
+    second = [differentiate(part, lam) for part in first]
+    fixed = [
+        load + DIRECTION * sp.sqrt(W) * aside for load, aside in zip(law.loads, law.coriolis or (0, 0, 0), strict=True)
+    ]
+    bend = -_dot(first, [differentiate(part, lam) for part in up])
+    return _Seat(
+        vertical=W * bend / shape.ds**2 - _dot(fixed, left),
+        lateral=W * _dot(second, cross(up, first)) / shape.ds**3 + _dot(fixed, up),
+        roll=_roll(banking, shape),
+        up=_upward(banking, shape),
+        level=tangent[0] ** 2 + tangent[1] ** 2,
+    )
+
+
+def _roll(banking: Banking, shape: Geometry) -> tuple[sp.Expr, sp.Expr]:
+    """Return cosine and sine of the roll angle."""
+    if banking.up:
+        left, above = frame_of(shape)
+        # What is upwards across the tangent has a vertical component that decides how much.
+        return banking.up[2] / above[2], _dot(banking.up, left)
+    angle = sp.S.Zero if banking.angle is None else banking.angle
+    return sp.cos(angle), sp.sin(angle)
+
+
+def _upward(banking: Banking, shape: Geometry) -> Place:
+    """Return the upward direction of riders."""
+    if banking.up:
+        up_x, up_y, up_z = banking.up
+        return up_x, up_y, up_z
+    return upward(shape, sp.S.Zero if banking.angle is None else banking.angle)
 
 
 def _turned(shape: Geometry, law: Forces, w: sp.Expr, forwards: sp.Expr = DIRECTION) -> Place:
@@ -167,5 +197,5 @@ def _turned(shape: Geometry, law: Forces, w: sp.Expr, forwards: sp.Expr = DIRECT
     return along_x, along_y, along_z
 
 
-def _dot(one: Place, other: Place) -> sp.Expr:
+def _dot(one: Sequence[sp.Expr], other: Sequence[sp.Expr]) -> sp.Expr:
     return sp.Add(*(a * b for a, b in zip(one, other, strict=True)))

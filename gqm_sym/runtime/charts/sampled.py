@@ -93,9 +93,13 @@ class Sampled:
             numbers = np.array(
                 [(n.value, n.low) for n in (read_number(t, where="points") for t in self.points.split())]
             )
-            corners = numbers.reshape(-1, 4)
+            corners = numbers.reshape(-1, 2 * (2 + self.in_space))
             count = len(corners)
-            return TruePieces(chart, lambda k: sample_plane(corners[k], corners[(k + 1) % count], nodes))
+            return TruePieces(
+                chart,
+                lambda k: sample_plane(corners[k], corners[(k + 1) % count], nodes),
+                in_space=self.in_space,
+            )
         t, c = spline.t, np.ascontiguousarray(spline.c)
         places = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
         return TruePieces(chart, lambda k: sample_spline(t, c, places[k], nodes), in_space=self.in_space)
@@ -103,13 +107,17 @@ class Sampled:
 
 @entry(SAMPLES(VECTOR, VECTOR, MATRIX))
 def sample_plane(begin, end, nodes):  # type: ignore[no-untyped-def]
-    """Return the samples of a plane between two points, each x and z as two doubles each (`pieces.Samples`)."""
-    samples = np.empty((2, 2, NODES_OF_PIECES))
+    """Return the samples of a straight line between two points, whose coordinates are two doubles each
+    (`pieces.Samples`).
+    """
+    dimension = begin.size // 2
+    samples = np.empty((dimension, 2, NODES_OF_PIECES))
     for i in range(NODES_OF_PIECES):
         share, share_low = add(0.5 * nodes[0, i], 0.5 * nodes[1, i], 0.5, 0.0)
-        for row in range(2):
-            x, x_low = begin[2 * row], begin[2 * row + 1]
-            gap, gap_low = add(end[2 * row], end[2 * row + 1], -x, -x_low)
+        for row in range(dimension):
+            column = row if dimension == 2 else IN_SAMPLES[row]
+            x, x_low = begin[2 * column], begin[2 * column + 1]
+            gap, gap_low = add(end[2 * column], end[2 * column + 1], -x, -x_low)
             gap, gap_low = multiply(gap, gap_low, share, share_low)
             samples[row, 0, i], samples[row, 1, i] = add(x, x_low, gap, gap_low)
     return samples, 4.0 * UNIT * np.abs(samples).max()
@@ -175,7 +183,9 @@ def _made(track: Sampled) -> tuple[Chart, Any]:
         points = np.concatenate([points, points[:1]])
     if track.banked:  # roll changes by less than half a turn from point to point
         points[:, ROLL] = np.unwrap(points[:, ROLL])
-    return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
+    if track.kind == "spline":
+        return _splined(points, track.closed)
+    return (_lines_in_space if track.in_space else _planes)(points, track.closed), None
 
 
 def _planes(points: Array, closed: bool) -> Chart:
@@ -199,6 +209,28 @@ def _planes(points: Array, closed: bool) -> Chart:
         places=places, lengths=lengths, anchors=points[:-1], angles=angles, curvatures=np.zeros_like(angles)
     )
     return _assembled(pieces, np.arange(lengths.size), edges, turn, closed, corners, corners)
+
+
+def _lines_in_space(points: Array, closed: bool) -> Chart:
+    """Return the chart in space of straight pieces from point to point; each turn of the tangent is a corner."""
+    steps = np.diff(points, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    edges, tangents = summed(lengths), steps / lengths[:, None]
+    turns = np.linalg.norm(tangents - np.roll(tangents, 1, axis=0), axis=1)
+    shorter = np.minimum(np.roll(lengths, 1), lengths)
+    bent = turns > MIN_TURN * (1.0 + np.abs(points).max() / shorter)
+    bent[0] &= closed
+    corners, places = edges[:-1][bent], np.repeat([[0.0, 1.0]], lengths.size, axis=0)
+    slopes = np.repeat(tangents[:, :, None], NODES.size, axis=2)
+    chart = assemble_in_space(
+        edges,
+        points[:-1],
+        [slopes, np.zeros_like(slopes), np.zeros_like(slopes)],
+        period=edges[-1] if closed else 0.0,
+        breaks=corners,
+        origins=np.column_stack([np.arange(lengths.size), places]),
+    )
+    return replace(chart, corners=corners, from_points=True)
 
 
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:

@@ -172,7 +172,7 @@ LINE = [(float(k), 0.5 * k, -1.0 * k) for k in range(9)]
         ([*LINE[:4], (4.0, 2.0), *LINE[5:]], {}, "row 5: must be three numbers, x, y and z, as in row 1, got"),
         ([(*row, 0.0) for row in LINE], {}, "row 1: must be two numbers, x and z, or in space three, x, y and z, got"),
         ([*LINE[:4], (1.0, 0.5, 9.0), *LINE[5:]], {}, r"row \d: the track turns by 1\d\d degrees there"),
-        (LINE, {"kind": "linear"}, "kind 'linear' is so far only for tracks of x and z"),
+        (LINE, {"kind": "linear", "roll": 0}, "roll: a track of kind 'linear' has corners"),
     ],
 )
 def test_bad_points_are_refused(points: object, options: dict[str, object], message: str) -> None:
