@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Expr, Function, S, Symbol, cos, cosh, exp, expand, sin, sinh
+from sympy import Add, Expr, Function, Mul, S, Symbol, cos, cosh, exp, expand, sin, sinh
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.angles import of_sum
@@ -142,6 +142,22 @@ def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
     )
 
 
+def _term_by_term(form: Expr) -> Expr:
+    """Divide a sum by a power of a number term by term, if this takes that power from one of the terms.
+
+    The root that remains of it, which is most of ds of a rolling body, then has one rounding instead of five.
+    """
+    sums = [factor for factor in form.args if factor.is_Add]
+    if not form.is_Mul or len(sums) != 1:
+        return form
+    total, others = sums[0], form / sums[0]
+    divisors = {power.base for power in others.args if power.is_Pow and power.exp.is_negative}
+    roots = {part for term in total.args for part in Mul.make_args(term) if part.is_Pow and part.exp.is_Rational}
+    if not any(root.base in divisors and root.exp.q == 2 for root in roots):
+        return form
+    return Add(*(term * others for term in total.args))
+
+
 def _at_middle(value: Expr, ends: tuple[Symbol, Symbol], middle: Symbol, rest: Symbol) -> Expr:
     """Write sinh, cosh or exp of a multiple of the mean of both ends by the mean as two numbers, because all nodes of
     an orbit have its rounding in common.
@@ -169,7 +185,11 @@ def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
         (starts, places, offsets),
         f"U[a, {place}], ds/d{place} and dU/d{place}.",
         inside=[(a, at(starts)), (place, at(places)), (d, at(offsets))],
-        outputs=(_from_start(differences.first(potential, 0, 1), a, d), model.ds, model.effective_potential_slope),
+        outputs=(
+            _from_start(differences.first(potential, 0, 1), a, d),
+            _term_by_term(model.ds),
+            model.effective_potential_slope,
+        ),
         batch=True,
     )
 
@@ -183,7 +203,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
     potential = in_single_waves(model.effective_potential, place)
-    forms = _with_constant_factors((differences.second(potential), model.ds), place, (a, b), (da, db))
+    forms = _with_constant_factors((differences.second(potential), _term_by_term(model.ds)), place, (a, b), (da, db))
     outputs, held = hoist(forms, {place, da, db})
     ends = [(a, at(lows)), (b, at(highs))]
     middle, rest = names.symbol("middle"), names.symbol("rest")

@@ -17,7 +17,7 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.kinks.places import next_kink, note_kinks
 from gqm_sym.runtime.legs.leg_record import HEAD, KNOWN_PEAK, NO_VALUES, PASSAGE, PEAKS, RIGHT, TIME, TIME_ERROR, Y_ROW
-from gqm_sym.runtime.legs.panels.breaks import offset
+from gqm_sym.runtime.legs.panels.breaks import offset, place_after
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
     FORCE,
@@ -40,7 +40,6 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
-from gqm_sym.runtime.legs.runs.arrival import fill_v2_from_turn
 from gqm_sym.runtime.legs.runs.branch_points import branch_beside
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, END_TURN, End
 from gqm_sym.runtime.legs.runs.gaps import ROUNDINGS_OF_TIMES
@@ -48,6 +47,7 @@ from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, unstretched, var
 from gqm_sym.runtime.legs.runs.peaks import Stretch, peak_of_part
 from gqm_sym.runtime.legs.runs.whole_leg import CHECK, variable_of_leg
 from gqm_sym.runtime.legs.runs.whole_rows import (
+    FROM_TURN,
     are_rows_resolved,
     begin_leg,
     blocks_for,
@@ -55,6 +55,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     extent_of_row,
     fill_load,
     fill_times,
+    fill_v2,
     is_contact_force_resolved,
     keeps_sign,
     load_sign,
@@ -243,17 +244,10 @@ def solve_part(part, blocks, h, is_last, work):  # type: ignore[no-untyped-def]
     if is_last:
         fill_v2_to_turn(blocks, h, work)
     elif part.v2 == 0.0:
-        fill_v2_from_turn(blocks, h, work)
+        fill_v2(blocks, h, FROM_TURN, work)
     else:
         fill_v2_onwards(blocks, part.v2, work)
     return work[blocks * W + blocks * WIDE - 1], max(part.largest_v2, extent_of_row(blocks, work, W)[1])
-
-
-@Inner
-def place_after(place, d):  # type: ignore[no-untyped-def]
-    """Return the place at a signed distance from a place of two doubles."""
-    high, low = two_sum(place[0], d)
-    return two_sum(high, low + place[1])
 
 
 @Inner

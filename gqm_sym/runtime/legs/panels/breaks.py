@@ -29,6 +29,13 @@ def offset(place, origin, u):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def place_after(origin, d):  # type: ignore[no-untyped-def]
+    """Return the place at a signed distance from an origin, both as two doubles."""
+    high, low = two_sum(origin[0], d)
+    return two_sum(high, low + origin[1])
+
+
+@Inner
 def located(origin, v, distance, breaks, upcoming):  # type: ignore[no-untyped-def]
     """Return the place at a distance from an origin, as two doubles; it is exactly a break if the distance is that of a
     break.
@@ -41,8 +48,7 @@ def located(origin, v, distance, breaks, upcoming):  # type: ignore[no-untyped-d
             return breaks[k], 0.0
         if far < distance:
             break
-    high, low = two_sum(origin[0], v * distance)
-    return two_sum(high, low + origin[1])
+    return place_after(origin, v * distance)
 
 
 @Inner

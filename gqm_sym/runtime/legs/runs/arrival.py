@@ -7,22 +7,17 @@ long as V**2 at the place is not small. The width is given, which takes fewer va
 """
 
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.kinks.places import note_kinks
 from gqm_sym.runtime.legs.leg_record import ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before
 from gqm_sym.runtime.legs.panels.equation import (
-    EXPM1_Q,
     FORCE,
-    NODES,
-    SPEED,
     TAILS,
     TIME_RATE,
     W_FACTOR,
     March,
     Panel,
     W,
-    damped_row,
 )
 from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
@@ -32,6 +27,7 @@ from gqm_sym.runtime.legs.panels.widest import HIGH_V2_RATIO
 from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2, first_attempt, next_attempt
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
+    FROM_TURN,
     HAS_KINKS,
     NO_KINKS,
     are_rows_resolved,
@@ -40,31 +36,18 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     curvature_sign,
     fill_load,
     fill_times,
+    fill_v2,
     keeps_sign,
     load_sign,
-    replace_v2,
     sample_leg,
     size_of_row,
     whole_buffer,
 )
-from gqm_sym.runtime.legs.runs.whole_tables import to_arrival_time, to_means
+from gqm_sym.runtime.legs.runs.whole_tables import to_arrival_time
 
 # The largest number of times that V**2 is computed from forces that depend on it, and the change of V**2 as a share of
 # its largest value that is rounding only.
 MAX_TRIES, SETTLED = 12, 1e-15
-
-grown_row = over_rows(lambda factor, y, h: factor * (h * y), WIDE)
-
-
-@Inner
-def fill_v2_from_turn(blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
-    to_means(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
-    for at in range(0, blocks * WIDE, WIDE):
-        factor = blocks * W_FACTOR + at
-        damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        grown_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h)
-    return replace_v2(blocks, work)
 
 
 @Inner
@@ -77,7 +60,7 @@ def reaches(forces, march, panel, blocks, variable, work):  # type: ignore[no-un
         if not sample_leg(forces, march, panel, blocks, variable, work):
             return False
         before = change
-        change, size = fill_v2_from_turn(blocks, variable.width, work)
+        change, size = fill_v2(blocks, variable.width, FROM_TURN, work)
         if not work[blocks * W + blocks * WIDE - 1] >= HIGH_V2_RATIO * size:
             return False
         settled = change <= SETTLED * size or is_settled(change, before, size, forces.squared_contact != 0)

@@ -13,6 +13,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
     FORCE,
+    GRADED,
     KAPPA,
     LENGTH,
     MEAN,
@@ -39,6 +40,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     length_row,
     product,
 )
+from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, keep_few
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, LEBESGUE, WIDE, extent, size_of, to_means, to_tails
 from gqm_sym.runtime.legs.panels.resolution import (
     ONE_SIGN_RATIO,
@@ -56,15 +58,17 @@ MAX_SHARE, POWERS = 0.1, 16
 # The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
 # largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature, and of the coefficients of
 # (N/m)**2; the factors of the powers; and rows from which V**2, N and time follow. With friction in space the first
-# two of the rows are those of P and Q without friction.
+# two of the rows are those of P and Q without friction, and WITH_FEW tells whether the gap is so short that few nodes
+# suffice (`panels.few_nodes`), whose rows come last.
 STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
 LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
-BOUNDS_OF_SQUARE, FACTORS = 11, 24
+BOUNDS_OF_SQUARE, WITH_FEW, FACTORS = 11, 17, 24
 FIRST_ROW = FACTORS + POWERS
 GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, MEAN, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
 SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
 FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
-GAP_COLUMNS = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
+FIRST_OF_FEW = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
+GAP_COLUMNS = FIRST_OF_FEW + ROOM_FOR_FEW
 FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.
@@ -117,7 +121,8 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     if not forces.linear:
         if is_curve_resolved(width, work)[0] and is_square_kept(gaps, at, work) and size_of(work, PLAIN_Q) < inf:
             keep_rows(forces, gaps, at, work)
-            gaps[at] = FILLED
+            is_short = keep_few(width, forces.direction, work, gaps, at + FIRST_OF_FEW)
+            gaps[at], gaps[at + WITH_FEW] = FILLED, 1.0 if is_short else 0.0
         return
     if not fill_force(march, work) < inf:
         return
@@ -183,8 +188,8 @@ def fill_length_on_gap(gaps, at, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def solve_on_gap(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Fill the row W for a law with friction in space; return whether it converges and V**2, the force and N are
-    resolved.
+    """Fill the rows W, FORCE and MEAN for a law with friction in space; return whether it converges and V**2, the force
+    and N are resolved.
     """
     for k, row in enumerate(FRICTION_ROWS):
         copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
@@ -195,6 +200,6 @@ def solve_on_gap(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-
     march, panel = March((0.0, 0.0), forces.direction, 0.0, 1.0), Panel(0.0, v2, 1, (-inf, inf))
     if not solve_nonlinear(forces, march, panel, work) < inf:
         return False
-    square_size_row(work, MEAN, AT_REST, TURNING, W)
+    square_size_row(work, GRADED, AT_REST, TURNING, W)
     low = extent(work, LENGTH)[0]
-    return low * low > LEAST_SHARE * extent(work, MEAN)[1] and examine(work, FORCE, size_of(work, FORCE))[2]
+    return low * low > LEAST_SHARE * extent(work, GRADED)[1] and examine(work, FORCE, size_of(work, FORCE))[2]

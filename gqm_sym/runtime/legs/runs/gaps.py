@@ -9,7 +9,8 @@ of time are found at nodes from the rows that are kept.
 
 Along curves in space the rows also give the square of N/m as a polynomial in V**2 (`interface`). If the law contains
 its root because of friction, it is the kept rows of the rest of the law, and friction, from which V**2 follows by
-Newton's method, without another look at the curve.
+Newton's method, without another look at the curve; on a short gap by one step of it with a few nodes
+(`panels.few_nodes`).
 """
 
 from math import fabs, inf, nan, sqrt
@@ -58,6 +59,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     solution_row,
     time_rate_row,
 )
+from gqm_sym.runtime.legs.panels.few_nodes import pass_few
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of, sum_and_slope, to_coefficients
 from gqm_sym.runtime.legs.panels.resolution import (
@@ -72,6 +74,7 @@ from gqm_sym.runtime.legs.runs.gap_data import (
     END_GAINED,
     FACTORS,
     FILLED,
+    FIRST_OF_FEW,
     FIRST_ROW,
     GAP_COLUMNS,
     GAP_ROWS,
@@ -85,6 +88,7 @@ from gqm_sym.runtime.legs.runs.gap_data import (
     MOST_KAPPA,
     MOST_N0,
     POWERS,
+    WITH_FEW,
     Bounds,
     fill_gap,
     fill_length_on_gap,
@@ -232,13 +236,18 @@ def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
 
 @Inner
 def pass_gap(forces, reading, v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Return what `pass_by_rows` does, by powers if that is possible and rows are not read; and whether they are."""
+    """Return what `pass_by_rows` does, by powers or few nodes if that is possible and rows are not read; and whether
+    they are.
+    """
     time, lost, reads = nan, 0.0, reading.what == PEAKS
     end, bounds = nan, Bounds(0.0, inf, 0.0, inf)
     if forces.linear:
         time, end, bounds = pass_by_powers(v2, contact_sign, gaps, at)
         lost = gaps[at + END_EXPM1]
-    if reads and time > 0.0 and reading.length:
+    elif gaps[at] == FILLED and gaps[at + WITH_FEW] > 0.0:
+        time, end, low, high, lost = pass_few(v2, gaps, at + FIRST_OF_FEW)
+        bounds = lengths_on(gaps, at, max(low, 0.0), high)
+    if forces.linear and reads and time > 0.0 and reading.length:
         bounds = lengths_on(gaps, at, bounds.least_v2, bounds.most_v2)
     top, has_values = bounds.most_v2, reads and not (time > 0.0 and not may_be_peak(reading, bounds))
     if has_values or not time > 0.0:
@@ -335,7 +344,7 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
     ahead : CurveAhead
     """
     v, nu, v2, first, breaks = march.direction, timed.contact_sign, timed.v2, ahead.upcoming, route.breaks
-    if not forces.linear or nu in (0, -route.only_sign) or route.gaps.size == 0 or first + 1 >= breaks.size:
+    if nu in (0, -route.only_sign) or route.gaps.size == 0 or first + 1 >= breaks.size:
         return 0.0, ahead
     # If a panel is laid once more, the break at which the body is lies behind already.
     if offset(breaks[first], march.origin, v) != timed.distance:
@@ -345,7 +354,10 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
         at, width = kept_gap(forces, route, upcoming, v, nu, work)
         if route.gaps[at] != FILLED:
             break
-        read_rows(v2, width, route.gaps, at, work)
+        if forces.linear:
+            read_rows(v2, width, route.gaps, at, work)
+        elif not solve_on_gap(forces, v2, width, route.gaps, at, work):
+            break
         noise = CANCELLATION_NOISE * max(largest_v2, extent(work, W)[1])
         turn, _, touch = first_change_of(work, W, 1, noise)
         far = distance_to_turn(v2, turn, width, work)

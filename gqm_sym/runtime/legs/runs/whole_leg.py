@@ -59,6 +59,7 @@ from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
+    BETWEEN_TURNS,
     HAS_KINKS,
     NO_KINKS,
     are_rows_resolved,
@@ -176,7 +177,7 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
             break
         if not forces.linear:
             before = change
-            change, size = fill_v2(blocks, h, work)
+            change, size = fill_v2(blocks, h, BETWEEN_TURNS, work)
             settled = is_settled(change, before, size, forces.squared_contact != 0)
             settled = settled or (aim == CHECK and before == 0.0 and change <= CHECKED * size)
         to_end_terms(blocks, work, blocks * FORCE, work, at)
@@ -218,7 +219,7 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
             return False, HAS_KINKS, 1.0
         if curve_fine and not is_kept:
             return False, 0, 1.0
-    fill_v2(blocks, h, work)
+    fill_v2(blocks, h, BETWEEN_TURNS, work)
     fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)

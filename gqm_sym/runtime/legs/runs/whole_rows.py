@@ -85,8 +85,11 @@ moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
 size_row = over_rows(lambda w: abs(w), WIDE)
 quotient_row = over_rows(lambda one, other: one / other, WIDE)
 quotient_before_end_row = over_rows(lambda one, y: one / (y - 1.0), WIDE)
-v2_row = over_rows(lambda factor, y, h: factor * (h * (y - y * y)), WIDE)
+v2_row = over_rows(lambda factor, y, h, bend: factor * (h * (y + bend * (y * y))), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
+
+# The factor c of ``W = h (y + c y**2) C`` on a leg between two turns, and on a part of one that begins at a turn.
+BETWEEN_TURNS, FROM_TURN = -1.0, 0.0
 
 # The number of blocks to try next on a leg with a kink of the law, and the ends of a leg that are no kinks.
 HAS_KINKS, NO_KINKS = -1, (False, False)
@@ -208,13 +211,18 @@ def replace_v2(blocks, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_v2(blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR and W; return the largest change of W, and the largest W."""
-    to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+def fill_v2(blocks, h, bend, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR and W of a leg between two turns (``bend`` is BETWEEN_TURNS) or of a part that begins at a
+    turn (FROM_TURN); return the largest change of W, and the largest W.
+    """
+    if bend == BETWEEN_TURNS:
+        to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+    else:
+        to_means(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
     for at in range(0, blocks * WIDE, WIDE):
         factor = blocks * W_FACTOR + at
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
-        v2_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h)
+        v2_row(work, blocks * SPEED + at, factor, blocks * NODES + at, h, bend)
     return replace_v2(blocks, work)
 
 

@@ -1,0 +1,131 @@
+"""V**2 and the time on short parts agree with solutions of the law in 25 digits, on a part alone and along a track."""
+
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.runtime.legs.panels import equation as rows
+from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, keep_few, pass_few
+from gqm_sym.runtime.legs.panels.polynomials import ENDS_BY_NODE, WIDE
+
+ULP = 2.0**-52
+
+
+@numba.njit
+def kept(width: float, direction: int, work: Any, data: Any) -> bool:
+    """Keep a part from the second number on."""
+    return keep_few(width, direction, work, data, 1)
+
+
+@numba.njit
+def passed(v2: float, data: Any) -> Any:
+    """Pass the part that is kept from the second number on."""
+    return pass_few(v2, data, 1)
+
+
+def law(place: Any, lib: Any) -> dict[str, Any]:
+    """Return P, Q and f of a law, and the coefficients of the square of the contact force."""
+    return {
+        "PLAIN_P": 9.75 * lib.sin(0.25 + place),
+        "PLAIN_Q": 0.125 * lib.cos(place),
+        "RUBBING": 0.125 + 0.0625 * place,
+        "AT_REST": 80 + 24 * lib.sin(place),
+        "MIXED": 11 * lib.cos(2 * place),
+        "TURNING": 0.5 + 0.5 * place,
+        "DS": 1 + 0.25 * place,
+    }
+
+
+def panel(width: float, direction: int) -> np.ndarray:
+    """Return the rows of a panel."""
+    work = np.zeros(30 * WIDE)
+    given = {"N0": 1.0, **law(direction * width * ENDS_BY_NODE, np)}
+    for name, values in given.items():
+        at = getattr(rows, name)
+        # The factor of friction has the sign of the direction.
+        work[at : at + WIDE] = values * (direction if name == "RUBBING" else 1)
+    return work
+
+
+def truth(width: float, direction: int, v2: float) -> Any:
+    """Return V**2 at the end of a part, and the time."""
+
+    def slopes(d: Any, y: Any) -> Any:
+        at = law(direction * d, mp)
+        load = mp.sqrt(at["AT_REST"] + y[0] * (at["MIXED"] + y[0] * at["TURNING"]))
+        slope = direction * (at["PLAIN_P"] - at["PLAIN_Q"] * y[0]) - at["RUBBING"] * load
+        return [slope, at["DS"] / mp.sqrt(y[0])]
+
+    with mp.workdps(25):
+        return mp.odefun(slopes, 0, [mpf(v2), mpf(0)])(mpf(width))
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("v2", [3.0, 7.5, 40.0])
+def test_a_part(direction: int, v2: float) -> None:
+    """The rounding errors are those of the result."""
+    data, width = np.zeros(1 + ROOM_FOR_FEW), 0.03125
+    assert kept(width, direction, panel(width, direction), data)
+    found, (end, time) = passed(v2, data), truth(width, direction, v2)
+    assert abs(found.end - end) <= ULP * end
+    assert abs(found.time - time) <= 2 * ULP * time
+    assert found.low <= min(v2, end) <= max(v2, end) <= found.high
+
+
+def test_parts_that_need_more_nodes() -> None:
+    """Long parts are not kept, and those next to a turn are passed in another way."""
+    data = np.zeros(1 + ROOM_FOR_FEW)
+    assert not kept(0.5, 1, panel(0.5, 1), data)
+    assert kept(0.03125, -1, panel(0.03125, -1), data)
+    assert np.isnan([passed(v2, data).time for v2 in (0.01, 0.1, 0.2)]).all()
+
+
+# On a circle of radius 1 that is tilted by 30 degrees, gravity has these parts along its plane and across.
+G, MU = mpf("9.81"), mpf("0.05")
+ALONG, ACROSS = G / 2, G * mp.sqrt(3) / 2
+
+
+def slope_on_circle(side: int, angle: Any, w: Any) -> Any:
+    """Return dW/dangle on a leg towards the other side, with the angle from the lowest point."""
+    return -2 * ALONG * mp.sin(angle) + 2 * side * MU * mp.hypot(w + ALONG * mp.cos(angle), ACROSS)
+
+
+def next_turn(start: Any) -> tuple[Any, Any]:
+    """Return the next turn, and the time to it."""
+    side = int(mp.sign(start))
+    from_start = mp.odefun(lambda d, w: [-side * slope_on_circle(side, start - side * d, w[0])], 0, [mpf(0)])
+    guess = 2 * abs(start) - 4 * MU  # for small angles
+    length = mp.findroot(lambda d: from_start(d)[0], (guess, 0.99 * guess))
+    end = start - side * length
+    # Next to the end W is found from there, where it has all its digits.
+    from_end = mp.odefun(lambda d, w: [side * slope_on_circle(side, end + side * d, w[0])], 0, [mpf(0)])
+    half = mp.sqrt(length / 2)
+    parts = (mp.quad(lambda u, w=w: 2 * u / mp.sqrt(w(u * u)[0]), [0, half]) for w in (from_start, from_end))
+    return end, sum(parts)
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Friction on the circle, made of 80 pieces."""
+    pieces = [gqm.transition(length="pi/40", yaw=1) for _ in range(80)]
+    curve = gqm.Curve.piecewise(pieces, start=(0, 0, 0), heading=(0, 0, "pi/6"), closed=True)
+    folder: Path = tmp_path_factory.mktemp("ring")
+    return gqm.build(gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction()), name="tilted_ring", folder=folder)
+
+
+@pytest.mark.parametrize("amplitude", [0.18, 0.21, 0.55])
+def test_times_to_rest_on_a_tilted_circle(amplitude: float, ring: Any) -> None:
+    """Legs along some of the pieces, on which V**2 is far from linear, and along many."""
+    launch = np.pi - amplitude
+    with mp.workdps(18):
+        place, time = mp.pi - mpf(launch), mpf(0)
+        while ALONG * abs(mp.sin(place)) > MU * mp.hypot(ALONG * mp.cos(place), ACROSS):
+            place, more = next_turn(place)
+            time += more
+    swept = ring.sweep("t_end", launch, 0.0, mu=0.05, g=9.81).values
+    np.testing.assert_allclose(swept, float(time), rtol=2e-14)
