@@ -14,14 +14,13 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
-from gqm_sym.design.charted_limits import along_chart, along_shaped_chart
+from gqm_sym.design.charted_limits import along_chart, along_shaped_chart, start_slopes
 from gqm_sym.design.limits import (
     LIMITS,
     Limit,
     Limited,
     along_formulas,
     along_spline,
-    end_slopes,
     margins_of,
     places_between,
     read_limits,
@@ -103,9 +102,7 @@ def minimise(
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
     curve with parameters they are those of ``motion.gradient`` and of all limits. For a track through points they are
-    those of all limits and of the solved motion by all its points together. The time of a body that loses no energy and
-    does not swing has them if it is that from the first point, which does not move, to the end of the track. The result
-    is a local minimum.
+    those of all limits and of the solved motion by all its points together. The result is a local minimum.
 
     Examples
     --------
@@ -311,15 +308,15 @@ class _Family(_Tracks):
         model, request, parameters, _ = self._launch(x)
         lam = self._given.get("lam") if quantity == "time_at" else None
         asked = "t_end" if quantity == "time_at" and lam is None else quantity
-        if self._from_end and model.domain_of is None:
+        p = model.numbers(parameters)
+        moved = start_slopes(model, p, self._names) if self._from_end else np.zeros(len(self._names))
+        if moved is None:
             return None
         try:
             found = model.solve(request, parameters).gradient(asked, (*self._names, "lam0"), lam=lam)
         except GQMError:
             return None
-        slopes: Array = np.array([found[name] for name in self._names])
-        if self._from_end:
-            slopes += found["lam0"] * end_slopes(model, model.numbers(parameters), self._names)[0]
+        slopes: Array = np.array([found[name] for name in self._names]) + found["lam0"] * moved
         return slopes
 
     def _limited(self, x: Array, between: Any) -> Limited:

@@ -145,14 +145,15 @@ def half_period(spline: Spline) -> Any:
     return mp.quad(rate, [0, *edges, mp.pi], method="gauss-legendre")
 
 
-def time(spline: Spline) -> Any:
-    """Return the time from the first point to the last."""
-    height = spline.at(mpf(0))[1]
+def time(spline: Spline, begin: Any = 0, end: Any = None) -> Any:
+    """Return the time from an arc length to a later one, or to the last point, of a body thrown from the former."""
+    begin, end = spline.place(mpf(begin)), spline.knots[-1] if end is None else spline.place(end)
+    height = spline.at(begin)[1]
 
     def rate(t: Any) -> Any:
         return mp.hypot(*spline.at(t, 1)) / mp.sqrt(SPEED**2 + 2 * GRAVITY * (height - spline.at(t)[1]))
 
-    return spline.integral(rate, mpf(0), spline.knots[-1])
+    return spline.integral(rate, begin, end)
 
 
 def load(spline: Spline, place: Any, w: Any) -> Any:
@@ -208,6 +209,23 @@ def test_times(tmp_path: Path) -> None:
     slopes = found.gradient("time_at", found.start)
     assert slopes is not None
     assert abs(slopes[0] - slope_of(time)) <= 1e-11 * abs(slopes[0])
+
+
+@pytest.mark.usefixtures("exact_lengths")
+@pytest.mark.parametrize(
+    ("given", "ends"),
+    [
+        ({"lam": "5/4"}, (mpf(0), mpf("1.25"))),
+        ({"lam0": "1/2", "lam": "5/4"}, (mpf("0.5"), mpf("1.25"))),
+        ({"lam0": "1/2"}, (mpf("0.5"), None)),
+    ],
+)
+def test_times_between_places(given: dict[str, Any], ends: tuple[Any, Any], tmp_path: Path) -> None:
+    """The derivative of the time from any launch to any place is that of the integral between fixed arc lengths."""
+    found = tracks(gqm.Gravity(), {"v0": 5} | given, tmp_path)
+    slopes = found.gradient("time_at", found.start)
+    assert slopes is not None
+    assert abs(slopes[0] - slope_of(lambda spline: time(spline, *ends))) <= 1e-11 * abs(slopes[0])
 
 
 @pytest.mark.usefixtures("exact_lengths")
