@@ -32,7 +32,6 @@ from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, Solut
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
-from gqm_sym.runtime.charts.interpolation import MIN_POINTS
 from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
@@ -365,7 +364,7 @@ class _Points(_Tracks):
 
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
         text = "\n".join(f"{a!r} {b!r}" for a, b in self._heights(x).tolist())
-        return replace(self._compiled, chart=Sampled(text)), {}
+        return replace(self._compiled, chart=Sampled(text, keeps_all=True)), {}
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
         """Return the derivatives of a quantity by all heights together.
@@ -376,7 +375,7 @@ class _Points(_Tracks):
         model, request, parameters, (low, _) = self._launch(x)
         numbers, points = model.numbers(parameters), self._heights(x)
         launch = read_launch(model, numbers, request)
-        if model.rolling_radius or len(points) > MIN_POINTS:
+        if model.rolling_radius:
             return None
         begins = (quantity, launch.direction, launch.lam0.value) == ("time_at", 1, low) and 0 not in self._moved
         if isinstance(model.exact, ExactPotential) and begins and "lam" not in self._given:
@@ -393,11 +392,9 @@ class _Points(_Tracks):
         """Return the quantities along a spline, with their derivatives."""
         model, request, parameters, ends = self._launch(x)
         points = self._heights(x)
-        # Of more points the chart may leave some out.
-        is_lossy = not isinstance(model.exact, ExactPotential)
-        if points.shape[1] > 2 or model.rolling_radius or (is_lossy and len(points) > MIN_POINTS):
+        if points.shape[1] > 2 or model.rolling_radius:
             return super()._limited(x, between)
-        if is_lossy:
+        if not isinstance(model.exact, ExactPotential):
             force = model.pass1(request, parameters, places_between(ends, between)).normal_force
             return lossy_limits(problem_of(model, request, parameters, points, self._moved), force, between)
         numbers, changes = model.numbers(parameters), SplineChanges(points, self._moved)
