@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 15, input 350ae6cf923a, body eb204f34768d
+# interface 15, input 350ae6cf923a, body 1bcd2619f5cc
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -28,11 +28,11 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=15)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, cos_of_sum,
-    divdiff1_cos, divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iconst, icos,
-    idiv, imul, isin, place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
+    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, cos_of_sum, divdiff1_cos,
+    divdiff1_cos_in_square, divdiff1_cos_of_sum, divdiff1_sinc_in_square, divdiff2_cos, iconst, icos, idiv, imul, isin,
+    place_from_ends, sin, sin_of_sum, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -309,33 +309,15 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
         out[3, i] = rest
 
 
-@compiled(TIME_INTEGRAND_BATCH)
-def time_integrand_batch(n, sine2, cosine2, p, out):
-    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
-    p, out = carray(p, (7, n)), carray(out, (2, n))
+@compiled(AGM_ARGUMENTS_BATCH)
+def agm_arguments_batch(n, halves, p, out):
+    """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
-        R, g, t, one_minus_t, one_minus_tt, cosine_fourth = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i]
-        _t0 = cosine2 + one_minus_tt*sine2
-        _t1 = 4*R
-        out[0, i] = -_t1*(cosine2 + one_minus_t*sine2)**2/(_t0*cosine_fourth*g*(sine2*t + 1)**2)
-        out[1, i] = -_t0*_t1*g
-
-
-@compiled(INTEGRAND_INVARIANTS_BATCH)
-def integrand_invariants_batch(n, halves, p, out):
-    """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
-    for i in range(n):
-        half = halves[i]
-        _t0 = half/2
-        _t1 = cos(_t0)
-        _t2 = _t1 + 1
-        _t3 = _t2**2
-        _t4 = 1/_t3
-        out[0, i] = _t4*sin(_t0)**2
-        out[1, i] = 2*_t1/_t2
-        out[2, i] = 4*_t1*_t4
-        out[3, i] = _t3/4
+        R, g = p[0, i], p[1, i]
+        _t0 = -g/(4*R)
+        out[0, i] = _t0
+        out[1, i] = _t0
 
 
 @compiled(BOUNDS_BATCH)
@@ -351,16 +333,10 @@ def bounds_batch(n, lo, hi, p, out):
         out[2, i], out[3, i] = _t1
 
 
-def exact_time_integrand(op, half, sine2, cosine2, p):
-    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+def exact_agm_arguments(op, half, p):
+    """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
     R, g = p[0], p[1]
-    _t0 = half/2
-    _t1 = op.cos(_t0)
-    _t2 = _t1 + 1
-    _t3 = 1/_t2**2
-    _t4 = _t3*sine2
-    _t5 = 4*_t1*_t4 + cosine2
-    return -16*R*_t3*(2*_t1*sine2/_t2 + cosine2)**2/(_t5*g*(_t4*op.sin(_t0)**2 + 1)**2), -4*R*_t5*g
+    return -g/(4*R), -g/(4*R)
 
 
 MODEL = CompiledModel(
@@ -371,12 +347,12 @@ MODEL = CompiledModel(
     ),
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
-        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=4, integrand_rows=4,
+        orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch, bounds=bounds_batch,
+        orbit_rows=4,
     ),
     domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope, time_integrand=exact_time_integrand,
+        exact_effective_potential_slope, agm_arguments=exact_agm_arguments,
     ),
 )

@@ -152,3 +152,14 @@ MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for or
 """The mean height of a train with its derivatives, by the place of its middle."""
 SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {**SPACE_ROWS, "h": MEAN_HEIGHT}
 """All functions that have charts of their own, with their derivatives."""
+
+
+class TermsSize(ChartFunction):
+    """The size of the terms whose sum is a function in space on the piece at an arc length."""
+
+
+TERMS_SIZES: dict[str, type[TermsSize]] = {
+    axis: type(f"size_of_{axis}", (TermsSize,), {"row": f"size of {axis}", "symbol": axis, "__module__": __name__})
+    for axis in (*AXES, "h")
+}
+"""Those of the coordinates and of a train's mean height."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.design.limit_programs import POINT, rows_at, track_program
-from gqm_sym.design.limits import LIMITS, PLACES, Limited, inputs_of, places_between
+from gqm_sym.design.limits import LIMITS, PLACES, Limited, end_slopes, inputs_of, places_between
 from gqm_sym.errors import GQMError, SolutionError
 from gqm_sym.runtime.charts.rail import Rail
 from gqm_sym.runtime.charts.tracing import Traced
@@ -22,7 +22,7 @@ from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping
 from gqm_sym.runtime.gradients.evaluation import values as results
 from gqm_sym.runtime.gradients.programs import Program, range_program, with_derivatives
 from gqm_sym.runtime.interface import ExactChartLaw, ExactPotential
-from gqm_sym.runtime.launch.formulas import true_pieces_of
+from gqm_sym.runtime.launch.formulas import ParameterValues, true_pieces_of
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.dissipative import dissipate
@@ -128,6 +128,19 @@ def _end_changes(model: CompiledModel, shape: ShapedPieces, columns: list[int]) 
         slopes: Array = rows.reshape(-1, 1 + len(p))[:2, 1:][:, columns]
         return slopes
     return None
+
+
+def start_slopes(model: CompiledModel, p: ParameterValues, names: Sequence[str]) -> Array | None:
+    """Return the derivatives of the lower end of a curve by some of its parameters; None if they are not known."""
+    if model.domain_of is not None:
+        slopes: Array = end_slopes(model, p, names)[0]
+        return slopes
+    maker = model.chart
+    if isinstance(maker, Traced) and maker.domain is not None:
+        rows = results(range_program(maker.domain, len(p)), inputs_of(p), np.zeros(1))[:, 0, 0]
+        found: Array = rows[1 : 1 + len(p)][[list(model.parameters).index(name) for name in names]]
+        return found
+    return np.zeros(len(names)) if isinstance(maker, Rail) else None  # a rail begins with arc length 0
 
 
 def _at_lengths(shape: ShapedPieces, lengths: Array, moved: Array, shaped: list[bool]) -> tuple[Array, Array]:

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from gqm_sym.design.charted_limits import lossy_slopes, shape_slopes
-from gqm_sym.design.limit_programs import POINT, rows_at, track_program
 from gqm_sym.design.limits import LIMITS, PLACES, Limited, places_between
 from gqm_sym.design.shape import SplineChanges
-from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
 from gqm_sym.runtime.charts.chart import Chart
@@ -20,20 +18,13 @@ from gqm_sym.runtime.charts.interpolation import DEGREE
 from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
-from gqm_sym.runtime.gradients.orbit import pairs
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.kinds import EXTREMES
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.legs.dissipative import dissipate
 from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.motion.conservative import solve
-from gqm_sym.runtime.motion.motion import Motion
-
-# An extreme this near to an end of the track, as a share of its length, counts as being there. Where the speed is below
-# this share of the largest, the body turns.
-AT_END, AT_REST = 1e-12, 1e-9
 
 
 class PointDisplacements:
@@ -180,8 +171,8 @@ def source_along(formulas: Formulas) -> ChartSource:
     return ChartSource(formulas.exact.effective_potential, formulas.inertia, len(names), names.index("m"), ())
 
 
-def slopes_by_heights(problem: Problem, quantity: str, lam: Any) -> Array | None:
-    """Return the derivatives of a quantity of a motion by all heights; None if there are none.
+def slopes_by_heights(problem: Problem, quantity: str, lam: Any) -> Array:
+    """Return the derivatives of a quantity of a motion by all heights.
 
     Parameters
     ----------
@@ -192,8 +183,6 @@ def slopes_by_heights(problem: Problem, quantity: str, lam: Any) -> Array | None
     """
     names, is_lossless = list(problem.formulas.parameters), problem.formulas.dissipation is None
     motion = (solve if is_lossless else dissipate)(problem.formulas, problem.p, problem.launch)
-    if is_lossless and motion.kind not in ("libration", "circulation"):
-        return extreme_slopes(motion, quantity) if quantity in EXTREMES else None
     found = motion.gradient(quantity, names[len(names) - len(changes_of(problem).lengthening) :], lam=lam)
     return np.array(list(found.values()))
 
@@ -222,33 +211,3 @@ def lossy_limits(problem: Problem, force: Array, between: Any) -> Limited:
     if rows is not None:
         found.slopes["normal_force"] = rows[1:-2].T[:, -count:] + rows[0][:, None] * stretched
     return found
-
-
-def extreme_slopes(motion: Motion, quantity: str) -> Array | None:
-    """Return the derivatives of an extreme along a motion without losses by all heights of a spline; None where the
-    body turns there.
-
-    The extreme changes as the quantity does at a fixed arc length, because it is stationary there (envelope theorem),
-    or at an end of the track.
-    """
-    found, problem = getattr(motion, quantity), motion.problem
-    changes, source = changes_of(problem), source_along(problem.formulas)
-    length, v = problem.high - problem.low, abs(motion.state(found.t).v)
-    if not v > AT_REST * motion.v_max.value:
-        return None
-    at_end = abs(found.lam - problem.high) <= AT_END * length
-    launch, count = problem.launch, len(changes.lengthening)
-    moved = np.array([float(at_end) * changes.lengthening, np.zeros(count)])
-    at, moves = changes.at_lengths(np.array([found.lam, launch.lam0.value]), moved)
-    p = tuple(number.value for number in problem.p)
-    potential, by_x, by_z = (float(part) for part in source.potential(ARRAYS, *at[:2, -1].tolist(), p))
-    energy = launch.v0.value**2 + 2.0 * potential
-    by_energy: Array = 2.0 * (by_x * moves[0, 1] + by_z * moves[1, 1])
-    if quantity.startswith("v_"):
-        _, by_x, by_z = (float(part) for part in source.potential(ARRAYS, *at[:2, 0].tolist(), p))
-        faster: Array = (0.5 * by_energy - by_x * moves[0, 0] - by_z * moves[1, 0]) / v
-        return faster
-    inputs = pairs(*((number, 0.0, 0.0) for number in (*p, energy)))
-    row = rows_at(track_program(source), inputs, at[:, :1])[-1, :, 0]
-    slopes: Array = row[1 : 1 + POINT] @ moves[:, 0] + row[1 + POINT] * by_energy
-    return slopes

@@ -14,14 +14,13 @@ from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
-from gqm_sym.design.charted_limits import along_chart, along_shaped_chart
+from gqm_sym.design.charted_limits import along_chart, along_shaped_chart, start_slopes
 from gqm_sym.design.limits import (
     LIMITS,
     Limit,
     Limited,
     along_formulas,
     along_spline,
-    end_slopes,
     margins_of,
     places_between,
     read_limits,
@@ -33,7 +32,6 @@ from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, Solut
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
-from gqm_sym.runtime.charts.interpolation import MIN_POINTS
 from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
@@ -103,9 +101,7 @@ def minimise(
     -----
     The optimiser is SciPy's SLSQP, with exact derivatives if there are such, and difference quotients otherwise. For a
     curve with parameters they are those of ``motion.gradient`` and of all limits. For a track through points they are
-    those of all limits and of the solved motion by all its points together. The time of a body that loses no energy and
-    does not swing has them if it is that from the first point, which does not move, to the end of the track. The result
-    is a local minimum.
+    those of all limits and of the solved motion by all its points together. The result is a local minimum.
 
     Examples
     --------
@@ -311,15 +307,15 @@ class _Family(_Tracks):
         model, request, parameters, _ = self._launch(x)
         lam = self._given.get("lam") if quantity == "time_at" else None
         asked = "t_end" if quantity == "time_at" and lam is None else quantity
-        if self._from_end and model.domain_of is None:
+        p = model.numbers(parameters)
+        moved = start_slopes(model, p, self._names) if self._from_end else np.zeros(len(self._names))
+        if moved is None:
             return None
         try:
             found = model.solve(request, parameters).gradient(asked, (*self._names, "lam0"), lam=lam)
         except GQMError:
             return None
-        slopes: Array = np.array([found[name] for name in self._names])
-        if self._from_end:
-            slopes += found["lam0"] * end_slopes(model, model.numbers(parameters), self._names)[0]
+        slopes: Array = np.array([found[name] for name in self._names]) + found["lam0"] * moved
         return slopes
 
     def _limited(self, x: Array, between: Any) -> Limited:
@@ -368,7 +364,7 @@ class _Points(_Tracks):
 
     def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
         text = "\n".join(f"{a!r} {b!r}" for a, b in self._heights(x).tolist())
-        return replace(self._compiled, chart=Sampled(text)), {}
+        return replace(self._compiled, chart=Sampled(text, keeps_all=True)), {}
 
     def gradient(self, quantity: str, x: Array) -> Array | None:
         """Return the derivatives of a quantity by all heights together.
@@ -379,7 +375,7 @@ class _Points(_Tracks):
         model, request, parameters, (low, _) = self._launch(x)
         numbers, points = model.numbers(parameters), self._heights(x)
         launch = read_launch(model, numbers, request)
-        if model.rolling_radius or len(points) > MIN_POINTS:
+        if model.rolling_radius:
             return None
         begins = (quantity, launch.direction, launch.lam0.value) == ("time_at", 1, low) and 0 not in self._moved
         if isinstance(model.exact, ExactPotential) and begins and "lam" not in self._given:
@@ -396,11 +392,9 @@ class _Points(_Tracks):
         """Return the quantities along a spline, with their derivatives."""
         model, request, parameters, ends = self._launch(x)
         points = self._heights(x)
-        # Of more points the chart may leave some out.
-        is_lossy = not isinstance(model.exact, ExactPotential)
-        if points.shape[1] > 2 or model.rolling_radius or (is_lossy and len(points) > MIN_POINTS):
+        if points.shape[1] > 2 or model.rolling_radius:
             return super()._limited(x, between)
-        if is_lossy:
+        if not isinstance(model.exact, ExactPotential):
             force = model.pass1(request, parameters, places_between(ends, between)).normal_force
             return lossy_limits(problem_of(model, request, parameters, points, self._moved), force, between)
         numbers, changes = model.numbers(parameters), SplineChanges(points, self._moved)

@@ -11,7 +11,7 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import SPACE_CHARTS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE_CHARTS, TERMS_SIZES, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
 # The names of the arrays of charts in emitted functions, each with its functions and their rows. In space each
 # coordinate has a chart, and possibly the roll angle.
@@ -19,6 +19,8 @@ CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
     **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
+for _axis, _size in TERMS_SIZES.items():
+    CHART_ROWS[f"along_{_axis}"][_size] = 4
 
 # LLVM vectorises a loop if it can check, before the loop begins, that no row that is written overlaps another one that
 # is read or written, and it makes at most 128 such checks.

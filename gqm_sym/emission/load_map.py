@@ -12,6 +12,7 @@ from gqm_sym.derivation.algebra.angles import is_power_of_two
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.subscripts import at
+from gqm_sym.sympy_charts import TERMS_SIZES, SpaceFunction
 
 
 def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
@@ -20,7 +21,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     potential = _without_constant(model.effective_potential, lowering.place)
     (accurate,) = lowering.accurate([potential])
     size = rounded_size(accurate, lowering.place)
-    if size is None:
+    if size is None or (model.curve.charted and not model.curve.in_space):
         return ()
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
@@ -91,6 +92,8 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
         return Pow(Abs(base), exponent - 1) * sizes[0]
     if isinstance(form, Abs):
         return sizes[0]
+    if isinstance(form, SpaceFunction) and form.order == 0 and form.axis in TERMS_SIZES:
+        return TERMS_SIZES[form.axis](place)
     if isinstance(form, exp | cosh):
         return form  # SymPy would write the real part of an exponent that it does not know to be real
     if isinstance(form, sinh):

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 # The number of states that are drawn, and the smallest number between two events.
 MAX_SAMPLES, MIN_SAMPLES = 801, 33
 
+# The number of states between neighbouring breaks of a track of many pieces, and the largest number of states on it.
+SAMPLES_PER_BREAK, MOST_SAMPLES = 40, 4001
+
 # The distance by which a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
 PORTRAIT_MARGIN = 0.4
 
@@ -215,11 +218,12 @@ def sampled(motion: "Motion") -> "State":
     Returns
     -------
     State
-        Arrays of some 800 states, in order of time.
+        Arrays of some 800 states, in order of time, and of more along a track of many pieces.
     """
     end = horizon(motion)
     marks = sorted({0.0, end, *(event.t for event in _shown_events(motion) if event.t < end)})
-    count = max(MAX_SAMPLES // max(len(marks) - 1, 1), MIN_SAMPLES)
+    whole = max(MAX_SAMPLES, min(SAMPLES_PER_BREAK * motion.problem.functions.breaks.size, MOST_SAMPLES))
+    count = max(whole // max(len(marks) - 1, 1), MIN_SAMPLES)
     # Steps that shorten towards both ends resolve the turning points, where the curves of speed and force are steep.
     fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     times: Array = np.concatenate(

@@ -68,7 +68,19 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     for load, colour in COLOURS.items():
         felt.plot(path.s, getattr(path, f"n_{load}"), color=colour, label=load)
         _limit(felt, levels.get(load, ()), colour, f"{load}, limit")
-    return finished(felt, "arc length s (m)", LOAD_LABEL)
+    finished(felt, "arc length s (m)", LOAD_LABEL)
+    # Loads fill their axes, so that the legend stands above them.
+    handles, labels = felt.get_legend_handles_labels()
+    entries = dict(zip(labels, handles, strict=True))
+    felt.legend(
+        entries.values(),
+        entries.keys(),
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=len(entries),
+        fontsize="small",
+    )
+    return figure
 
 
 @require("plot")

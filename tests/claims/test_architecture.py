@@ -58,6 +58,7 @@ PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
     ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
     ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_, Motion.__str__
+    ("runtime/motion/aperiodic.py", "gqm_sym.runtime.legs.variations.without_losses"),  # derivatives along charts
     ("declare/curve.py", "gqm_sym.building"),  # Curve.plot
     ("derivation/model.py", "gqm_sym.building"),  # Model.equilibria
     ("derivation/model.py", "gqm_sym.runtime.launch.equilibria"),  # the type of what it returns
@@ -173,6 +174,7 @@ TESTED_THROUGH = {
     "legs/variations/law_at_rest.py": "runtime/legs/frames/test_fitting.py",
     "legs/variations/programs.py": "runtime/legs/variations/test_answers.py",
     "legs/variations/solving.py": "runtime/legs/variations/test_changes.py",
+    "legs/variations/without_losses.py": "runtime/gradients/test_charts.py",
     "model.py": "claims/test_reference.py",
     "motion/motion.py": "claims/test_reference.py",
     "motion/parts/derivatives.py": "runtime/gradients/test_quantities.py",

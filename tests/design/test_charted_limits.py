@@ -108,6 +108,15 @@ def test_along_a_rail(friction: bool, tmp_path: Path) -> None:
             compare(found, k, quantities(*at), slopes_of(quantities, at), tuple(LIMITS))
 
 
+def test_a_time_along_a_rail(tmp_path: Path) -> None:
+    """Down a line, from its beginning to its end, t = sqrt(2 q/(g sin)); its derivative by the length is exact."""
+    curve = gqm.Curve.piecewise([gqm.line(length="q")], heading="-pi/6", parameters={"q": 2})
+    tracks = _Family(curve, gqm.Gravity(), {"q": (1, 3)}, {}, str(tmp_path))
+    found = tracks.gradient("time_at", tracks.start)
+    assert found is not None
+    assert found[0] == pytest.approx(0.5 / np.sqrt(2 * 9.81 / 4), rel=1e-14)
+
+
 def test_a_minimum_with_limits(tmp_path: Path) -> None:
     """The lowest arc on which the load stays below a limit is found: a rail that leads a body round a bend."""
     pieces = [gqm.line(length=1), gqm.arc(radius="r", angle="1")]

@@ -145,14 +145,15 @@ def half_period(spline: Spline) -> Any:
     return mp.quad(rate, [0, *edges, mp.pi], method="gauss-legendre")
 
 
-def time(spline: Spline) -> Any:
-    """Return the time from the first point to the last."""
-    height = spline.at(mpf(0))[1]
+def time(spline: Spline, begin: Any = 0, end: Any = None) -> Any:
+    """Return the time from an arc length to a later one, or to the last point, of a body thrown from the former."""
+    begin, end = spline.place(mpf(begin)), spline.knots[-1] if end is None else spline.place(end)
+    height = spline.at(begin)[1]
 
     def rate(t: Any) -> Any:
         return mp.hypot(*spline.at(t, 1)) / mp.sqrt(SPEED**2 + 2 * GRAVITY * (height - spline.at(t)[1]))
 
-    return spline.integral(rate, mpf(0), spline.knots[-1])
+    return spline.integral(rate, begin, end)
 
 
 def load(spline: Spline, place: Any, w: Any) -> Any:
@@ -211,6 +212,23 @@ def test_times(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("exact_lengths")
+@pytest.mark.parametrize(
+    ("given", "ends"),
+    [
+        ({"lam": "5/4"}, (mpf(0), mpf("1.25"))),
+        ({"lam0": "1/2", "lam": "5/4"}, (mpf("0.5"), mpf("1.25"))),
+        ({"lam0": "1/2"}, (mpf("0.5"), None)),
+    ],
+)
+def test_times_between_places(given: dict[str, Any], ends: tuple[Any, Any], tmp_path: Path) -> None:
+    """The derivative of the time from any launch to any place is that of the integral between fixed arc lengths."""
+    found = tracks(gqm.Gravity(), {"v0": 5} | given, tmp_path)
+    slopes = found.gradient("time_at", found.start)
+    assert slopes is not None
+    assert abs(slopes[0] - slope_of(lambda spline: time(spline, *ends))) <= 1e-11 * abs(slopes[0])
+
+
+@pytest.mark.usefixtures("exact_lengths")
 def test_extremes(tmp_path: Path) -> None:
     """The derivative of the largest contact force is right for a body that runs along the whole track."""
     found = tracks(gqm.Gravity(), {"v0": 5}, tmp_path)
@@ -239,14 +257,27 @@ def test_limits_with_friction(between: Any, tmp_path: Path) -> None:
 
 
 def test_many_points(tmp_path: Path) -> None:
-    """Of more points than 64 the chart may leave some out; limits with friction are then left to difference
-    quotients.
+    """Of many points on a line a spline needs few, but each height counts: along a plane with friction the time is
+    sqrt(2 length/(g (sin - mu cos))), and the contact force m g cos.
+
+    Together, the heights change as the slope of the plane does.
     """
     places = np.linspace(0.0, 2.0, 65)
-    points = np.column_stack([places, -0.1 * places * (4.0 - places)])
-    track = _Points(points, FRICTION, [30], {"v0": 1}, str(tmp_path))
-    found = track.limited(track.start, None)
+    track = _Points(np.column_stack([places, -0.5 * places]), FRICTION, range(65), GIVEN, str(tmp_path))
+    slopes, found = track.gradient("time_at", track.start), track.limited(track.start, None)
+    assert slopes is not None
     assert found is not None
-    assert np.isfinite(found.values["normal_force"]).all()
-    assert not found.slopes
-    assert track.gradient("normal_force_max", track.start) is None
+
+    def time_and_force(k: Any) -> list[Any]:
+        stretch = mp.sqrt(1 + k * k)
+        time = mp.sqrt(4 * stretch**2 / (GRAVITY * (k - MU)))
+        return [time, MASS * GRAVITY / stretch]
+
+    with mp.workdps(40):
+        by_time, by_force = (mp.diff(lambda k, i=i: time_and_force(k)[i], mpf("0.5")) for i in range(2))
+        time, force = time_and_force(mpf("0.5"))
+    assert track.answer("time_at", track.start) == pytest.approx(float(time), rel=1e-12)
+    assert slopes @ -places == pytest.approx(float(by_time), rel=1e-9)
+    assert abs(slopes.sum()) <= 1e-9 * np.abs(slopes).max()
+    assert found.values["normal_force"] == pytest.approx(np.full(PLACES, float(force)), rel=1e-12)
+    assert found.slopes["normal_force"] @ -places == pytest.approx(np.full(PLACES, float(by_force)), rel=1e-7)

@@ -67,8 +67,9 @@ class SymmetricOrbits:
         if the body passes over the barrier (0 for other squares). If the second is positive, U2 grows all the way from
         the axis to the turning point. None if U2 has a third or higher power of that square, or is not a polynomial.
     agm_arguments
-        Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None if
-        the time is not a complete elliptic integral of the first kind.
+        Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. Both
+        are the same if all orbits have the same period. None if the time is not a complete elliptic integral of the
+        first kind.
     """
 
     time_integrand: sp.Expr | None
@@ -121,7 +122,8 @@ def symmetric_orbits(
             return None
         square, growth = _turn(height, Y, OFFSET**2, symmetry.monotone)
         turning_point = square and (sp.sqrt(square), growth, sp.S.Zero)
-        return _with_agm(metric / slope, slope, ((T, HALF**2),), turning_point)
+        squares = _isochronous(height, metric, Y, 4 * Y)
+        return _with_agm(metric / slope, slope, ((T, HALF**2),), turning_point, squares)
     waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if functions <= {waves.sine, waves.cosine}), None)
     found = None if waves is None else _of_waves(forms, d, waves)
     if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
@@ -150,12 +152,38 @@ def symmetric_orbits(
     cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
     times = None if cancels else integrand, divisor, invariants
     square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
+    metric = metric.xreplace({_COSINE: 1 + waves.sign * _SINE})
+    squares = _isochronous(height, metric, _SINE, rate**2 * _SINE * (1 + waves.sign * _SINE))
     if square is None:
-        return _with_agm(*times, None)
+        return _with_agm(*times, None, squares)
     turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
     if waves.sign < 0:
         turn, share = 4 * sp.atan(sp.sqrt(square) / (1 + sp.sqrt(1 - square))) / abs(rate), square
-    return _with_agm(*times, (turn, growth, share))
+    return _with_agm(*times, (turn, growth, share), squares)
+
+
+def _isochronous(
+    height: sp.Expr, metric: sp.Expr, square: sp.Symbol, slope_squared: sp.Expr
+) -> tuple[sp.Expr, sp.Expr] | None:
+    """Return the square of the angular frequency, twice, if it is the same for all orbits, as on a cycloid.
+
+    U2 is then its product with the square of the arc length from the axis. Only linear functions of the square of a
+    sine or of the distance are tried.
+
+    Parameters
+    ----------
+    height, metric
+        U2 and (ds/dd)**2 as functions of ``square``.
+    square
+        The symbol of the square.
+    slope_squared
+        The square of the derivative of ``square`` with respect to the distance d.
+    """
+    if _degree(height, {square}) != 1 or _degree(metric, {square}) > 1:
+        return None
+    growth = height.diff(square)
+    found = sp.cancel(growth * slope_squared / (4 * square * metric))
+    return None if found.has(square) else (found, found)
 
 
 def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) -> tuple[sp.Expr | None, sp.Expr]:
@@ -220,14 +248,18 @@ def _with_agm(
     divisor: sp.Expr,
     invariants: tuple[tuple[sp.Symbol, sp.Expr], ...],
     turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
+    squares: tuple[sp.Expr, sp.Expr] | None,
 ) -> SymmetricOrbits:
-    """Return the record, with the arguments of the arithmetic-geometric mean if there are any."""
+    """Return the record, with the arguments of the arithmetic-geometric mean if there are any.
+
+    ``squares`` are these, if they are known.
+    """
     if integrand is None:
         return SymmetricOrbits(None, divisor, invariants, turning_point, None)
     sine2, cosine2 = _symbol("sine2"), _symbol("cosine2")
     inverse = 1 / integrand.xreplace(at_place({}, sine2, cosine2))
-    arguments = None
-    if _degree(inverse, {sine2, cosine2}) <= 1:
+    arguments = squares
+    if arguments is None and _degree(inverse, {sine2, cosine2}) <= 1:
         ends = ({cosine2: sp.S.One, sine2: sp.S.Zero}, {cosine2: sp.S.Zero, sine2: sp.S.One})
         arguments = tuple(inverse.xreplace(end).xreplace(dict(invariants)) for end in ends)
     return SymmetricOrbits(integrand, divisor, invariants, turning_point, arguments)

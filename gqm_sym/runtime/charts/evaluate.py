@@ -31,6 +31,9 @@ ROWS = 4
 EDGES = 6
 RECORD = 6 + ROWS * TERMS
 
+# The number by which `chart_rows` is asked for the size of the terms of a coordinate in space whose slope is at most 1.
+SIZES = 4
+
 # A jump of a derivative between neighbouring pieces that is smaller than this share of the derivative is due to
 # rounding.
 MAX_ROUNDING_JUMP = 1e-11
@@ -166,7 +169,7 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     rows : tuple of int
-        As in `chart_row`.
+        As in `chart_row`, or `SIZES`.
     places : (n,) array
     out : (m, n) array
         Has at least as many rows as ``rows`` names.
@@ -186,6 +189,9 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
             i += 1
         for k in range(len(rows)):
             row = rows[k]
+            if row == SIZES:
+                out[first + k, begin:i] = fabs(chart[start + 4]) + 1.0 / scale
+                continue
             terms, (whole, constant_low) = start + 6 + row * TERMS, _constant(chart, start, row, laps)
             if n < LANES:
                 for j in range(begin, i):

@@ -49,6 +49,8 @@ class Sampled:
         Whether the points have three coordinates.
     banked : bool
         Whether points in space have a roll angle, in radians.
+    keeps_all : bool
+        Whether no point is left out, not even if the spline through the others is the same to rounding.
     """
 
     points: str
@@ -56,6 +58,7 @@ class Sampled:
     closed: bool = False
     in_space: bool = False
     banked: bool = False
+    keeps_all: bool = False
 
     @property
     def shaped_by(self) -> tuple[int, ...]:
@@ -184,7 +187,7 @@ def _made(track: Sampled) -> tuple[Chart, Any]:
     if track.banked:  # roll changes by less than half a turn from point to point
         points[:, ROLL] = np.unwrap(points[:, ROLL])
     if track.kind == "spline":
-        return _splined(points, track.closed)
+        return _splined(points, track.closed, keeps_all=track.keeps_all)
     return (_lines_in_space if track.in_space else _planes)(points, track.closed), None
 
 
@@ -233,12 +236,13 @@ def _lines_in_space(points: Array, closed: bool) -> Chart:
     return replace(chart, corners=corners, from_points=True)
 
 
-def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
+def _splined(points: Array, closed: bool, *, keeps_all: bool) -> tuple[Chart, Any]:
     """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
     knots, ends = arc_length_knots(points[:, :ROLL], closed)
     # The increase of the roll angle over a lap is taken as linear, and the rest is periodic.
     rates = (points[-1] - points[0]) / knots[-1] if closed else np.zeros(points.shape[1])
-    points, knots = thinned(points - rates * knots[:, None], knots, ends)
+    points = points - rates * knots[:, None]
+    points, knots = (points, knots) if keeps_all else thinned(points, knots, ends)
     spline = interpolated(points, knots, ends)
     terms = polynomials(spline, knots)
     terms[:, :, 0] += rates * knots[:-1, None]

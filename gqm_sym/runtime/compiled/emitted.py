@@ -148,6 +148,27 @@ class Emitted:
             jit.PENDING_EXCEPTIONS[threading.get_ident()] = error
 
 
+class RunByPython(Emitted):
+    """A function that Python always runs, also for compiled callers.
+
+    Parameters
+    ----------
+    function : callable
+        The function, which takes pointers as integers.
+    signature
+        As for `Emitted`.
+    """
+
+    def __init__(self, function: Callable[..., None], signature: Any) -> None:
+        super().__init__(function, signature)
+        self._called_from_c = _c_function(signature)(self._run_for_c)
+        self._slot.value = ctypes.cast(self._called_from_c, ctypes.c_void_p).value
+
+    def run(self, *arguments: Any) -> None:
+        """Run the function."""
+        self.function(*arguments)
+
+
 class MachineCode(Emitted):
     """A function that is machine code from the beginning.
 

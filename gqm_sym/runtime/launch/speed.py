@@ -40,6 +40,9 @@ MAP_ROWS, MAP_ROWS_IN_SPACE = 6, 10
 # or of its change: the divided difference is then no more accurate.
 MAX_TERMS_RATIO = 1.0
 
+# Potentials that two functions evaluate differ by less than this share of their terms.
+DIFFERENCE_SHARE = 0.01
+
 
 class Pass1(NamedTuple):
     """The results of pass 1 at places of a curve (paper, section "Pass 1"; MATHS, section 2).
@@ -249,9 +252,24 @@ def fill_by_difference(fns, path_in_space, p, launch, places, low_parts, field):
             for i in range(n):
                 keeps = is_filled and keeps_digits(w0, v2[i], size + sizes[i])
                 field[first + k * n + i] = field[first + k * n + i] if keeps else rows[k * n + i]
+                # The rows before come from the same function, whether the load map of the block is known or not.
+                field[k * n + i] = field[k * n + i] if keeps else frame[k * n + i]
     for i in range(n):
         force[i] = force[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
     v2[:] = better
+
+
+@Inner
+def may_keep_digits(fns, p, launch, potential, places):  # type: ignore[no-untyped-def]
+    """Return whether V**2 may keep its digits at some of the places, given the potential at launch; the size of its
+    terms there is part of those that V**2 is the difference of.
+    """
+    rows, size = np.empty(2 * places.size), (1.0 - DIFFERENCE_SHARE) * launch.size
+    call_effective_potential(fns.effective_potential, places.size, places, p, rows)
+    for i in range(places.size):
+        if not size > MAX_TERMS_RATIO * max(fabs(2.0 * (rows[i] - potential)), launch.w0):
+            return True
+    return False
 
 
 @Inner
@@ -316,19 +334,25 @@ def fill_load_map(fns, of_map, p, launch, places, rows, part, past_cache):  # ty
         call_load_map(load_map, 1, 0.0, 0.0, start, p, field)
         level, size = 0.5 * (correction - field[4]), field[6]
     numbers = LaunchNumbers(lam0, w0, correction, size)
-    by_subtraction = size >= 0.0
+    unknown = LaunchNumbers(lam0, w0, correction, nan)
+    by_subtraction, is_known, in_space = size >= 0.0, True, 0 if direction else path_in_space
     x, z, ds, kappa, v2, force, y, along_x, along_y, along_z = rows
     for first in range(begin, end, BLOCK):
         n = min(BLOCK, end - first)
-        inaccurate = n
-        if by_subtraction:
+        inaccurate, block = n, lam[first : first + n]
+        # After a block without digits to keep, a look at the next one costs less than its load map.
+        is_known = by_subtraction and (
+            is_known or not in_space or may_keep_digits(fns, p, numbers, slopes[0, 0], block)
+        )
+        if is_known:
             call_load_map(load_map, n, w0, level, lam[first : first + n], p, field)
             inaccurate = 0
             for i in range(n):
                 inaccurate += 0 if keeps_digits(w0, field[4 * n + i], size + field[6 * n + i]) else 1
         if inaccurate:
-            part_low, in_space = low_parts[first : first + n], 0 if direction else path_in_space
-            fill_by_difference(fns, in_space, p, numbers, lam[first : first + n], part_low, field)
+            told = numbers if is_known else unknown
+            fill_by_difference(fns, in_space, p, told, block, low_parts[first : first + n], field)
+            is_known = is_known and inaccurate < n
         if direction:
             fill_directed(path_in_space, p, numbers, float(direction), lam[first : first + n], field)
         put(x, first, field, 0, n, past_cache)

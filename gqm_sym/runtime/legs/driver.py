@@ -56,6 +56,7 @@ from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, F
 from gqm_sym.runtime.legs.endings import cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
+from gqm_sym.runtime.legs.frames.swings import may_have_died_away, move_swings, swings_per_call
 from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
     BEGIN_LOW,
@@ -212,10 +213,12 @@ class Driver:
         self._last_record = last = line[at:]
         if what == END_TURN and frame is None and not number(STATUS):
             # This avoids the constructor of a named tuple, which is slow.
-            self.runs.append(tuple.__new__(TurnedLegs, (line, count, at, before)))
+            self.runs.append(tuple.__new__(TurnedLegs, (line, count, at, before, None)))
             return
         if count > 1:
-            self.runs.append(TurnedLegs(line, count - 1, -1, before))
+            if frame is not None:
+                move_swings(frame, line, count - 1)
+            self.runs.append(TurnedLegs(line, count - 1, -1, before, frame))
         if what == END_PAUSE and frame is None and not number(STATUS) and not self._creeps(number):
             self.runs.append(tuple.__new__(Run, (last, what, "", None, None, None)))
         else:
@@ -290,9 +293,17 @@ class Driver:
         """Follow the next legs; return the code for the end of the last of them (`advance`), and their records."""
         (dissipation, track, parameters, *_), frame = self._conditions, self._frame
         if frame is not None:
-            legs, track, dissipation, parameters = 1, self._track_in_frame, frame.dissipation, frame.p[None]
+            legs = swings_per_call(frame) if legs > 1 else 1
+            track, dissipation, parameters = self._track_in_frame, frame.dissipation, frame.p[None]
         records = np.empty((legs, (self._space or self._conditions.space) * COLUMNS))
-        return drive_along(track, dissipation, parameters, LEGS, self.body, records), records
+        before = None if frame is None or legs == 1 else self.body.copy()
+        what = drive_along(track, dissipation, parameters, LEGS, self.body, records)
+        if frame is not None and before is not None:
+            earlier = int(self.number(VALUE)) - 1
+            if may_have_died_away(frame, records.reshape(-1), earlier):
+                self.body[:] = before
+                return self._drive(1)
+        return what, records
 
     def _completed(self, what: int, records: Array) -> tuple[int, Array]:
         """Return the code and an array that begins with the records, after launching the body next to an equilibrium,

@@ -265,25 +265,28 @@ class TurnedLegs(NamedTuple):
         Where the record of the last one begins; -1 if other runs follow.
     before : array or None
         The line of the body before each leg, as in `Run`.
+    frame : Frame or None
+        The frame in which all of them were followed, as in `Run`.
     """
 
     line: Array
     size: int
     last_at: int
     before: Array | None
+    frame: Frame | None = None
 
     def runs(self) -> list[Run]:
         """Return a run for each leg."""
-        line, size, last_at, lines_before = self
+        line, size, last_at, lines_before, frame = self
         if last_at == 0:  # there is one
             before = None if lines_before is None else lines_before[0]
-            return [tuple.__new__(Run, (line, END_TURN, TURN, None, before, None))]
+            return [tuple.__new__(Run, (line, END_TURN, TURN, frame, before, None))]
         runs, at = [], 0
         for k in range(size):
             end = at + int(line.item(at + USED))
             before = None if lines_before is None else lines_before[k]
             # This avoids the constructor of a named tuple, which is slow.
-            runs.append(tuple.__new__(Run, (line[at:end], END_TURN, TURN, None, before, None)))
+            runs.append(tuple.__new__(Run, (line[at:end], END_TURN, TURN, frame, before, None)))
             at = end
         return runs
 

@@ -185,14 +185,18 @@ class AperiodicMotion(Motion):
         return any(timed.end == "turn" and t > timed.t_stop[0] for timed in self._segments)
 
     @computed_once
+    def _in_legs(self) -> Motion | None:
+        """The same motion along a chart, followed as one with losses that vanish, which has derivatives; None along a
+        curve with formulas.
+        """
+        from gqm_sym.runtime.legs.variations.without_losses import followed_in_legs
+
+        return None if self.problem.formulas.chart is None else followed_in_legs(self.problem, self.t_end)
+
+    @computed_once
     def _passage(self) -> PassageChanges:
-        """The changes of the motion."""
+        """The changes of the motion along a curve with formulas."""
         formulas = self.problem.formulas
-        if formulas.chart is not None and not formulas.rolling_radius and self.problem.true_pieces is not None:
-            raise SolutionError(
-                "gradients: there are none yet of motions without losses that do not repeat, along curves without "
-                "formulas; there are if QuadraticDrag(b=0) is added to the forces"
-            )
         if not isinstance(formulas.exact, ExactFormulas):
             raise without_formulas()
         turns, last = self.turning_points, self._segments[-1]
@@ -207,6 +211,8 @@ class AperiodicMotion(Motion):
             raise SolutionError(
                 f"gradient: a motion of kind {self.kind!r} does not repeat, and so it has no {quantity}"
             )
+        if self._in_legs is not None:
+            return self._in_legs._gradient(quantity, wrt)
         found = gradient(self, self._passage, quantity)
         if quantity == "turning_points":
             return {name: tuple(found[:, row].tolist()) for name, row in rows.items()}
@@ -214,7 +220,10 @@ class AperiodicMotion(Motion):
 
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
-        rows, passage = selected(self.problem.formulas.parameters, wrt), self._passage
+        rows = selected(self.problem.formulas.parameters, wrt)
+        if self._in_legs is not None:
+            return self._in_legs._sensitivity(t, wrt)
+        passage = self._passage
         times, _, shape = self._times(t)
         states, turned = self.state(times), np.array([self._has_turned(time) for time in times.tolist()], dtype=bool)
         made = passage.states(np.atleast_1d(states.lam), np.atleast_1d(states.v), turned)[:, list(rows.values())]

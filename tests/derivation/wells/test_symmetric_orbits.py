@@ -33,12 +33,14 @@ def graph(z: str) -> gqm.Curve:
     return gqm.Curve.graph(z, parameter="x")
 
 
+CYCLOID = gqm.Curve.parametric(x="u + sin(u)", z="-cos(u)", parameter="u")
 PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
 ELLIPSE = gqm.Curve.parametric(x="2*cos(theta)", z="3*sin(theta)", parameter="theta")
 GRAVITY = gqm.Gravity()
 # A row has the curve, the force, and the distance of both turning points from the axis.
 CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
     "pendulum": (PENDULUM, GRAVITY, "2.8"),
+    "cycloid": (CYCLOID, GRAVITY, "2.3"),
     "ellipse": (ELLIPSE, GRAVITY, "1.3"),
     "parabola": (graph("x**2"), GRAVITY, "1.7"),
     "parabola, shifted": (graph("3*x**2 - x"), GRAVITY, "0.8"),
@@ -116,7 +118,7 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
         assert abs(by_integral(model, mpf(half)) / truth - 1) < mpf("1e-20")
 
 
-AGM = ["pendulum", "Duffing"]
+AGM = ["pendulum", "cycloid", "Duffing"]
 TURNING_POINTS = [name for name in CASES if name != "root of a wave"]
 # In these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
 NOT_GROWING = ["double well", "two waves"]
@@ -144,8 +146,16 @@ def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
         assert abs(mp.pi / mp.agm(mp.sqrt(one), mp.sqrt(other)) / truth - 1) < mpf("1e-25")
 
 
-@pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
+def test_a_cycloid_has_one_period() -> None:
+    """The squares of both numbers are the square of the frequency, g/4 for the radius 1, without the width."""
+    orbits = model_of("cycloid").symmetric_orbits
+    assert orbits is not None
+    assert orbits.agm_arguments is not None
+    assert {str(4 * square) for square in orbits.agm_arguments} == {"g"}
+
+
 @pytest.mark.parametrize("name", TURNING_POINTS)
+@pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     """An orbit launched anywhere in the well, with the V**2 of that place, has the well's width."""
     model, half = model_of(name), CASES[name][-1]

@@ -316,18 +316,92 @@ def test_a_launch_at_rest_where_two_pieces_meet(generated_folder: Path) -> None:
 
 
 def test_motions_that_do_not_repeat(generated_folder: Path) -> None:
-    """The error for a body that leaves a rail names the remedy, with which the derivatives are those of a fall along
-    a straight line, t = sqrt(2 (length - lam0) / (g sin)).
+    """A body that leaves a rail has the derivatives of a fall along a straight line, t = sqrt(2 (length - lam0) / (g
+    sin)).
     """
     curve = gqm.Curve.piecewise([gqm.line(length=3), gqm.line(length="q")], heading="-pi/6", parameters={"q": 2})
     free = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_slope", folder=generated_folder)
     motion = free.solve("0.5")
     t = np.sqrt(2 * 4.5 / (9.81 * 0.5))
     assert motion.t_end == pytest.approx(t, rel=4e-16)
-    with pytest.raises(SolutionError, match=r"do not repeat.*QuadraticDrag\(b=0\)"):
-        motion.gradient("t_end")
-    model = gqm.derive(curve, gqm.Gravity() + gqm.QuadraticDrag(b=0))
-    damped = gqm.build(model, name="gradient_slope_with_drag", folder=generated_folder).solve("0.5")
     wanted = {"lam0": -t / 9.0, "q": t / 9.0, "g": -t / (2 * 9.81)}
-    assert damped.t_end == pytest.approx(t, rel=4e-16)
-    assert damped.gradient("t_end", tuple(wanted)) == pytest.approx(wanted, rel=1e-13)
+    assert motion.gradient("t_end", tuple(wanted)) == pytest.approx(wanted, rel=1e-14)
+    thrown = free.solve("0.5", 2, -1)
+    back = (2 + np.sqrt(4 + 2 * 9.81 * 0.5 * 4.5)) / (9.81 * 0.5)
+    speed = np.sqrt(4 + 9.81 * 4.5)
+    assert thrown.t_end == pytest.approx(back, rel=4e-16)
+    wanted = {"lam0": -1 / speed, "q": 1 / speed, "v0": (1 + 2 / speed) / (9.81 * 0.5)}
+    assert thrown.gradient("t_end", tuple(wanted)) == pytest.approx(wanted, rel=1e-14)
+    assert thrown.gradient("turning_points", ("v0", "lam0")) == {
+        "v0": pytest.approx((-4 / 9.81,), rel=1e-14),
+        "lam0": pytest.approx((1.0,), rel=1e-14),
+    }
+
+
+def test_a_slide_in_space(generated_folder: Path) -> None:
+    """On a descending helix through points, derivatives agree with what units and the flow of time require.
+
+    If g is c**2 times and the speed c times as large, times are shorter by c and forces c**2 times as large. A launch
+    from a later state of the motion leaves so much less time to the end.
+    """
+    turn = np.linspace(0.0, 4.0 * np.pi, 60)
+    track = gqm.Curve.sampled(np.column_stack([np.cos(turn), np.sin(turn), -0.2 * turn]))
+    module = gqm.build(gqm.derive(track, gqm.Gravity()), name="gradient_helix", folder=generated_folder)
+    motion, g, v0 = module.solve(3, 2), 9.81, 2.0
+    for quantity, power, value in (("t_end", -1, motion.t_end), ("normal_force_max", 2, motion.normal_force_max.value)):
+        found = motion.gradient(quantity, ("g", "v0", "m"))
+        assert 2 * g * found["g"] + v0 * found["v0"] == pytest.approx(power * value, rel=1e-13), quantity
+        assert found["m"] == pytest.approx(value if power == 2 else 0.0, rel=1e-13, abs=1e-13)
+    start, found = motion.state(0.0), motion.gradient("t_end", ("lam0", "v0"))
+    push = -g * (motion.state(1e-6).z - start.z) / (1e-6 * v0)  # along the track
+    assert found["lam0"] * v0 + found["v0"] * push == pytest.approx(-1.0, rel=1e-5)
+    banked = gqm.Curve.sampled(np.column_stack([np.cos(turn), np.sin(turn), -0.2 * turn]), roll="0")
+    built = gqm.build(gqm.derive(banked, gqm.Gravity()), name="gradient_banked", folder=generated_folder)
+    held = built.solve(3, 2, contact="above")
+    with pytest.raises(SolutionError, match=r"one side.*QuadraticDrag\(b=0\)"):
+        held.gradient("t_end")
+
+
+@pytest.mark.parametrize(("lam0", "v0"), [("0.3", "1"), ("0.05", "0")])
+def test_a_body_that_leaves_an_ellipse(lam0: str, v0: str, generated_folder: Path) -> None:
+    """A body on top of an ellipse slides down until it lifts off; this time and that of a place before have the
+    derivatives of 40-digit differences of the closed form, also by the axis of the ellipse.
+    """
+    curve = gqm.Curve.implicit("x**2/a**2+(z-1)**2-1", start=(0, 2), parameters={"a": 2})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_dome", folder=generated_folder)
+    motion = module.solve(lam0, v0, contact="below")
+    given = {"lam0": mpf(lam0), "v0": mpf(v0), "a": mpf(2), "g": mpf("9.81")}
+
+    def stretch(u: Any, a: Any) -> Any:
+        return mp.hypot(a * mp.cos(u), mp.sin(u))
+
+    def angle(length: Any, a: Any) -> Any:
+        """Return the angle from the top at an arc length."""
+        return mp.findroot(lambda b: mp.quad(lambda u: stretch(u, a), [0, b]) - length, length / a)
+
+    def times(lam0: Any, v0: Any, a: Any, g: Any) -> list[Any]:
+        """Return the times at which the body lifts off, and is at the arc length of 0.7."""
+        first = angle(lam0, a)
+
+        def square(way: Any) -> Any:  # V**2; cosines are not subtracted
+            return v0**2 + 4 * g * mp.sin(first + way / 2) * mp.sin(way / 2)
+
+        def until(last: Any) -> Any:
+            def rate(x: Any) -> Any:  # with the root of the way as the variable
+                way = (last - first) * x * x
+                return 2 * x * (last - first) * stretch(first + way, a) / mp.sqrt(square(way))
+
+            return mp.quad(rate, [0, 0.25, 0.5, 1])
+
+        lost = mp.findroot(lambda u: square(u - first) - g * mp.cos(u) * stretch(u, a) ** 2, 0.7)
+        return [until(lost), until(angle(mpf("0.7"), a))]
+
+    with mp.workdps(40):
+        names, step = tuple(name for name in given if given[name]), mpf(10) ** -12
+        truth = times(**given)
+        assert (motion.t_end, motion.time_at("0.7")) == pytest.approx([float(time) for time in truth], rel=4e-15)
+        found = motion.gradient("t_end", names), motion.gradient("time_at", names, lam="0.7")
+        for name in names:
+            below, above = (times(**{**given, name: given[name] + sign * step}) for sign in (-1, 1))
+            wanted = [float((b - a) / (2 * step)) for a, b in zip(below, above, strict=True)]
+            assert [row[name] for row in found] == pytest.approx(wanted, rel=1e-12), name

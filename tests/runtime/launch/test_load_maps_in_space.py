@@ -182,3 +182,21 @@ def test_nothing_is_known_beyond_the_ends(banked: ModuleType) -> None:
     path = banked.pass1(np.array([-1.0, 5.0, 1e3]), 5.0, 1.0)
     for row in path:
         assert np.isnan(row).tolist() == [True, False, True]
+
+
+def test_along_a_chart_next_to_the_launch_and_to_height_zero(tmp_path: Path) -> None:
+    """Along a helix without its formulas the height is linear in arc length, so that V**2 is known at every place."""
+    helix = gqm.Curve.space(x="cos(u)", y="sin(u)", z="3*u/4", parameter="u", domain=(-10, 10)).in_arc_length()
+    module = gqm.build(gqm.derive(helix, gqm.Gravity()), name="charted_helix", folder=tmp_path)
+    random = np.random.default_rng(8)
+    for start in (12.5, 12.6, 24.0, 3.0):  # the height is 0 at 12.5
+        for v0 in (0.0, 1e-3, 20.0):
+            gaps = 10.0 ** random.uniform(-12, 0, 100) * random.choice([-1, 1], 100)
+            lam = np.concatenate([random.uniform(0, 25, 200), 12.5 + gaps, start + gaps])
+            lam = lam[(lam >= 0) & (lam <= 25)]
+            found = module.pass1(lam, start, v0)
+            with mp.workdps(30):
+                gained = [mpf("9.81") * 2 * 3 / 5 * (mpf(s) - mpf(start)) for s in lam.tolist()]
+                true = np.array([float(mpf(v0) ** 2 - gain) for gain in gained])
+            size = np.maximum(v0**2, np.abs([float(gain) for gain in gained]))
+            assert np.all(np.abs(found.v2 - true) <= 1.5e-15 * size)

@@ -304,7 +304,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         if set(rows) & set(source.shaping):
             raise SolutionError(
                 "gradient: there are no second derivatives with respect to parameters that shape a curve without "
-                "formulas yet; name the others in wrt"
+                "formulas yet; name the others in wrt, or take differences of the first derivatives, which are right "
+                "to a few last places"
             )
         start = np.ascontiguousarray(self._found[[LAUNCH], :PLACE].T)
         given = [(high, low, UNIT * abs(high)) for high, low in shape.bends(start)[:, 0].reshape(-1, 2).tolist()]

@@ -134,10 +134,9 @@ def fill_square_roots(n, a, out):  # type: ignore[no-untyped-def]
 @Inner
 def fill_waves(n, a, out, other):  # type: ignore[no-untyped-def]
     """Fill a register with sines, and another one with cosines."""
-    for i in range(n):
-        out[i] = sin(a[i])
-    for i in range(n):
-        other[i] = cos(a[i])
+    for i in range(n):  # both share the reduction of the argument
+        angle = a[i]
+        out[i], other[i] = sin(angle), cos(angle)
 
 
 @Inner

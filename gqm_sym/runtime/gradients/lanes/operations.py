@@ -35,10 +35,12 @@ class LaneRecorder(RecorderOfMore):
     ----------
     uncertain : set of int
         The registers of numbers in double-double arithmetic of which many digits may have cancelled.
+    by_inverses : bool
+        Whether quotients are products with inverses, which have a rounding more, but which derivatives share.
     """
 
-    def __init__(self, parameters: int, coordinates: int) -> None:
-        self.uncertain = set[int]()
+    def __init__(self, parameters: int, coordinates: int, *, by_inverses: bool = False) -> None:
+        self.uncertain, self.by_inverses = set[int](), by_inverses
         self._depends: list[bool] = []
         self.exact: dict[int, Fraction | str] = {}
         super().__init__(parameters, coordinates)
@@ -92,6 +94,18 @@ class LaneRecorder(RecorderOfMore):
             return a
         if code == DIVIDE and self.depends(self.register(a)) and not self.depends(self.register(b)):
             return a * (self.number(1) / b)
+        is_shared = code == DIVIDE and self.by_inverses and self.depends(self.register(b))
+        return self._by_inverse(a, b) if is_shared else None
+
+    def _by_inverse(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
+        """Return a quotient as a product with an inverse; None if it is one."""
+        if a.known != 1:
+            return a * (self.number(1) / b)
+        code, *operands = self.entries[b.register] if b.known is None else (None,)
+        for one, rest in (operands, operands[::-1]) if code == MULTIPLY else ():
+            constant = self.exact.get(one)
+            if isinstance(constant, Fraction) and constant != 0:
+                return self.number(1 / constant) * (self.number(1) / self.at(rest))
         return None
 
     def _product(self, factor: TapeNumber, other: TapeNumber) -> TapeNumber | None:

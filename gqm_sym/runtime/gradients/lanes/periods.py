@@ -202,7 +202,8 @@ def fill_by_stages(
             break
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
-        for most in () if program is None else PASSES if isinstance(program, LaneProgram) else (0,):
+        has_levels = isinstance(program, LaneProgram) and stage.make is not mean_program
+        for most in () if program is None else PASSES if has_levels else (0,):
             if not chosen.size:
                 break
             out, states = carried_out(stage, program, len(columns), (chosen, launches.even[chosen] != UNEVEN), most)
@@ -290,10 +291,10 @@ def carried_out(
         *spaces, own = (one.work.copy() for one in programs)
         given = ends, tuple(spaces) or (np.empty(0), np.empty(0)), addressed[-1], own
         some, answers = launched[part], (out[part], states[part])
-        if isinstance(program, LaneProgram):
-            fill_lane_gradients(*given, (stage.inputs, most, PASSES[-1]), some, mirrored[part], answers)
-        elif stage.make is mean_program:
+        if stage.make is mean_program:
             fill_mean_gradients(*given, stage.inputs, some, answers)
+        elif isinstance(program, LaneProgram):
+            fill_lane_gradients(*given, (stage.inputs, most, PASSES[-1]), some, mirrored[part], answers)
         else:
             max_error = MAX_SHARE if stage.make is exact_swing_program else inf
             rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind), max_error

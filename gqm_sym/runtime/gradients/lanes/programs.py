@@ -20,7 +20,7 @@ import numpy as np
 
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient, partials
-from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble_rates
+from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble, assemble_rates
 from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, Terms, combined, terms_of
@@ -105,7 +105,7 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     the phase angle. The results are Q and the derivatives of the time per phase angle. It is None if the potential
     contains an operation without a rule for divided differences.
     """
-    op = LaneRecorder(swing_inputs(source, plan), 2)
+    op = LaneRecorder(swing_inputs(source, plan), 2, by_inverses=True)
     p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
@@ -148,7 +148,8 @@ class Orbits(NamedTuple):
         n, half = self.source.parameters, Fraction(1, 2)
         if not self.at_rest:
             _, _, (a, b), moves = swing_of(op, self.source, self.plan)
-            return (b - a) * half, [[(high - low) * half, *move] for low, high, *move in moves]
+            # As a product with a constant, the width would be joined with other constants, and no derivative found.
+            return (b - a) / 2, [[(high - low) * half, *move] for low, high, *move in moves]
         p, (lam0, number, sign) = op.values[:n], op.values[n:]
         variables = self.plan.moves(n)
         moves = [[op.number(int(i == k)) for i in range(n)] for k in variables]
@@ -182,7 +183,7 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 2)
+    op = LaneRecorder(orbits.inputs, 2, by_inverses=True)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     square, divisor = formula(op, half, *op.places, p)
     rate = op.sqrt(square)
@@ -208,40 +209,60 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
 
 
 @lru_cache(maxsize=64)
-def mean_program(orbits: Orbits) -> Program | None:
+def mean_program(orbits: Orbits) -> LaneProgram | None:
     """Return the program of the derivatives of a half period that is pi over an arithmetic-geometric mean.
 
-    The first result is half the relative difference of the two numbers before the last step, the square of which is the
-    error of the others. It is None if the model has no such mean.
+    With the first mean a_1, it is pi/a_1 in double-double arithmetic plus a small share, and so are its derivatives.
+    These shares and r, which are small where both numbers are alike, are computed in doubles. The coordinate of a place
+    is 1. The first result is half the relative difference of the two numbers before the last step, the square of which
+    is the error of the derivatives. The next ones are positive where roundings matter. The program is None if the model
+    has no such mean.
     """
     formula = orbits.source.formulas.agm_arguments
     if formula is None:
         return None
-    op = Recorder(orbits.inputs)
+    op = LaneRecorder(orbits.inputs, 1)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     squares = [op.number(square) for square in formula(op, half, p)]
     a, b = (op.sqrt(square) for square in squares)
-    difference = (a - b) / 2
-    share = difference / (2 * (a + b))  # of c_1**2 in c_0**2
-    rest = share
-    a, b = (a + b) / 2, op.sqrt(a * b)
+    first_mean = (a + b) * Fraction(1, 2)
+    first_time = op.pi / first_mean
+    difference, rest, more = _mean_in_doubles(op, a, b)
+    # The derivatives of half the logarithms of both squares.
+    logarithmic = [[part / (2 * square) for part in gradient(op, square, [half, *p])] for square in squares]
+    rates, losses = [first_time * more + first_time], []
+    for move in moves:
+        first, second = (total_change(op, parts, move) for parts in logarithmic)
+        apart, together = first_time * (second - first), -first_time * (first + second) * Fraction(1, 2)
+        small = rest * apart
+        rates.append((small + more * (small + together)) + together)
+        losses.append(256 * (small * small) - rates[-1] * rates[-1])
+    terms = orbits.terms(op)
+    found = combined(op, terms, rates)
+    for total, some in zip(found, terms, strict=True):
+        if len(some) > 1:
+            parts = [number * rates[which] for number, which in some]
+            losses.append(sum((part * part for part in parts), op.number(0)) - 4 * (total * total))
+    return assemble(op, [difference, *losses, *found])
+
+
+def _mean_in_doubles(op: LaneRecorder, a: TapeNumber, b: TapeNumber) -> tuple[TapeNumber, TapeNumber, TapeNumber]:
+    """Record, for the arithmetic-geometric mean of two numbers, half their relative difference before the last step,
+    the sum r of squares of differences (see the beginning of this file), and by which share the mean is smaller than
+    the arithmetic one, as a share of itself.
+    """
+    one = op.place
+    mean, difference = (a + b) * Fraction(1, 2) * one, (a - b) * Fraction(1, 2) * one
+    first_mean, lost = mean, op.number(0)
+    share = rest = difference / (4 * mean)  # of c_1**2 in c_0**2
+    b = op.sqrt(a * b * one)
     for _ in range(MEAN_STEPS):
-        a, b = (a + b) / 2, op.sqrt(a * b)
-        shrink = difference / (4 * a)
+        following = (mean + b) * Fraction(1, 2)
+        b, mean = op.sqrt(mean * b), following
+        shrink = difference / (4 * mean)
         share, difference = 2 * (share * (shrink * shrink)), difference * shrink
-        rest = rest + share
-    half_period = op.pi / a
-    # Minus the derivatives of the half period with respect to both squares.
-    weights = [
-        half_period * share / (2 * square)
-        for share, square in zip((Fraction(1, 2) + rest, Fraction(1, 2) - rest), squares, strict=True)
-    ]
-    partials_of = [gradient(op, square, [half, *p]) for square in squares]
-    found = [op.number(0)] * len(moves)
-    for j, move in enumerate(moves):
-        for weight, parts in zip(weights, partials_of, strict=True):
-            found[j] = found[j] - weight * total_change(op, parts, move)
-    return in_double_double(op, [difference / a, *combined(op, orbits.terms(op), [half_period, *found])])
+        rest, lost = rest + share, lost + difference
+    return difference / mean, rest, lost / (first_mean - lost)
 
 
 def changes(

@@ -240,20 +240,24 @@ def frame_functions() -> tuple[Any, Any]:
         own = ROWS + int(carray(p, ROWS)[PARTS]) * ROW_SIZE
         frame, work = carray(p, own + 1), rows_buffer()
         places, speeds, out = carray(places, n), carray(speeds, n), carray(out, 5 * n)
-        for i in range(n):
-            at, place = part_at(frame, places[i]), frame[PLACE] + (places[i] + frame[PLACE_LOW])
-            work[i] = min(max(place, frame[at + FIRST_PLACE]), frame[at + LAST_PLACE])
-            work[WIDE + i] = LEAST_V2
         at_rest, moving = 2 * WIDE, 7 * WIDE
-        call_speed_equation(int(frame[ADDRESS]), n, work, (0, WIDE, at_rest), v, nu, frame[own:])
-        for i in range(n):
-            work[WIDE + i] = speeds[i]
-        call_speed_equation(int(frame[ADDRESS]), n, work, (0, WIDE, moving), v, nu, frame[own:])
-        for i in range(n):
-            for row in range(5):
-                out[row * n + i] = work[moving + row * n + i]
-            at_place = force_on(frame, part_at(frame, places[i]), places[i])
-            out[n + i] = at_place + (work[moving + n + i] - work[at_rest + n + i])
+        for begin in range(0, n, WIDE):  # a whole leg may have more nodes than the buffer has space for
+            count = min(WIDE, n - begin)
+            for i in range(count):
+                distance = places[begin + i]
+                at, place = part_at(frame, distance), frame[PLACE] + (distance + frame[PLACE_LOW])
+                work[i] = min(max(place, frame[at + FIRST_PLACE]), frame[at + LAST_PLACE])
+                work[WIDE + i] = LEAST_V2
+            call_speed_equation(int(frame[ADDRESS]), count, work, (0, WIDE, at_rest), v, nu, frame[own:])
+            for i in range(count):
+                work[WIDE + i] = speeds[begin + i]
+            call_speed_equation(int(frame[ADDRESS]), count, work, (0, WIDE, moving), v, nu, frame[own:])
+            for i in range(count):
+                for row in range(5):
+                    out[row * n + begin + i] = work[moving + row * count + i]
+                at_place = force_on(frame, part_at(frame, places[begin + i]), places[begin + i])
+                change = work[moving + count + i] - work[at_rest + count + i]
+                out[n + begin + i] = at_place + change
 
     @compiled(STATIC_BALANCE)
     def static_balance(n, places, p, out):  # type: ignore[no-untyped-def]

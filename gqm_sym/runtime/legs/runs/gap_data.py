@@ -38,10 +38,22 @@ from gqm_sym.runtime.legs.panels.equation import (
     fill_force,
     fill_square,
     length_row,
+    linear_row,
     product,
 )
 from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, keep_few
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, LEBESGUE, WIDE, extent, size_of, to_means, to_tails
+from gqm_sym.runtime.legs.panels.polynomials import (
+    COUNT,
+    LEBESGUE,
+    WIDE,
+    extent,
+    last_sum_row,
+    next_sum_row,
+    size_of,
+    to_coefficients,
+    to_means,
+    to_tails,
+)
 from gqm_sym.runtime.legs.panels.resolution import (
     ONE_SIGN_RATIO,
     are_resolved,
@@ -73,6 +85,9 @@ FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.
 LEAST_SHARE = 1e-2
+
+# The part of a gap on which a turn is sought is longer than the estimated distance of the turn by this factor.
+ENOUGH = 1.03
 
 # Where the force almost vanishes along a whole gap, as where friction balances the weight, its coefficients are
 # compared with this share of n0, because a rounding of a chart's angle changes it by a rounding of n0.
@@ -187,14 +202,76 @@ def fill_length_on_gap(gaps, at, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_on_gap(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W, FORCE and MEAN for a law with friction in space; return whether it converges and V**2, the force
-    and N are resolved.
-    """
+def read_friction_rows(gaps, at, work):  # type: ignore[no-untyped-def]
+    """Read the rows kept of a gap for a law with friction in space."""
     for k, row in enumerate(FRICTION_ROWS):
         copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
     for k, row in enumerate(SQUARE_ROWS):
         copy(work, row, gaps, at + FIRST_SQUARE + k * WIDE)
+
+
+@Inner
+def share_to_turn(forces, v2, width, work):  # type: ignore[no-untyped-def]
+    """Return about the share of a gap after which the body turns, from the rows that are read, with friction as on
+    average between the start of the gap and a place where the body is at rest; 1 if it does not turn, and infinity if
+    it is not slower at the end.
+    """
+    fast, at_rest = sqrt(work[AT_REST] + v2 * (work[MIXED] + v2 * work[TURNING])), sqrt(work[AT_REST])
+    rubbed = 0.5 * (fast + at_rest) * work[RUBBING]
+    to_means(work, PLAIN_P, work, MEAN)
+    before, y_before = v2, 0.0
+    for j in range(WIDE):
+        y = work[NODES + j]
+        w = v2 + width * y * forces.direction * (work[MEAN + j] - rubbed)
+        if not w > 0.0:
+            return y_before + (y - y_before) * before / (before - w)
+        before, y_before = w, y
+    return 1.0 if before < v2 else inf
+
+
+@Inner
+def shorten(share, work):  # type: ignore[no-untyped-def]
+    """Replace the rows kept of a gap by those of its first part."""
+    linear_row(work, GRADED, NODES, -2.0, 4.0 * share)
+    for row in FRICTION_ROWS + SQUARE_ROWS:
+        to_coefficients(work, row, work, SERIES)
+        copy_row(work, SPEED, 0.0)
+        copy_row(work, EXPM1_Q, 0.0)
+        for k in range(COUNT - 1, 0, -2):
+            next_sum_row(work, EXPM1_Q, GRADED, SPEED, EXPM1_Q, work[SERIES + k])
+            next_sum_row(work, SPEED, GRADED, EXPM1_Q, SPEED, work[SERIES + k - 1])
+        last_sum_row(work, row, GRADED, SPEED, EXPM1_Q, work[SERIES])
+
+
+@Inner
+def solve_towards_turn(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Return the width of the part of a gap on which a turn may be sought, and fill its rows as `solve_on_gap` does for
+    the gap; 0 if it is not resolved, or the body does not become slower.
+
+    Far behind a turn, where V**2 is negative, the law may not be resolved.
+    """
+    read_friction_rows(gaps, at, work)
+    share = ENOUGH * share_to_turn(forces, v2, width, work)
+    if not share < inf:
+        return 0.0
+    if share < 1.0:
+        width *= share
+        shorten(share, work)
+    return width if solve_on_rows(forces, v2, width, work) else 0.0
+
+
+@Inner
+def solve_on_gap(forces, v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W, FORCE and MEAN for a law with friction in space; return whether it converges and V**2, the force
+    and N are resolved.
+    """
+    read_friction_rows(gaps, at, work)
+    return solve_on_rows(forces, v2, width, work)
+
+
+@Inner
+def solve_on_rows(forces, v2, width, work):  # type: ignore[no-untyped-def]
+    """Do the work of `solve_on_gap` by the rows that are read."""
     product(work, OFFSET, NODES, width)
     copy_row(work, D, OFFSET)
     march, panel = March((0.0, 0.0), forces.direction, 0.0, 1.0), Panel(0.0, v2, 1, (-inf, inf))

@@ -95,6 +95,7 @@ from gqm_sym.runtime.legs.runs.gap_data import (
     lengths_on,
     range_of,
     solve_on_gap,
+    solve_towards_turn,
 )
 from gqm_sym.runtime.legs.runs.route import CurveAhead
 
@@ -309,8 +310,8 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
 
 @Inner
 def distance_to_turn(v2, turn, width, work):  # type: ignore[no-untyped-def]
-    """Return the distance from the start of a gap, where V**2 is ``v2``, at which it vanishes, near the zero x =
-    ``turn`` of the series of W; infinity if that has none, and 0 if the distance is not resolved.
+    """Return the distance from the start of a gap or of its first part, where V**2 is ``v2``, at which it vanishes,
+    near the zero x = ``turn`` of the series of W; infinity if that has none, and 0 if the distance is not resolved.
 
     Of a short distance that series has few digits. But the force times exp(q) has the mean ``-v2/d`` up to the distance
     d where V**2 vanishes, and this mean has its digits if it is not small.
@@ -354,13 +355,16 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
         at, width = kept_gap(forces, route, upcoming, v, nu, work)
         if route.gaps[at] != FILLED:
             break
+        part = width
         if forces.linear:
             read_rows(v2, width, route.gaps, at, work)
-        elif not solve_on_gap(forces, v2, width, route.gaps, at, work):
+        else:
+            part = solve_towards_turn(forces, v2, width, route.gaps, at, work)
+        if part == 0.0:
             break
         noise = CANCELLATION_NOISE * max(largest_v2, extent(work, W)[1])
         turn, _, touch = first_change_of(work, W, 1, noise)
-        far = distance_to_turn(v2, turn, width, work)
+        far = distance_to_turn(v2, turn, part, work)
         fill_load(work)
         load, _, no_load = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * extent(work, MEAN)[1])
         # Behind the turn V**2 is negative, and N may be anything.
@@ -370,6 +374,6 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
             return begin + far, CurveAhead(upcoming + 1, ahead.span, inf, True)
         v2 = work[W + COUNT]
         # Where the body does not become slower, this is not the end of its leg.
-        if not noise < v2 <= work[W]:
+        if part < width or not noise < v2 <= work[W]:
             break
     return 0.0, ahead

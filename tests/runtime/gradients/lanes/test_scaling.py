@@ -1,14 +1,16 @@
 """Derivatives that follow from homogeneity agree with differences in mpmath, and are claimed only where they hold."""
 
 from fractions import Fraction
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from orbits import FORMULAS, by_differences, half_orbit
+from orbits import FORMULAS, Formula, by_differences, half_orbit
 from paths import ROOT
 
+import gqm_sym as gqm
 from gqm_sym.loading import load
 from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.lanes.scaling import Scaling, plan_of, scalings
@@ -80,6 +82,29 @@ def test_random_launches(name: str, *, is_thrown: bool) -> None:
                 if key == "v0" and not is_thrown:
                     assert found.gradient[k, column] == 0.0
                     continue
+                assert abs(found.gradient[k, column] - wanted) <= 4 * ULP * abs(wanted)
+
+
+@pytest.mark.parametrize("rate", [1, 3])
+def test_thrown_along_waves(rate: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Multiples of half the width of an orbit are differentiated, whatever constants they are joined with."""
+    formula = Formula(
+        lambda lam, g, **_: -g * mp.cos(rate * lam) / 2,
+        lambda lam, **_: mp.sqrt(1 + (rate * mp.sin(rate * lam) / 2) ** 2),
+        {},
+    )
+    monkeypatch.setitem(FORMULAS, "waves", formula)
+    curve = gqm.Curve.graph(f"-cos({rate}*x)/2", parameter="x")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name=f"waves_{rate}", folder=tmp_path)
+    lam0, v0 = np.array([0.1, 0.3, 0.6]) / rate, np.array([0.4, 1.0, 0.2])
+    found = module.sweep("half_period", lam0, v0, gradient=("g", "lam0", "v0"))
+    ends = module.sweep("turning_points", lam0, v0).values
+    for k in range(3):
+        launch = {"g": 9.81, "lam0": float(lam0[k]), "v0": float(v0[k])}
+        with mp.workdps(40):
+            for column, key in enumerate(launch):
+                near = tuple(ends[k])
+                wanted = by_differences(lambda numbers, near=near: half_orbit("waves", numbers, near), launch, key)[0]
                 assert abs(found.gradient[k, column] - wanted) <= 4 * ULP * abs(wanted)
 
 

@@ -5,6 +5,7 @@ formulas.
 import math
 import random
 from collections.abc import Callable
+from ctypes import CFUNCTYPE, c_double, c_ssize_t, c_void_p
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
@@ -254,3 +255,28 @@ def test_small_swings_where_a_chart_begins(seed: int, ring: ModuleType) -> None:
             # The arc is longer than its sine by a sixth of its cube.
             assert abs(mpf(motion.lam(t)) - true) <= motion.error_bound(t) + 10 * abs(lam0) ** 3
             assert motion.error_bound(t) <= max(2e-14, 1e-10 * abs(lam0))
+
+
+def test_many_nodes_in_one_call(tmp_path: Path) -> None:
+    """The force next to an equilibrium is the same for the 72 nodes of a whole leg as for one place after another.
+
+    Those after the 24th were written behind the end of a buffer, and `legs` up to a late time ended the process.
+    """
+    shape = np.linspace(-3.0, 3.0, 61)
+    track = gqm.Curve.sampled(np.column_stack([shape, np.cosh(shape / 2)]))
+    model = gqm.derive(track, gqm.Gravity() + gqm.QuadraticDrag(b="c_d"))
+    motion: Any = gqm.build(model, name="many_nodes", folder=tmp_path).solve(4.99, c_d=0.05, t_max=300.0)
+    assert len(motion.legs) > 140
+    frame = motion._driver._frame
+    places = np.linspace(-0.9, 0.9, 72) * frame.reach
+    law = CFUNCTYPE(None, c_ssize_t, c_void_p, c_void_p, c_double, c_double, c_void_p, c_void_p)(
+        c_void_p.from_address(frame.dissipation.speed_equation).value
+    )
+
+    def evaluated(at: np.ndarray) -> np.ndarray:
+        out, speeds = np.zeros((5, at.size)), 1e-3 * (1.0 + at)
+        law(at.size, at.ctypes.data, speeds.ctypes.data, 1.0, 1.0, frame.p.ctypes.data, out.ctypes.data)
+        return out
+
+    singly = np.hstack([evaluated(place) for place in places.reshape(-1, 1).copy()])
+    assert np.array_equal(evaluated(places), singly)

@@ -110,17 +110,20 @@ def next_turn(start: Any) -> tuple[Any, Any]:
 
 
 @pytest.fixture(scope="module")
-def ring(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Friction on the circle, made of 80 pieces."""
-    pieces = [gqm.transition(length="pi/40", yaw=1) for _ in range(80)]
-    curve = gqm.Curve.piecewise(pieces, start=(0, 0, 0), heading=(0, 0, "pi/6"), closed=True)
-    folder: Path = tmp_path_factory.mktemp("ring")
-    return gqm.build(gqm.derive(curve, gqm.Gravity() + gqm.CoulombFriction()), name="tilted_ring", folder=folder)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the modules."""
+    return tmp_path_factory.mktemp("rings")
 
 
-@pytest.mark.parametrize("amplitude", [0.18, 0.21, 0.55])
-def test_times_to_rest_on_a_tilted_circle(amplitude: float, ring: Any) -> None:
-    """Legs along some of the pieces, on which V**2 is far from linear, and along many."""
+@pytest.mark.parametrize(("pieces", "amplitude"), [(80, 0.18), (80, 0.21), (80, 0.55), (8, 0.55), (8, 1.1)])
+def test_times_to_rest_on_a_tilted_circle(pieces: int, amplitude: float, folder: Path) -> None:
+    """Legs along some short pieces, on which V**2 is far from linear, and along many; and turns sought on parts of long
+    pieces.
+    """
+    parts = [gqm.transition(length=f"2*pi/{pieces}", yaw=1) for _ in range(pieces)]
+    curve = gqm.Curve.piecewise(parts, start=(0, 0, 0), heading=(0, 0, "pi/6"), closed=True)
+    forces = gqm.Gravity() + gqm.CoulombFriction()
+    ring = gqm.build(gqm.derive(curve, forces), name=f"ring_of_{pieces}", folder=folder)
     launch = np.pi - amplitude
     with mp.workdps(18):
         place, time = mp.pi - mpf(launch), mpf(0)

@@ -37,15 +37,30 @@ def test_roundings_of_the_inertia_do_not_add_up(beta: float, build: Callable[...
 
 @pytest.mark.parametrize("beta", [0.1, 0.4, 0.7])
 def test_sums_over_nodes_are_rounded_once(beta: float, build: Callable[..., ModuleType]) -> None:
-    """On Huygens's cycloid all times are the same, and those of the trapezoidal rule are rounded at random about it."""
-    module = build("rolling_cycloid_sums", gqm.families.cycloid(R=1, inverted=True), gqm.Rolling())
-    places = np.pi + np.linspace(0.2, 2.5, 400)
-    values = module.sweep("half_period", places, beta=beta).values
+    """On the parabola z = x**2/2 half periods are complete elliptic integrals of the second kind, and those of the
+    trapezoidal rule are rounded at random about them.
+    """
+    module = build("rolling_parabola_sums", gqm.Curve.graph("x**2/2", parameter="x"), gqm.Rolling())
+    amplitudes = np.linspace(0.2, 1.5, 400)
+    values = module.sweep("half_period", amplitudes, beta=beta).values
     with mp.workdps(40):
-        truth = 2 * mp.pi * mp.sqrt((1 + mpf(beta)) / mpf(9.81))
-    found = errors(values, [truth] * len(values))
+        scale = 2 * mp.sqrt((1 + mpf(beta)) / mpf(9.81))
+        truths = [scale * mp.ellipe(-(mpf(a) ** 2)) for a in amplitudes.tolist()]
+    found = errors(values, truths)
     assert np.abs(found).max() <= MAX_ERROR
     assert abs(found.mean()) <= MAX_MEAN_ERROR
+
+
+@pytest.mark.parametrize("beta", [0.1, 0.4, 0.7])
+def test_a_cycloid_has_one_period(beta: float, build: Callable[..., ModuleType]) -> None:
+    """On Huygens's cycloid all times are the same, to the last bit, and their derivatives by the launch are zero."""
+    module = build("rolling_cycloid", gqm.families.cycloid(R=1, inverted=True), gqm.Rolling())
+    found = module.sweep("half_period", np.pi + np.linspace(0.2, 2.5, 400), beta=beta, gradient=("lam0", "v0"))
+    with mp.workdps(40):
+        truth = 2 * mp.pi * mp.sqrt((1 + mpf(beta)) / mpf(9.81))
+    assert np.abs(errors(found.values, [truth] * len(found.values))).max() <= MAX_ERROR
+    assert len(set(found.values.tolist())) == 1
+    np.testing.assert_array_equal(found.gradient, 0.0)
 
 
 def half_period_of_ball(start: float, beta: float, rho: float) -> Any:
