@@ -13,7 +13,7 @@ from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import partials
 from gqm_sym.runtime.gradients.lanes.operations import SINC, SINC_PAIR, LaneRecorder
-from gqm_sym.runtime.gradients.lanes.scaling import Terms
+from gqm_sym.runtime.gradients.lanes.scaling import Terms, combined
 
 # The second derivative of S(p) at 0, and the derivatives of S[p, p, q], by the operations and the numbers of the
 # results whose derivatives they are. These derivatives are not on the tape.
@@ -33,8 +33,7 @@ POWERS = {Fraction(2) ** k for k in range(-6, 7)}
 def variances(op: LaneRecorder, rates: Sequence[TapeNumber], terms: Sequence[Terms]) -> list[TapeNumber]:
     """Return the variances of the rounding errors of sums of products.
 
-    The errors of terms may be correlated, so that the variance of a sum is at most that of its terms times their
-    number.
+    Those of sums of several terms follow from the sums themselves, because errors that terms have in common may cancel.
 
     Parameters
     ----------
@@ -45,12 +44,16 @@ def variances(op: LaneRecorder, rates: Sequence[TapeNumber], terms: Sequence[Ter
     terms : sequence of Terms
         The products.
     """
-    needed = sorted({which for some in terms for _, which in some})
-    by_rate = {which: _variance(op, op.register(rates[which])) for which in needed}
+    by_rate = {which: _variance(op, op.register(rates[which])) for which in _alone(terms)}
     return [
-        sum(((len(some) * (number * number)) * by_rate[which] for number, which in some), op.number(0))
-        for some in terms
+        (some[0][0] * some[0][0]) * by_rate[some[0][1]] if len(some) == 1 else _variance(op, op.register(total))
+        for total, some in zip(combined(op, terms, rates), terms, strict=True)
     ]
+
+
+def _alone(terms: Sequence[Terms]) -> list[int]:
+    """Return the positions of the rates that are the only ones in a sum."""
+    return sorted({some[0][1] for some in terms if len(some) == 1})
 
 
 def _variance(op: LaneRecorder, wanted: int) -> TapeNumber:
