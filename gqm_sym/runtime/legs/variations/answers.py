@@ -228,9 +228,11 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
-    law, v = LawRows(changes.law.matrix(at_end)), run.record[HEADING]
-    if what == "liftoff":
-        place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
+    law, v, at = LawRows(changes.law.matrix(at_end)), run.record[HEADING], run.record[END]
+    if what == "liftoff" and np.abs(at - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(at):
+        moved = zero  # the contact force changes its sign by a jump, the place of which is fixed
+    elif what == "liftoff":
+        place = np.array([at]), np.array([run.record[END_LOW]])
         path = changes.law.path(*place)
         curvature, load = path.curvature[:, 0], path.load[:, 0]
         faster = y - law.force[0, 0] * sigma

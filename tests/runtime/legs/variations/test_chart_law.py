@@ -3,6 +3,7 @@ rail.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -222,3 +223,36 @@ def test_in_space_as_differences(name: str, generated_folder: Path) -> None:
             for k in (1, 2)
         )
         assert found == pytest.approx((4.0 * near - far) / 3.0, rel=2e-8, abs=2e-8), key
+
+
+def test_liftoff_at_a_corner(tmp_path: Path) -> None:
+    """A body that leaves a track of straight lines where the force on it changes its side ends at the corner, whatever
+    the parameters are.
+
+    The reference is the harmonic motion with friction on the line, in 40 digits.
+    """
+    points = [[-2.0, 1.824], [-1.429, 0.528], [-0.857, -0.17], [-0.286, -0.063], [0.286, 0.416], [0.857, 0.708]]
+    curve = gqm.Curve.sampled([*points, [1.429, 0.777], [2.0, 1.153]], kind="linear")
+    law = gqm.Potential("5*(x**2 + z**2)") + gqm.CoulombFriction(mu="1/20")
+    module = gqm.build(gqm.derive(curve, law), name="leaves_a_corner", folder=tmp_path)
+    launch = 3.724887446488845
+    motion = module.solve(launch, direction=-1, t_max=4, contact="above")
+    assert [leg.end for leg in motion.legs] == ["liftoff"]
+    with mp.workdps(40):
+        (x1, z1), (x2, z2) = ((mpf(x), mpf(z)) for x, z in points[4:])
+        length = mp.hypot(x2 - x1, z2 - z1)
+        before = [mp.hypot(mpf(b[0]) - mpf(a[0]), mpf(b[1]) - mpf(a[1])) for a, b in pairwise(points[:5])]
+        corner = ((x2 - x1) * x1 + (z2 - z1) * z1) / length  # its distance from the point nearest to the centre
+        load = 10 * abs((x2 - x1) * z1 - (z2 - z1) * x1) / length
+
+        def time(start: Any, mu: Any) -> Any:
+            shift = mu * load / 10
+            return mp.acos((corner - shift) / (corner + start - mp.fsum(before) - shift)) / mp.sqrt(10)
+
+        given = mpf(launch), mpf(1) / 20
+        by_place, by_friction = (mp.diff(time, given, order) for order in ((1, 0), (0, 1)))
+        assert motion.t_end == pytest.approx(float(time(*given)), rel=1e-14)
+    found = motion.gradient("t_end")
+    assert found["m"] == 0.0
+    assert found["lam0"] == pytest.approx(float(by_place), rel=1e-12)
+    assert found["mu"] == pytest.approx(float(by_friction), rel=1e-12)
