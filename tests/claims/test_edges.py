@@ -167,6 +167,15 @@ def test_a_ball_does_not_roll_over_corners(build: Build) -> None:
         build("ball_on_planes", VEE, BALL).solve("1/10")
 
 
+def test_a_body_that_falls_into_a_centre_of_force(build: Build) -> None:
+    """The error says where the potential energy is infinite; a division by zero was not caught."""
+    curve = gqm.Curve.graph("-cos(2*x)/3", parameter="x")
+    module = build("into_the_centre", curve, gqm.CentralForce(centre=(0, "-1/3"), k=4))
+    with pytest.raises(SolutionError, match=r"potential energy is infinite at the place 0\.0 .* move the centre"):
+        assert module.solve(1.1437806281064022).half_period
+    assert np.isnan(module.sweep("half_period", [1.1437806281064022]).values).all()
+
+
 def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
     """In waves that become ever narrower, a ball that fits at its launch but not at places that it reaches is refused
     at once.

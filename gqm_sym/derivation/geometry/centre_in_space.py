@@ -65,7 +65,7 @@ def centre_in_space(curve: Curve, radius: sp.Expr, default: Value | None, may_be
             "derive: rolling: radius: on which side of a track in space the body rolls is not known; declare roll= as "
             "an angle (0 is upright)"
         )
-    height = sp.simplify(radius - banking.heartline)
+    height = radius - banking.heartline
     if height == 0:
         return curve
     if curve.charted and default is not None and banking.heartline == read_expression(str(default), where="radius"):

@@ -174,9 +174,21 @@ class Arithmetic:
         return self.context.sqrt(value)
 
     def effective_potential(self, lam: Any) -> Any:
-        """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant."""
+        """Return U = Phi/(1 + beta) per unit mass, for which V**2 + 2*U is constant.
+
+        Raises
+        ------
+        SolutionError
+            If it has a pole there, as a central force has at its centre.
+        """
         check_budget()
-        return self.track.effective_potential(lam)
+        try:
+            return self.track.effective_potential(lam)
+        except ZeroDivisionError:
+            raise SolutionError(
+                f"motion: the potential energy is infinite at the place {float(lam)!r} of the curve; "
+                "launch the body where it does not come there, or move the centre of the force away from the curve"
+            ) from None
 
     def effective_potential_slope(self, lam: Any) -> Any:
         """Return the derivative of U with respect to lam."""

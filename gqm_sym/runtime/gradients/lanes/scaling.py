@@ -111,7 +111,7 @@ def plan_of(source: Source, wanted: tuple[int, ...], *, at_rest: bool, is_scaled
         if scaling is not None and not scaling.others and not scaling.place and (at_rest or not scaling.speed):
             scaled.append((position, k, scaling.time))
         else:
-            (zeros if at_rest and k == n + 1 else others).append(position)
+            (zeros if (at_rest and k == n + 1) or k in constants(source) else others).append(position)
     left = tuple(wanted[position] for position in others)
     by = [found.get(k) for k in left]
     has_launch = any(s is None and k >= n for k, s in zip(left, by, strict=True)) or any(
@@ -121,6 +121,21 @@ def plan_of(source: Source, wanted: tuple[int, ...], *, at_rest: bool, is_scaled
     tangents |= {other for s in by if s is not None for other, _ in s.others}
     plan = Plan(left, tuple(by), tuple(sorted(tangents)), has_launch)
     return DirectRows(tuple(scaled), tuple(zeros), tuple(others)), plan
+
+
+@lru_cache(maxsize=64)
+def constants(source: Source) -> frozenset[int]:
+    """Return the parameters that add only a constant to the effective potential, and on which ds does not depend."""
+    op = Recorder(source.parameters)
+    potential = op.number(source.formulas.effective_potential(op, op.place, op.values))
+    ds = op.number(source.formulas.ds(op, op.place, op.values))
+
+    def adds_a_constant(p: TapeNumber) -> bool:
+        change = gradient(op, potential, [p])[0]
+        by_place = change if change.known is not None else gradient(op, change, [op.place])[0]
+        return (change.known is not None or by_place.known == 0) and gradient(op, ds, [p])[0].known == 0
+
+    return frozenset(k for k, p in enumerate(op.values[: source.parameters]) if adds_a_constant(p))
 
 
 Terms = list[tuple[TapeNumber, int]]

@@ -13,7 +13,7 @@ from paths import ROOT
 import gqm_sym as gqm
 from gqm_sym.loading import load
 from gqm_sym.runtime.gradients.formula_orbit import source_of
-from gqm_sym.runtime.gradients.lanes.scaling import Scaling, plan_of, scalings
+from gqm_sym.runtime.gradients.lanes.scaling import Scaling, constants, plan_of, scalings
 
 ULP, HALF = 2.0**-52, Fraction(1, 2)
 
@@ -58,9 +58,22 @@ def test_plans() -> None:
     assert plan.wanted == (count,)
     assert plan.has_launch
     assert plan.tangents == ()
-    _, plan = plan_of(source, everything, at_rest=False, is_scaled=False)
-    assert plan.wanted == everything
-    assert plan.tangents == tuple(range(count))
+    direct, plan = plan_of(source, everything, at_rest=False, is_scaled=False)
+    mass = list(module.MODEL.parameters).index("m")
+    assert direct.zeros == (mass,)
+    assert plan.wanted == tuple(k for k in everything if k != mass)
+    assert plan.tangents == tuple(k for k in range(count) if k != mass)
+
+
+def test_a_constant_of_the_potential(tmp_path: Path) -> None:
+    """A parameter that only shifts the height has the derivative 0, and not a rounding."""
+    curve = gqm.Curve.graph("a*x**2 + b*x + c", parameter="x", parameters={"a": 1, "b": "1/5", "c": "3/10"})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="shifted", folder=tmp_path)
+    names = list(module.MODEL.parameters)
+    assert constants(source_of(module.MODEL)) == {names.index("c"), names.index("m")}
+    found = module.sweep("half_period", [0.5, 0.7], [0.0, 1.0], gradient=("a", "c"))
+    assert (found.gradient[:, 1] == 0.0).all()
+    assert (found.gradient[:, 0] != 0.0).all()
 
 
 @pytest.mark.parametrize("is_thrown", [False, True])
