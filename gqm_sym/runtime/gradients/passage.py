@@ -19,6 +19,7 @@ from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.orbit import liftoff_in_space
 from gqm_sym.runtime.gradients.path import CURVATURE, DS, LOAD, PRODUCT, SPACE_Y, X, Z, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
@@ -293,6 +294,8 @@ class PassageChanges:
     def end(self, what: str, lam: float) -> Array:
         """Return the derivatives of the place where the motion ends, by the reason for it."""
         count, moved = self.source.parameters, np.zeros(self.source.variables)
+        if what == "liftoff" and not self._problem.formulas.signed:
+            raise liftoff_in_space()
         if what == "liftoff":
             rows = self.extreme_rows(lam, of_speed=False)
             moved = -rows[3:] / rows[1]

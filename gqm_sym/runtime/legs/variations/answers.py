@@ -10,6 +10,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.gradients.orbit import liftoff_in_space
 from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
@@ -225,6 +226,8 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     run, (sigma, y, delay, arc) = changes.runs[k], changes.ends[k]
     if what == "rest":
         return changes.parameter_change(sigma, arc, run.laps), delay
+    if what == "liftoff" and not motion.problem.formulas.signed:
+        raise liftoff_in_space()
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
