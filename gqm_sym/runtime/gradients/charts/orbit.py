@@ -390,12 +390,12 @@ def _length_rows(path: PathRows, rows: Array, direction: int) -> tuple[list[Arra
     respect to all variables, given half of V**2 with its derivatives in the same order, and the sign of ds/dt.
     """
     w = 2.0 * rows[0]
-    v = direction * np.sqrt(w)
     kappa, load, product = path.curvature[0], path.load[0], path.rows[PRODUCT, 0]
     # Half of the square of N, and of its derivative with respect to half of V**2, have a term for each of these rows.
     kinds, factors = [CURVATURE, PRODUCT, LOAD], [kappa * w**2, w, load]
     square, by_half = (kappa * w) ** 2 + 2.0 * product * w + load**2, 2.0 * (kappa**2 * w + product)
     if len(path.rows) > ASIDE:
+        v = direction * np.sqrt(np.maximum(w, 0.0))  # at a turn rounding may leave W below zero
         kinds, factors = [*kinds, ASIDE, ASIDE_TURN], [*factors, v, v * w]
         aside, turning = path.rows[ASIDE, 0], path.rows[ASIDE_TURN, 0]
         square, by_half = square + 2.0 * v * (aside + turning * w), by_half + (aside / v + 3.0 * turning * v)
