@@ -195,7 +195,7 @@ def _charted(curve: Curve) -> Geometry:
     return _undivided(tangent, one, chart_kappa(s), positive=curve.positive, angle=angle)
 
 
-def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:
+def _plain(curve: Curve, signs: Signs, *notes: str) -> Geometry:
     """Return the shape by its definitions, without simplification."""
     lam = curve.parameter
     first = [differentiate(form, lam) for form in (curve.x, curve.y, curve.z)]
@@ -205,9 +205,9 @@ def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:
     if curve.in_space:
         turning = tuple(part / square for part in cross(first, second))
         rate = sp.sqrt(sp.Add(*(part**2 for part in turning)))
-        return _undivided(first, ds, rate, positive=signs.positive, notes=(note,), turning=turning)
+        return _undivided(first, ds, rate, positive=signs.positive, notes=notes, turning=turning)
     rate = (first[0] * second[2] - first[2] * second[0]) / square
-    return _undivided(first, ds, rate, positive=signs.positive, notes=(note,), angle=sp.atan2(first[2], first[0]))
+    return _undivided(first, ds, rate, positive=signs.positive, notes=notes, angle=sp.atan2(first[2], first[0]))
 
 
 def _undivided(
@@ -249,7 +249,8 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
     algebra = tangent.algebra
     root = root_of_sum(tangent, signs)
     if differentiate(curve.x, lam) == 1 and _is_written_out(tangent, root):
-        return _graph(curve, signs)
+        shape = _plain(curve, signs)
+        return replace(shape, angle=sp.atan(shape.across))
     scale = tangent.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
     rate = _turning_rate(tangent, root, (0, 1))
@@ -288,15 +289,6 @@ def _is_written_out(tangent: Direction, root: Root) -> bool:
     slope = spell_ratio(tangent.algebra, across, along)
     divides_sum = any(base.is_Add and power > 0 for base, power in slope)
     return divides_sum or any(base.has(sp.exp, sp.sinh, sp.cosh) for base, power in slope if power < 0)
-
-
-def _graph(curve: Curve, signs: Signs) -> Geometry:
-    """Return the shape of a graph z(x) by the derivatives of z as it is declared."""
-    slope = differentiate(curve.z, curve.parameter)
-    square = 1 + slope**2
-    rate = differentiate(slope, curve.parameter) / square
-    first = (sp.S.One, sp.S.Zero, slope)
-    return _undivided(first, sp.sqrt(square), rate, positive=signs.positive, angle=sp.atan(slope))
 
 
 def _in_space(curve: Curve, signs: Signs) -> Geometry:
