@@ -232,7 +232,7 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
     law, v, at = LawRows(changes.law.matrix(at_end)), run.record[HEADING], run.record[END]
-    if what == "liftoff" and np.abs(at - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(at):
+    if what == "liftoff" and _is_at_break(changes, at):
         moved = zero  # the contact force changes its sign by a jump, the place of which is fixed
     elif what == "liftoff":
         place = np.array([at]), np.array([run.record[END_LOW]])
@@ -244,6 +244,11 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
     return changes.parameter_change(moved, arc, run.laps), delay + v * law.ds[0] * (moved - sigma) / speed
+
+
+def _is_at_break(changes: Changes, place: float) -> bool:
+    """Return whether the force may jump at a place."""
+    return bool(np.abs(place - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(place))
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))
@@ -294,7 +299,7 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
         t, moved = t_end, end(motion, changes)[1][:, None]
     else:
         t, is_stationary = _improved(motion, changes, of_speed, found)
-        if not is_stationary and np.abs(found.lam - changes.breaks).min(initial=np.inf) <= AT_BREAK * abs(found.lam):
+        if not is_stationary and _is_at_break(changes, found.lam):
             # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
             # itself.
             sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * SIDE_SHARE * t_end
