@@ -114,6 +114,7 @@ TESTED_THROUGH = {
     "gradients/evaluation.py": "runtime/gradients/test_quantities.py",
     "gradients/formula_orbit.py": "runtime/gradients/test_quantities.py",
     "gradients/lanes/assembly.py": "runtime/gradients/lanes/test_differences.py",
+    "gradients/lanes/extremes.py": "runtime/gradients/test_sweep.py",
     "gradients/lanes/interpreter.py": "runtime/gradients/lanes/test_differences.py",
     "gradients/lanes/launches.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/lanes/machine_code.py": "runtime/gradients/lanes/test_evaluation.py",
