@@ -54,8 +54,7 @@ from gqm_sym.runtime.legs.panels.polynomials import (
     LEBESGUE,
     WIDE,
     extent,
-    last_sum_row,
-    next_sum_row,
+    series_at,
     size_of,
     to_coefficients,
     to_means,
@@ -344,17 +343,12 @@ def share_to_turn(forces, v2, width, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def shorten(share, work):  # type: ignore[no-untyped-def]
-    """Replace the rows kept of a gap by those of its first part."""
-    linear_row(work, GRADED, NODES, -2.0, 4.0 * share)
+def shorten(begin, share, work):  # type: ignore[no-untyped-def]
+    """Replace the rows kept of a gap by those of a part of it."""
+    linear_row(work, GRADED, NODES, 4.0 * begin - 2.0, 4.0 * share)
     for row in FRICTION_ROWS + SQUARE_ROWS:
         to_coefficients(work, row, work, SERIES)
-        copy_row(work, SPEED, 0.0)
-        copy_row(work, EXPM1_Q, 0.0)
-        for k in range(COUNT - 1, 0, -2):
-            next_sum_row(work, EXPM1_Q, GRADED, SPEED, EXPM1_Q, work[SERIES + k])
-            next_sum_row(work, SPEED, GRADED, EXPM1_Q, SPEED, work[SERIES + k - 1])
-        last_sum_row(work, row, GRADED, SPEED, EXPM1_Q, work[SERIES])
+        series_at(work, row, GRADED, SERIES)
 
 
 @Inner
@@ -370,7 +364,7 @@ def solve_towards_turn(forces, v2, width, gaps, at, work):  # type: ignore[no-un
         return 0.0
     if share < 1.0:
         width *= share
-        shorten(share, work)
+        shorten(0.0, share, work)
     return width if solve_on_rows(forces, v2, width, work) else 0.0
 
 

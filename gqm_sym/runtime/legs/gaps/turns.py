@@ -1,12 +1,47 @@
-"""Turns that are found by the data kept of the gaps between two breaks of the curve."""
+"""Turns that are found by the data kept of the gaps between two breaks of the curve, and the gaps next to turns.
 
-from math import inf
+On the gaps before a turn, and after one, neither is the curve evaluated nor are panels laid (`beside_turns`).
+"""
+
+from math import fabs, inf, nan
+from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.legs.gaps.blocks import kept_gap
-from gqm_sym.runtime.legs.gaps.data import FILLED, fill_load, read_rows, solve_towards_turn
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.legs.gaps.beside_turns import (
+    GAPS_BEFORE,
+    keep_series,
+    leave_turn,
+    series_store,
+    time_near_turn,
+    time_to_turn,
+)
+from gqm_sym.runtime.legs.gaps.blocks import ends_of_gap, gap_behind, kept_gap
+from gqm_sym.runtime.legs.gaps.data import (
+    FILLED,
+    LEAST_KAPPA,
+    LEAST_N0,
+    MOST_KAPPA,
+    MOST_N0,
+    Bounds,
+    fill_load,
+    lengths_on,
+    range_of,
+    read_rows,
+    solve_on_gap,
+    solve_towards_turn,
+)
+from gqm_sym.runtime.legs.gaps.passing import FAR_SHARE, RunState, is_read_inside, may_be_peak
+from gqm_sym.runtime.legs.leg_record import (
+    HEAD,
+    NO_VALUES,
+    PEAKS,
+    RIGHT,
+    TIME,
+    TIME_ERROR,
+)
 from gqm_sym.runtime.legs.panels.breaks import offset
-from gqm_sym.runtime.legs.panels.equation import LOAD, MEAN, SERIES, W
+from gqm_sym.runtime.legs.panels.equation import KAPPA, LOAD, MEAN, N0, SERIES, W, load_per_mass_row, marched
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent, size_of, sum_and_slope, to_coefficients
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE, first_change_of
@@ -17,7 +52,8 @@ from gqm_sym.runtime.legs.runs.route import CurveAhead
 SHORT_SHARE, LEAST_MEAN = 0.25, 0.125
 
 # The number of gaps on which a turn is sought. Gaps before the one with the turn are passed as elsewhere.
-GAPS_TO_TURN = 4
+GAPS_TO_TURN = GAPS_BEFORE + 1
+width_store = on_stack(GAPS_BEFORE)
 
 
 @Inner
@@ -42,9 +78,38 @@ def distance_to_turn(v2, turn, width, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def may_be_peak_on_gap(reading, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Return whether the extreme to be found may be on a gap with the row W."""
+    high = extent(work, W)[1]
+    if reading.length:
+        return may_be_peak(reading, lengths_on(gaps, at, 0.0, high))
+    load_per_mass_row(work, SERIES, N0, KAPPA, W)
+    least, most = range_of(work, SERIES)
+    return may_be_peak(reading, Bounds(0.0, high, least, most))
+
+
+class TurnOnGaps(NamedTuple):
+    """A turn that is found by the rows kept of gaps.
+
+    Attributes
+    ----------
+    distance : float
+        Its distance from the origin; 0 if there is none.
+    time : float
+        The time up to it; NaN if it is not known, or an extreme may be on the way.
+    ahead : CurveAhead
+        The data of the curve ahead of the body there.
+    """
+
+    distance: float
+    time: float
+    ahead: CurveAhead
+
+
+@Inner
 def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type: ignore[no-untyped-def]
-    """Return the distance at which a body that becomes slower turns, by the rows kept of the next gaps, and the data of
-    the curve ahead of it there; the distance is 0 if they do not show a turn, or N may change its sign before.
+    """Return the turn of a body that becomes slower, by the rows kept of the next gaps, if these show one and N does
+    not change its sign before.
 
     V**2 is a polynomial on each gap, so that the curve is not evaluated.
 
@@ -57,14 +122,15 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
     ahead : CurveAhead
     """
     v, nu, v2, first, breaks = march.direction, timed.contact_sign, timed.v2, ahead.upcoming, route.breaks
+    none, time, store, widths = TurnOnGaps(0.0, nan, ahead), 0.0, series_store(), width_store()
     if nu in (0, -route.only_sign) or route.gaps.size == 0 or first + 1 >= breaks.size:
-        return 0.0, ahead
+        return none
     # If a panel is laid once more, the break at which the body is lies behind already.
     if offset(breaks[first], march.origin, v) != timed.distance:
-        return 0.0, ahead
-    for upcoming in range(first, min(first + GAPS_TO_TURN, breaks.size - 1)):
-        begin = offset(breaks[upcoming], march.origin, v)
-        at, width = kept_gap(forces, route, upcoming, v, nu, work)
+        return none
+    for k in range(min(GAPS_TO_TURN, breaks.size - 1 - first)):
+        begin = offset(breaks[first + k], march.origin, v)
+        at, width = kept_gap(forces, route, first + k, v, nu, work)
         if route.gaps[at] != FILLED:
             break
         part = width
@@ -77,15 +143,115 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
         noise = CANCELLATION_NOISE * max(largest_v2, extent(work, W)[1])
         turn, _, touch = first_change_of(work, W, 1, noise)
         far = distance_to_turn(v2, turn, part, work)
+        if route.reading.what == PEAKS and may_be_peak_on_gap(route.reading, route.gaps, at, work):
+            time = nan
+        start = 0.0
+        if time >= 0.0 and far == inf and k < GAPS_BEFORE:
+            widths[k] = width
+            keep_series(store, k, work)
+        elif time >= 0.0 and 0.0 < far < inf:
+            time, start = time_to_turn(part, far / part, work)
         fill_load(work)
         load, _, no_load = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * extent(work, MEAN)[1])
         # Behind the turn V**2 is negative, and N may be anything.
         if not (touch > 1.0 and min(load, no_load) > min(turn, 1.0) and far > 0.0):
             break
         if far < inf:
-            return begin + far, CurveAhead(upcoming + 1, ahead.span, inf, True)
+            time += time_before(far, start, k, store, widths, work)
+            return TurnOnGaps(begin + far, time, CurveAhead(first + k + 1, ahead.span, inf, True))
         v2 = work[W + COUNT]
         # Where the body does not become slower, this is not the end of its leg.
         if part < width or not noise < v2 <= work[W]:
             break
-    return 0.0, ahead
+    return none
+
+
+@Inner
+def time_before(far, v2, count, store, widths, work):  # type: ignore[no-untyped-def]
+    """Return the time over the gaps before that with a turn, which lies at the distance ``far`` from the last one,
+    where V**2 is ``v2``; NaN if it is not resolved.
+    """
+    total = 0.0
+    for k in range(count - 1, -1, -1):
+        time, v2 = time_near_turn(far, widths[k], v2, False, store, k, work)
+        total, far = total + time, far + widths[k]
+    return total
+
+
+@Inner
+def is_load_far(forces, contact_sign, v2, gaps, at):  # type: ignore[no-untyped-def]
+    """Return whether N is far from zero on a gap where V**2 is at most ``v2``; with friction in space this is tested
+    where V**2 is found.
+    """
+    if not forces.linear:
+        return True
+    flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
+    least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
+    size = max(fabs(least), fabs(most)) + max(fabs(flat), fabs(steep)) * v2
+    load = least + min(flat * v2, 0.0) if contact_sign > 0 else -most - max(steep * v2, 0.0)
+    return load > FAR_SHARE * size
+
+
+@Inner
+def may_be_peak_up_to(forces, reading, v2, gaps, at):  # type: ignore[no-untyped-def]
+    """Return whether the extreme to be found may be on a gap where V**2 is at most ``v2``."""
+    if reading.what != PEAKS:
+        return False
+    if forces.squared_contact != 0:
+        return may_be_peak(reading, lengths_on(gaps, at, 0.0, v2))
+    least = gaps[at + LEAST_N0] + min(gaps[at + LEAST_KAPPA] * v2, 0.0)
+    most = gaps[at + MOST_N0] + max(gaps[at + MOST_KAPPA] * v2, 0.0)
+    return may_be_peak(reading, Bounds(0.0, v2, least, most))
+
+
+@Inner
+def pass_after_turn(forces, v2, far, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Return the time over the gap that begins at the distance ``far`` from a turn, where V**2 is ``v2``, and V**2 at
+    its end; the time is NaN if it is not resolved.
+    """
+    if gaps[at] != FILLED:
+        return nan, v2
+    if forces.linear:
+        read_rows(v2, width, gaps, at, work)
+    elif not solve_on_gap(forces, v2, width, gaps, at, work):
+        return nan, v2
+    store, end = series_store(), work[W + COUNT]
+    keep_series(store, 0, work)
+    return (time_near_turn(far, width, v2, True, store, 0, work)[0] if end > 0.0 else nan), end
+
+
+@Inner
+def begin_on_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
+    """Leave a turn by the rows kept of the gap in which it is, and of the next one; the state is as ``before`` if this
+    is not possible.
+    """
+    v, upcoming, breaks, passed = march.direction, before.ahead.upcoming, route.breaks, 0.0
+    if contact_sign in (0, -route.only_sign) or route.gaps.size == 0 or upcoming + 1 >= breaks.size or before.v2 > 0.0:
+        return before
+    to = offset(breaks[upcoming], march.origin, v)
+    low, high = ends_of_gap(route.all_breaks, route.period, gap_behind(route, upcoming - 1, v))
+    if not 0.0 < to < high - low:
+        return before
+    at, width = kept_gap(forces, route, upcoming - 1, v, contact_sign, work)
+    if route.gaps[at] != FILLED:
+        return before
+    v2, total, largest, state = 0.0, 0.0, 0.0, before
+    for k in range(2):
+        if k == 0:
+            time, end = leave_turn(forces, to, width, route.gaps, at, work)
+        else:
+            at, length = kept_gap(forces, route, upcoming, v, contact_sign, work)
+            time, end = pass_after_turn(forces, v2, passed, length, route.gaps, at, work)
+            upcoming += 1
+        places, high = (march.origin[0] + v * passed, breaks[upcoming]), range_of(work, W)[1]
+        if not (time > 0.0 and is_load_far(forces, contact_sign, high, route.gaps, at)):
+            break
+        if is_read_inside(route, places, (total, total + time)) or may_be_peak_up_to(
+            forces, route.reading, high, route.gaps, at
+        ):
+            break
+        passed, total, v2 = offset(breaks[upcoming], march.origin, v), total + time, end
+        left, largest = marched(passed, march), max(largest, max(end, extent(work, W)[1]))
+        record[HEAD + RIGHT], record[HEAD + TIME], record[HEAD + TIME_ERROR] = left, total, NO_VALUES
+        state = RunState(left, passed, v2, largest, CurveAhead(upcoming, before.ahead.span, inf, True), 1)
+    return state

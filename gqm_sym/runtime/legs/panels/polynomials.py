@@ -14,6 +14,8 @@ from gqm_sym.runtime.arithmetic.matrices import largest, multiply, span
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.compiled.series_rows import series_rows
+from gqm_sym.runtime.compiled.types import Array
 
 # The number of nodes; together with the panel's end they fill three registers.
 COUNT = 23
@@ -106,8 +108,21 @@ MIN_PART = 2.0**-30
 PART, TWICE_X, NEXT_SUM, SUM_AFTER, STACK = range(0, 5 * WIDE, WIDE)
 search_buffer = on_stack(STACK + 64)
 
+# A series at places.
+series_at = series_rows(WIDE, COUNT)
+
 next_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + twice_x * next_sum - after, WIDE)
 last_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + 0.5 * twice_x * next_sum - after, WIDE)
+
+
+def arrival_weights(nodes: int) -> Array:
+    """Return the matrix with one column that gives the integral of f over ``y**-0.5 dy``, y from 0 to 1, from the
+    values of f.
+    """
+    by_node = tables(nodes)[3]
+    k = np.arange(len(by_node))
+    return np.array([2.0 / (1.0 - 4.0 * k * k) @ by_node]).T
+
 
 # Newton's method for a zero in [-1, 1] ends after a step this short, because the next one would be about its square.
 LAST_STEP = 1e-9

@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.leg_record import (
     PANELS,
     PASSAGE,
     ROWS_COUNT_AS,
+    TIME,
     TIME_FROM_END,
     TIME_FROM_START,
     WHOLE,
@@ -79,6 +80,9 @@ from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
 # The width of the first panel, as a share of a leg of known width.
 FIRST_PANEL_OF_LEG = 0.25
+
+# A leg is tried as one polynomial only if the next break is at least at this share of its expected width.
+MAX_SHARE_TO_BREAK = 0.75
 
 # The reasons for which a leg was not followed back.
 NO_SPACE, LOST = -1, -2
@@ -241,6 +245,7 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
     """
     step, no_turn_until = start.step, start.no_turn_until
     while True:
+        record[BACK] = 0.0
         end = run(forces, start, route, off, record)
         width = fabs((end.place[0] - start.place) + (end.place[1] - start.place_low))
         turns_at_once = end.what == END_TURN and start.v2 == 0.0 and FIRST_PANEL_OF_LEG * width < step
@@ -264,6 +269,16 @@ def passes_kinks(start):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def passes_break(start, route):  # type: ignore[no-untyped-def]
+    """Return whether a leg is expected to pass a break of the curve, so that it is not one polynomial."""
+    for place in route.breaks:
+        d = offset(place, (start.place, start.place_low), start.direction)
+        if d > 0.0:
+            return d < MAX_SHARE_TO_BREAK * start.width
+    return False
+
+
+@Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """Run to the end, or to a place whose passage is to be found, as one polynomial if that suffices, in parts past
     kinks of the law, or else by `run_to_end`; return the end, the number of blocks of the polynomial (`whole_tables`),
@@ -277,7 +292,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
             end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
             if end.what == END_PAUSE:
                 return end, blocks, branch
-        if not passes_kinks(start):
+        if not (passes_kinks(start) or passes_break(start, route)):
             end, blocks, branch = run_whole(forces, start, branch, route, off, record)
             if end.what == END_TURN:
                 return end, blocks, branch
@@ -349,7 +364,9 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), 0.0
     direction, could_stay = start.direction, True
     if what == END_TURN:
-        if blocks == 0:
+        if blocks == 0 and record[BACK] > 0.0:
+            back, record[TIME_FROM_END] = 1, record[used + TIME]
+        elif blocks == 0:
             back = run_back(forces, end, breaks, off, route.reading, record, used)
             record[TIME_FROM_END] = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))

@@ -4,12 +4,24 @@ Time is counted on the way as long as V**2 is large. After V**2 has begun to dec
 to its end, from which time is then counted back (`follow`).
 """
 
-from math import inf
+from math import inf, sqrt
 
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.legs.gaps.passing import RunState, pass_gaps
-from gqm_sym.runtime.legs.gaps.turns import turn_on_gaps
-from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
+from gqm_sym.runtime.legs.gaps.passing import RunState, is_read_inside, pass_gaps
+from gqm_sym.runtime.legs.gaps.turns import begin_on_gaps, turn_on_gaps
+from gqm_sym.runtime.legs.leg_record import (
+    BACK,
+    COLUMNS,
+    HEAD,
+    NO_VALUES,
+    RIGHT,
+    TIME,
+    TIME_ERROR,
+    add_panel,
+    change_at,
+    has_space,
+    total_time,
+)
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
     LOAD,
@@ -64,6 +76,20 @@ def enter_panel(forces, march, panel, reading, record, count, right, work):  # t
 
 
 @Inner
+def enter_turn(route, march, turn, run_length, left, record, count):  # type: ignore[no-untyped-def]
+    """Return the state of a run after a turn that kept rows show; store the time up to it from the distance
+    ``run_length`` behind the panels of the record, as one from the turn, if it is known and nothing else is read there.
+    """
+    at, place, v = HEAD + count * COLUMNS, march.origin[0] + march.origin[1], march.direction
+    spent, far, time = total_time(record, HEAD, count), turn.distance, turn.time
+    ends = place + v * run_length, place + v * far
+    if time >= 0.0 and has_space(record, at, 0) and not is_read_inside(route, ends, (spent, spent + time)):
+        record[at + RIGHT], record[at + TIME], record[at + TIME_ERROR] = sqrt(far - run_length), time, NO_VALUES
+        record[BACK] = 1.0
+    return END_TURN, far, 0.0, marched(far, march) - left, turn.ahead
+
+
+@Inner
 def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-def]
     """Return the largest V**2 so far after a panel that begins with ``v2``; resistance alone reduces the value before
     by the factor exp(-q).
@@ -93,22 +119,26 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     work, point, v = panel_buffer(), point_buffer(), start.direction
     set_nodes(work)
     march, nu, ahead = begin(forces, start, route, off, point)
-    v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(start.step, march)
+    left, run_length, v2, largest_v2, ahead, recorded = begin_on_gaps(
+        *(forces, march, route, nu, RunState(0.0, 0.0, start.v2, start.v2, ahead, 0), record, work)
+    )
     # When time is not counted any more, a turn is searched for.
-    what, panel_count, recorded, change_count, searching, at_stop = END_NONE, 0, 0, 0, False, False
+    what, panel_count, change_count, searching, at_stop = END_NONE, 0, 0, False, recorded > 0
     # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; with laws that
     # are not linear only the part next to the end is.
     middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
-    timed = LastTimed(run_length, v2, nu, change_count)
+    timed, step = LastTimed(run_length, v2, nu, change_count), left if at_stop else marched(start.step, march)
     for _ in range(MAX_PANELS):
         if at_stop and not searching:
             left, run_length, v2, largest_v2, ahead, recorded = pass_gaps(
                 *(forces, march, route, nu, RunState(left, run_length, v2, largest_v2, ahead, recorded), record, work)
             )
             timed = LastTimed(run_length, v2, nu, change_count)
-            turn, after = turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work)
-            if turn > run_length:
-                what, run_length, v2, step, ahead = END_TURN, turn, 0.0, marched(turn, march) - left, after
+            turn = turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work)
+            if turn.distance > run_length:
+                what, run_length, v2, step, ahead = enter_turn(
+                    *(route, march, turn, run_length, left, record, recorded)
+                )
                 break
         late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
         ahead, at_end, stop = pass_break(march, route, off, v2, ahead, run_length)

@@ -12,7 +12,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.matrices import multiply_one_of
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, LAST, MIDDLE, WIDE, tables
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, LAST, MIDDLE, WIDE, arrival_weights, tables
 
 # The largest number of blocks. Where more nodes would be needed, panels take less time.
 MAX_BLOCKS = 3
@@ -80,10 +80,8 @@ def half_times(blocks: int) -> Array:
 
 
 def arrival_time(blocks: int) -> Array:
-    """Return the matrix that gives the integral of f over ``y**-0.5 dy``, y from 0 to 1, from the values of f."""
-    by_node = tables(blocks * WIDE - 1)[3]
-    k = np.arange(len(by_node))
-    return np.array([2.0 / (1.0 - 4.0 * k * k) @ by_node]).T
+    """Return the matrix that gives the time of an arrival (`polynomials.arrival_weights`)."""
+    return arrival_weights(blocks * WIDE - 1)
 
 
 to_nodes, to_means, to_coefficients, to_tails, to_end_terms, to_factors, to_half_times, to_arrival_time = (
