@@ -121,6 +121,7 @@ TESTED_THROUGH = {
     "gradients/lanes/pairs.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/lanes/periods.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/lanes/programs.py": "runtime/gradients/lanes/test_evaluation.py",
+    "gradients/lanes/vectors.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/orbit.py": "runtime/gradients/test_quantities.py",
     "gradients/path.py": "runtime/gradients/test_sensitivity.py",
     "gradients/programs.py": "runtime/gradients/test_quantities.py",

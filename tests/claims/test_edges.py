@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator
 from decimal import Decimal
 from fractions import Fraction
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -30,20 +29,6 @@ HALF_PIPE = gqm.Curve.piecewise(
 BALL = gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once for each name."""
-    folder: Path = tmp_path_factory.mktemp("edges")
-    built: dict[str, ModuleType] = {}
-
-    def make(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return make
-
-
 @pytest.mark.parametrize(
     "launch",
     [
@@ -55,11 +40,11 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
         {"lam0": "pi/2 + 1/2", "v0": "sqrt(2*981/100)"},
     ],
 )
-def test_from_end_to_end(launch: dict[str, Any], build: Build) -> None:
+def test_from_end_to_end(launch: dict[str, Any], built: Build) -> None:
     """A body released at one end of a half pipe reaches the other end after two quarter swings and a metre at full
     speed.
     """
-    motion = build("half_pipe", HALF_PIPE, gqm.Gravity()).solve(**launch)
+    motion = built("half_pipe", HALF_PIPE, gqm.Gravity()).solve(**launch)
     assert motion.kind == "libration"
     low, high = sorted(motion.turning_points)
     assert (low, high) == pytest.approx((0.0, math.pi + 1.0), abs=1e-15)
@@ -73,9 +58,9 @@ def test_from_end_to_end(launch: dict[str, Any], build: Build) -> None:
 
 
 @pytest.mark.parametrize("lam0", [0, "2*sqrt(2)"])
-def test_from_end_to_end_of_planes(lam0: Any, build: Build) -> None:
+def test_from_end_to_end_of_planes(lam0: Any, built: Build) -> None:
     """On two planes the same takes four times the time down one of them."""
-    motion = build("vee", VEE, gqm.Gravity()).solve(lam0)
+    motion = built("vee", VEE, gqm.Gravity()).solve(lam0)
     assert motion.kind == "libration"
     assert motion.half_period == pytest.approx(2 * math.sqrt(4 / 9.81), rel=1e-15)
 
@@ -83,47 +68,47 @@ def test_from_end_to_end_of_planes(lam0: Any, build: Build) -> None:
 @pytest.mark.parametrize(
     ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
 )
-def test_losses_keep_a_body_from_the_other_end(name: str, force: Any, build: Build) -> None:
+def test_losses_keep_a_body_from_the_other_end(name: str, force: Any, built: Build) -> None:
     """With losses the body turns before the other end, at mirrored places from either side."""
-    module = build(name, HALF_PIPE, gqm.Gravity() + force)
+    module = built(name, HALF_PIPE, gqm.Gravity() + force)
     left, right = (module.solve(lam0).turning_points[:2] for lam0 in (0, "pi + 1"))
     assert left[1] < math.pi + 1.0
     assert left[1] == pytest.approx(math.pi + 1.0 - right[1], abs=1e-14)
 
 
-def test_a_faster_body_leaves_over_the_end(build: Build) -> None:
+def test_a_faster_body_leaves_over_the_end(built: Build) -> None:
     """A body with some speed at the end does not turn there; one that just reaches the end does."""
-    module = build("half_pipe", HALF_PIPE, gqm.Gravity())
+    module = built("half_pipe", HALF_PIPE, gqm.Gravity())
     assert module.solve(0, "1/1000").events[-1].kind == "domain-end"
-    bowl = build("bowl", gqm.Curve.graph("x**2", parameter="x", domain=(-1, 1)), gqm.Gravity())
+    bowl = built("bowl", gqm.Curve.graph("x**2", parameter="x", domain=(-1, 1)), gqm.Gravity())
     for speed in ("sqrt(2*981/100)", "sqrt(2*981/100 - 1/10**30)"):
         assert bowl.solve(0, speed).kind == "libration"
     assert bowl.solve(0, "sqrt(2*981/100 + 1/1000000)").kind == "transit"
 
 
-def test_nothing_lies_beyond_the_ends_of_a_track(build: Build) -> None:
+def test_nothing_lies_beyond_the_ends_of_a_track(built: Build) -> None:
     """pass1 gives NaN beyond the ends of a track; a curve with formulas continues, with the sign of V**2 that they
     have.
     """
     rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/10")
     tracks = (("vee", VEE, gqm.Gravity()), ("half_pipe", HALF_PIPE, gqm.Gravity()), ("rough", HALF_PIPE, rough))
     for name, curve, force in tracks:
-        module = build(name, curve, force)
+        module = built(name, curve, force)
         end = module.MODEL.domain(module.MODEL.numbers(tuple(module.PARAMETERS.values()))).high
         places = np.array([-1.0, np.nextafter(0.0, -1.0), 0.0, 0.5, end, np.nextafter(end, 9.0), 50.0])
         rows = np.array(module.pass1(places, lam0=0.25, v0=9))
         assert np.isnan(rows[:, [0, 1, 5, 6]]).all()
         assert np.isfinite(rows[:4, 2:5]).all()
         assert np.isnan(module.pass1(-1, lam0=0.25, v0=9).x)
-    formula = build("line", gqm.Curve.graph("x", parameter="x", domain=(0, 1)), gqm.Gravity())
+    formula = built("line", gqm.Curve.graph("x", parameter="x", domain=(0, 1)), gqm.Gravity())
     assert formula.pass1(2.0, lam0=0).v2 == pytest.approx(-2 * 9.81 * 2)
 
 
-def test_the_time_at_a_turning_point_given_exactly(build: Build) -> None:
+def test_the_time_at_a_turning_point_given_exactly(built: Build) -> None:
     """The distance of a place from a turning point is that of the exact numbers; half of its digits determine the
     time.
     """
-    swing = build("swing", gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi"), gqm.Gravity())
+    swing = built("swing", gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi"), gqm.Gravity())
     motion = swing.solve(0, "sqrt(2*981/100)")
     quarter = motion.half_period / 2
     assert motion.time_at("pi/2") == quarter
@@ -135,15 +120,15 @@ def test_the_time_at_a_turning_point_given_exactly(build: Build) -> None:
         assert before == pytest.approx(math.sqrt(2 / 9.81 / 10.0**digits), rel=1e-4, abs=1e-15)
     with pytest.raises(SolutionError, match="never at"):
         motion.time_at("pi/2 + 1/10**25")
-    thrown = build("upright", gqm.Curve.parametric(x="0*u", z="u", parameter="u"), gqm.Gravity()).solve(0, 1)
+    thrown = built("upright", gqm.Curve.parametric(x="0*u", z="u", parameter="u"), gqm.Gravity()).solve(0, 1)
     assert thrown.time_at("50/981") == pytest.approx(100 / 981, rel=1e-15)
 
 
-def test_a_body_that_slips_at_launch_begins_to_slip_once(build: Build) -> None:
+def test_a_body_that_slips_at_launch_begins_to_slip_once(built: Build) -> None:
     """The event at launch occurs once; later ones follow after every half period."""
     circle = gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi")
     force = gqm.Gravity() + gqm.Rolling(beta="2/5", mu_static="1/10")
-    motion = build("slipping", circle, force).solve("3/2")
+    motion = built("slipping", circle, force).solve("3/2")
     slips = [event.t for event in motion.events_between(0, 4 * motion.period) if event.kind == "slip"]
     assert slips[0] == 0.0
     assert len(slips) == 9
@@ -151,36 +136,36 @@ def test_a_body_that_slips_at_launch_begins_to_slip_once(build: Build) -> None:
     assert steps == pytest.approx(motion.half_period, rel=1e-12)
 
 
-def test_the_contact_force_before_a_node(build: Build) -> None:
+def test_the_contact_force_before_a_node(built: Build) -> None:
     """N keeps its sign up to the node of a lemniscate, although the formula of the curvature is 0/0 there."""
     curve = gqm.Curve.implicit("(x**2 + z**2)**2 - x**2 + z**2", start=(1, 0))
-    lemniscate = build("lemniscate", curve, gqm.Gravity())
+    lemniscate = built("lemniscate", curve, gqm.Gravity())
     for contact, first in (("bilateral", ["singular-point"]), ("above", ["singular-point"])):
         motion = lemniscate.solve(0, 6, -1, contact=contact)
         assert [event.kind for event in motion.events] == first
     assert [event.kind for event in lemniscate.solve(0, 6).events] == ["contact-sign", "singular-point"]
 
 
-def test_a_ball_does_not_roll_over_corners(build: Build) -> None:
+def test_a_ball_does_not_roll_over_corners(built: Build) -> None:
     """The centre of a ball has no path beside a corner."""
     with pytest.raises(LaunchError, match=r"radius: the track has a corner at s = 1\.414.*round the corners off"):
-        build("ball_on_planes", VEE, BALL).solve("1/10")
+        built("ball_on_planes", VEE, BALL).solve("1/10")
 
 
-def test_a_body_that_falls_into_a_centre_of_force(build: Build) -> None:
+def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
     """The error says where the potential energy is infinite; a division by zero was not caught."""
     curve = gqm.Curve.graph("-cos(2*x)/3", parameter="x")
-    module = build("into_the_centre", curve, gqm.CentralForce(centre=(0, "-1/3"), k=4))
+    module = built("into_the_centre", curve, gqm.CentralForce(centre=(0, "-1/3"), k=4))
     with pytest.raises(SolutionError, match=r"potential energy is infinite at the place 0\.0 .* move the centre"):
         assert module.solve(1.1437806281064022).half_period
     assert np.isnan(module.sweep("half_period", [1.1437806281064022]).values).all()
 
 
-def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
+def test_a_ball_that_will_not_fit_is_told_at_once(built: Build) -> None:
     """In waves that become ever narrower, a ball that fits at its launch but not at places that it reaches is refused
     at once.
     """
-    waves = build("narrower", gqm.Curve.graph("-x + sin(x**2/20)", parameter="x"), BALL)
+    waves = built("narrower", gqm.Curve.graph("-x + sin(x**2/20)", parameter="x"), BALL)
     with pytest.raises(SolutionError, match=r"does not fit into the track at x = 45\.9.* where it comes after 6\.46"):
         waves.solve(0, 1)
     assert waves.solve(0, 1, radius="1/1000000").state(1.0).v > 0.0
@@ -272,29 +257,29 @@ def test_what_is_no_model_is_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("name", "force"), [("vee", gqm.Gravity()), ("rough_vee", gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))]
 )
-def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, build: Build) -> None:
+def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, built: Build) -> None:
     """A moving body keeps its speed at each corner between two turns, and a leg ends there; a body at rest on a corner
     stays.
     """
-    motion = build(name, VEE, force).solve(1)
+    motion = built(name, VEE, force).solve(1)
     first = [(event.kind, event.lam) for event in motion.events[:4] if event.kind == "corner"]
     assert first == [("corner", pytest.approx(math.sqrt(2), rel=1e-15))] * 2
     assert [leg.end for leg in motion.legs[:4]] == ["corner", "turn", "corner", "turn"]
     before, after = motion.legs[:2]
     assert (before.lam_end, before.t_end) == (after.lam_start, after.t_start)
     assert motion.events[0].t == before.t_end
-    resting = build(name, VEE, force).solve("sqrt(2)")
+    resting = built(name, VEE, force).solve("sqrt(2)")
     assert (resting.kind, [event.kind for event in resting.events]) == ("rest", ["rest"])
 
 
-def test_at_rest_at_a_cusp(build: Build) -> None:
+def test_at_rest_at_a_cusp(built: Build) -> None:
     """A body stays at a cusp with a level tangent, because no force moves it, and falls from any other cusp."""
     deltoid = gqm.Curve.parametric(x="2*cos(t) + cos(2*t)", z="2*sin(t) - sin(2*t)", parameter="t", period="2*pi")
     nephroid = gqm.Curve.parametric(x="3*cos(t) - cos(3*t)", z="3*sin(t) - sin(3*t)", parameter="t", period="2*pi")
     for name, curve, level in (("deltoid", deltoid, ("0",)), ("nephroid", nephroid, ("0", "pi"))):
         for lam0 in level:
-            assert build(name, curve, gqm.Gravity()).solve(lam0).kind == "rest"
-    motion = build("deltoid", deltoid, gqm.Gravity()).solve("2*pi/3")
+            assert built(name, curve, gqm.Gravity()).solve(lam0).kind == "rest"
+    motion = built("deltoid", deltoid, gqm.Gravity()).solve("2*pi/3")
     assert [event.kind for event in motion.events] == ["contact-sign", "cusp"]
     # Down the arc to the lowest cusp: dt = ds/V, with V**2 = 2 g (z0 - z).
     with mp.workdps(40):
@@ -306,9 +291,9 @@ def test_at_rest_at_a_cusp(build: Build) -> None:
 
 
 @pytest.mark.parametrize("height", ["1/1000", "1/100"])
-def test_a_very_flat_bowl(height: str, build: Build) -> None:
+def test_a_very_flat_bowl(height: str, built: Build) -> None:
     """On z = x**20 a body takes up to 10**26 s to the other side, as the beta function says."""
-    motion = build("flat_bowl", gqm.Curve.graph("x**20", parameter="x"), gqm.Gravity()).solve(height)
+    motion = built("flat_bowl", gqm.Curve.graph("x**20", parameter="x"), gqm.Gravity()).solve(height)
     a, power = mpf(1) / int(height.split("/")[1]), mpf(1) / 20
     half = 2 * a**-9 * mp.sqrt(mp.pi / (2 * G)) * mp.gamma(1 + power) / mp.gamma(mpf(1) / 2 + power)
     assert motion.turning_points == (float(a), -float(a))
@@ -320,12 +305,12 @@ ANGLES = ("pi", "-3*pi", "pi/2", "-pi/2", "pi/3", "2*pi/3", "5*pi/6", "pi/7", "1
 
 
 @pytest.mark.parametrize("alpha", ANGLES)
-def test_an_inclination_means_what_its_text_says(alpha: Any, build: Build) -> None:
+def test_an_inclination_means_what_its_text_says(alpha: Any, built: Build) -> None:
     """Bodies thrown up an incline turn after v0/(g sin(alpha)), and never if the text says that it is level.
 
     The sine of the double nearest to pi is 1.2e-16, and that of pi is 0.
     """
-    module = build("slope", SLOPE, gqm.Gravity())
+    module = built("slope", SLOPE, gqm.Gravity())
     with mp.workdps(300):
         sine = mp.sin(read_number(alpha, where="alpha").at(mp))
         rise = mpf(0) if abs(sine) < mpf(10) ** -200 else sine * G
@@ -342,11 +327,11 @@ def test_an_inclination_means_what_its_text_says(alpha: Any, build: Build) -> No
 
 
 @pytest.mark.parametrize("tilt", ["pi/6", "1/2", 0.5])
-def test_a_single_sine_of_a_parameter(tilt: Any, build: Build) -> None:
+def test_a_single_sine_of_a_parameter(tilt: Any, built: Build) -> None:
     """A bead on a ring whose plane is tilted by an angle is a pendulum with g sin(tilt)."""
     force = gqm.Potential("g*sin(tilt)*z", parameters={"g": "9.81", "tilt": "1/2"})
-    module = build("tilted_ring", gqm.families.circle(L=1), force)
-    plain = build("plain_ring", gqm.families.circle(L=1), gqm.Gravity())
+    module = built("tilted_ring", gqm.families.circle(L=1), force)
+    plain = built("plain_ring", gqm.families.circle(L=1), gqm.Gravity())
     with mp.workdps(30):
         ratio = mp.sqrt(mp.sin(read_number(tilt, where="tilt").at(mp)))
         wanted = float(mpf(plain.solve("6/5").period_to(25)) / ratio)
@@ -356,9 +341,9 @@ def test_a_single_sine_of_a_parameter(tilt: Any, build: Build) -> None:
 
 
 @pytest.mark.parametrize("alpha", ANGLES)
-def test_an_inclination_means_the_same_to_friction(alpha: Any, build: Build) -> None:
+def test_an_inclination_means_the_same_to_friction(alpha: Any, built: Build) -> None:
     """On a level line only friction stops a body, and the way up an incline has a closed form."""
-    module = build("rough_slope", SLOPE, gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))
+    module = built("rough_slope", SLOPE, gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))
     with mp.workdps(50):
         angle = read_number(alpha, where="alpha").at(mp)
         up = 1 if mp.sin(angle) >= 0 else -1

@@ -18,19 +18,6 @@ Vector = np.ndarray[Any, np.dtype[np.float64]]
 INTEGRATED = 3e-11
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("forces_in_space"), {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
 VIVIANI = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter="u")
 
 
@@ -40,13 +27,13 @@ def vectors(found: Any) -> Any:
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1])
-def test_a_frame_that_turns(mu: float, build: Build) -> None:
+def test_a_frame_that_turns(mu: float, built: Build) -> None:
     """Places and the contact force with its Coriolis part are right in both directions of motion, and friction includes
     that part.
     """
     frame = gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")
     force, name = (frame + gqm.CoulombFriction(), "rough_turning") if mu else (frame, "turning")
-    module = build(name, VIVIANI, force)
+    module = built(name, VIVIANI, force)
     numbers = {"mu": mu} if mu else {}
     motion, newton = module.solve(-2, 4, t_max=30, **numbers), Newton(viviani, 1.5, mu)
     turn = motion.legs[0].t_end
@@ -67,11 +54,11 @@ def test_a_frame_that_turns(mu: float, build: Build) -> None:
             assert np.all(np.abs(path.normal_force[~same] - state.normal_force[~same]) > 0.1)
 
 
-def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> None:
+def test_a_frame_that_turns_has_extremes_of_its_contact_force(built: Build) -> None:
     """No state exceeds the extremes of the contact force, and sweeps return the same numbers within two
     roundings.
     """
-    module = build("turning", VIVIANI, gqm.Gravity() + gqm.RotatingFrame(Omega="3/2"))
+    module = built("turning", VIVIANI, gqm.Gravity() + gqm.RotatingFrame(Omega="3/2"))
     motion = module.solve(-2, 4)
     force = motion.state(np.linspace(0.0, motion.period, 2001)).normal_force
     for extreme, told in ((motion.normal_force_max, force.max()), (motion.normal_force_min, force.min())):
@@ -84,13 +71,13 @@ def test_a_frame_that_turns_has_extremes_of_its_contact_force(build: Build) -> N
         module.solve(-2, 4, contact="above")
 
 
-def test_a_hoop_that_turns_is_the_planar_one(build: Build) -> None:
+def test_a_hoop_that_turns_is_the_planar_one(built: Build) -> None:
     """A hoop in a plane through the axis moves as the planar curve; the track also balances the Coriolis force."""
     force = gqm.Gravity() + gqm.RotatingFrame(Omega=2)
     flat = gqm.derive(gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u"), force)
     model = gqm.derive(gqm.Curve.space(x="3/5*sin(u)", y="4/5*sin(u)", z="-cos(u)", parameter="u"), force)
     assert model.speed_squared == flat.speed_squared
-    hoop = build("turning_hoop", model.curve, force).solve("1/2", 1)
+    hoop = built("turning_hoop", model.curve, force).solve("1/2", 1)
     state = hoop.state(np.linspace(0.0, hoop.period, 7))
     # In the plane V**2 + (4*sin(u) - ...) balances; across it the force is 2*Omega*V*dx/ds.
     sideways = 2.0 * 2.0 * state.v * np.cos(state.lam)
@@ -118,13 +105,13 @@ def upright_on(track: Callable[[float], Any], u: float, roll: float) -> Vector:
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.05])
-def test_a_track_that_pushes_upwards_only(mu: float, build: Build) -> None:
+def test_a_track_that_pushes_upwards_only(mu: float, built: Build) -> None:
     """Contact is lost at the place that DOP853 finds, where the contact force has no component along the upward
     direction.
     """
     curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="3*cos(u)", parameter="u", roll="u/10")
     rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/20")
-    module = build("rough_groove", curve, rough) if mu else build("groove", curve, gqm.Gravity())
+    module = built("rough_groove", curve, rough) if mu else built("groove", curve, gqm.Gravity())
     newton = Newton(hill, mu=mu)
 
     def lifts(_: float, state: Vector) -> float:
@@ -162,12 +149,12 @@ def valley(u: float) -> tuple[Any, Any, Any]:
 
 
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 8.0, 1, 2), (1.2, 6.7, -1, 1)])
-def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way: int, legs: int, build: Build) -> None:
+def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way: int, legs: int, built: Build) -> None:
     """In a frame that turns contact is lost on the way on which the Coriolis force lifts the body, although the other
     way, with the same speeds, it is kept.
     """
     curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter="u", roll="pi/3")
-    module = build("turning_groove", curve, gqm.Gravity() + gqm.RotatingFrame(Omega="1/2"))
+    module = built("turning_groove", curve, gqm.Gravity() + gqm.RotatingFrame(Omega="1/2"))
     newton = Newton(valley, 0.5)
 
     def lifts(_: float, state: Vector) -> float:
@@ -195,13 +182,13 @@ TURNING_VALLEY = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter
 
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 10.0, 1, 2), (1.2, 6.7, -1, 1)])
 def test_a_rough_track_that_turns_and_pushes_upwards_only(
-    lam0: float, v0: float, way: int, legs: int, build: Build
+    lam0: float, v0: float, way: int, legs: int, built: Build
 ) -> None:
     """With friction, contact is lost where DOP853 finds it, and the energy lost until then is right; a force that other
     losses leave linear in V**2 is seen to vanish as well.
     """
     frame = gqm.Gravity() + gqm.RotatingFrame(Omega="1/2")
-    rough = build("rough_turning_groove", TURNING_VALLEY, frame + gqm.CoulombFriction(mu="1/50"))
+    rough = built("rough_turning_groove", TURNING_VALLEY, frame + gqm.CoulombFriction(mu="1/50"))
     newton = Newton(valley, 0.5, 0.02)
 
     def lifts(_: float, state: Vector) -> float:
@@ -228,10 +215,10 @@ def test_a_rough_track_that_turns_and_pushes_upwards_only(
     assert motion.state(motion.t_end).n_vertical == pytest.approx(0.0, abs=1e-11)
 
 
-def test_drag_on_a_track_that_turns_and_pushes_upwards_only(build: Build) -> None:
+def test_drag_on_a_track_that_turns_and_pushes_upwards_only(built: Build) -> None:
     """Drag leaves the law linear in V**2, but not the component of N that decides about contact."""
     frame = gqm.Gravity() + gqm.RotatingFrame(Omega="1/2")
-    module = build("dragged_turning_groove", TURNING_VALLEY, frame + gqm.QuadraticDrag(b="1/100"))
+    module = built("dragged_turning_groove", TURNING_VALLEY, frame + gqm.QuadraticDrag(b="1/100"))
     for way in (1, -1):
         start = (0.1, 10.0) if way > 0 else (1.2, 6.5)
         motion = module.solve(*start, way, contact="above", t_max=30)
@@ -242,23 +229,23 @@ def test_drag_on_a_track_that_turns_and_pushes_upwards_only(build: Build) -> Non
         assert state.n_vertical[-1] == pytest.approx(0.0, abs=1e-11)
 
 
-def test_a_ball_on_a_banked_track(build: Build) -> None:
+def test_a_ball_on_a_banked_track(built: Build) -> None:
     """The path of the centre, banked with the radius as heartline, has a line of contact and energy without slip."""
     curve = gqm.Curve.space(x="2*cos(u)", y="2*sin(u)", z="-u/2", parameter="u", roll="pi/6", heartline="1/10")
-    state = build("ball", curve, gqm.Gravity() + gqm.Rolling(beta="2/5")).solve(0, 1).state(np.linspace(0.0, 2.0, 5))
+    state = built("ball", curve, gqm.Gravity() + gqm.Rolling(beta="2/5")).solve(0, 1).state(np.linspace(0.0, 2.0, 5))
     assert state.v2 == pytest.approx(1.0 - 2.0 * 9.81 / 1.4 * state.z, rel=4e-15)
     gap = np.stack([state.x - state.track_x, state.y - state.track_y, state.z - state.track_z])
     assert np.linalg.norm(gap, axis=0) == pytest.approx(np.full(5, 0.1), rel=1e-13)
 
 
-def test_random_space_curves_with_friction(build: Build) -> None:
+def test_random_space_curves_with_friction(built: Build) -> None:
     """On twelve curves, places, speeds, contact forces and the energy lost to friction are right up to the first
     turn.
     """
     curve = gqm.Curve.space(
         x="a*cos(u) + b*sin(2*u)", y="c*sin(u) + d*cos(2*u)", z="h*cos(u + f) + k*sin(3*u)", parameter="u"
     )
-    module = build("random_rough", curve, gqm.Gravity() + gqm.CoulombFriction())
+    module = built("random_rough", curve, gqm.Gravity() + gqm.CoulombFriction())
     rng = np.random.default_rng(21)
     for _ in range(12):
         a, c = rng.uniform(1.0, 4.0, 2)
@@ -285,9 +272,9 @@ def test_random_space_curves_with_friction(build: Build) -> None:
         assert motion.energy(times).lost == pytest.approx(truth[2], abs=INTEGRATED * 10)
 
 
-def test_sides_that_nothing_tells_are_refused(build: Build) -> None:
+def test_sides_that_nothing_tells_are_refused(built: Build) -> None:
     """If nothing determines the sides of a track, one error says what to declare."""
-    module = build(
+    module = built(
         "coordinated_hill", gqm.Curve.space(x="u", y="u**2", z="u**3", parameter="u", roll="coordinated"), gqm.Gravity()
     )
     with pytest.raises(LaunchError, match="declare the upward direction"):

@@ -21,19 +21,6 @@ VIVIANI = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter=
 FRAME = gqm.Gravity() + gqm.RotatingFrame()
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("turning_frames"), {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
 class Truth:
     """A body on Viviani's curve in a frame that turns, without losses, in mpmath; ``way`` is the sign of ds/dt."""
 
@@ -107,9 +94,9 @@ GIVEN = {"lam0": -2, "v0": 4, "Omega": 1.5, "g": 9.81, "m": 2}
 # With 1/10 the least force is passed so close to a turn that it is sought in time.
 @pytest.mark.parametrize("omega", [1.5, -1.5, 0.25, 0.1])
 @pytest.mark.parametrize("quantity", ["normal_force_max", "normal_force_min"])
-def test_extremes(quantity: str, omega: float, build: Build) -> None:
+def test_extremes(quantity: str, omega: float, built: Build) -> None:
     """The derivatives of the extremes of the contact force are right to 12 digits."""
-    module, given = build("turning", VIVIANI, FRAME), {**GIVEN, "Omega": omega}
+    module, given = built("turning", VIVIANI, FRAME), {**GIVEN, "Omega": omega}
     motion = module.solve(**given)
     found, extreme = motion.gradient(quantity), getattr(motion, quantity)
     way = int(np.sign(motion.state(extreme.t).v))
@@ -120,9 +107,9 @@ def test_extremes(quantity: str, omega: float, build: Build) -> None:
             assert slope == pytest.approx(truth, rel=1e-12, abs=1e-12 * abs(extreme.value)), name
 
 
-def test_sweeps_have_the_same(build: Build) -> None:
+def test_sweeps_have_the_same(built: Build) -> None:
     """Swept derivatives of extremes are those of single motions."""
-    module = build("turning", VIVIANI, FRAME)
+    module = built("turning", VIVIANI, FRAME)
     swept = module.sweep("normal_force_max", lam0=-2, v0=[3.0, 4.0], Omega=1.5, gradient=("v0", "Omega"))
     for k, v0 in enumerate((3.0, 4.0)):
         single = module.solve(-2, v0, Omega=1.5).gradient("normal_force_max", ("v0", "Omega"))
@@ -130,9 +117,9 @@ def test_sweeps_have_the_same(build: Build) -> None:
 
 
 @pytest.mark.parametrize("way", [1, -1])
-def test_sensitivities(way: int, build: Build) -> None:
+def test_sensitivities(way: int, built: Build) -> None:
     """The change of the contact force at a given time is right to 12 digits in both directions of motion."""
-    module = build("turning", VIVIANI, FRAME)
+    module = built("turning", VIVIANI, FRAME)
     motion, t = module.solve(**GIVEN, direction=way), 0.2
     found, lam = motion.sensitivity(t), float(motion.state(t).lam)
     with mp.workdps(40):
@@ -146,12 +133,12 @@ def test_sensitivities(way: int, build: Build) -> None:
 
 
 @pytest.mark.parametrize("lossy", [False, True])
-def test_along_a_chart(lossy: bool, build: Build) -> None:
+def test_along_a_chart(lossy: bool, built: Build) -> None:
     """Along the same curve without its formulas the derivatives are the same."""
     curve = gqm.Curve.space(x="1 + cos(u)", y="sin(u)", z="2*sin(u/2)", parameter="u", domain=("-2*pi", "2*pi"))
     force = FRAME + gqm.CoulombFriction() if lossy else FRAME
-    known = build(f"known_{lossy}", curve, force)
-    charted = build(f"charted_{lossy}", curve.in_arc_length(), force)
+    known = built(f"known_{lossy}", curve, force)
+    charted = built(f"charted_{lossy}", curve.in_arc_length(), force)
     numbers = {"Omega": 1.5, "m": 2, **({"mu": 0.05} if lossy else {})}
     start = float(mp.quad(lambda u: mp.sqrt(1 + mp.cos(u / 2) ** 2), [-2 * mp.pi, -2]))
     one, other = known.solve(-2, 4, t_max=30, **numbers), charted.solve(start, 4, t_max=30, **numbers)
@@ -165,11 +152,11 @@ def test_along_a_chart(lossy: bool, build: Build) -> None:
         assert slopes[1] == pytest.approx(slopes[0], rel=1e-9, abs=1e-10)
 
 
-def test_with_friction(build: Build) -> None:
+def test_with_friction(built: Build) -> None:
     """With friction the change of the contact force agrees with differences of Newton's law, followed by DOP853 up to
     the first turn.
     """
-    module = build("rough_turning", VIVIANI, FRAME + gqm.CoulombFriction())
+    module = built("rough_turning", VIVIANI, FRAME + gqm.CoulombFriction())
     given = {**GIVEN, "mu": 0.1}
     motion, t = module.solve(**given), 0.4
     found = motion.sensitivity(t)

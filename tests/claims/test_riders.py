@@ -100,30 +100,17 @@ def test_closed_forms_against_newton(roll: str, lossy: bool) -> None:
 
 
 @pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ModuleType]:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("riders"), {}
-
-    def module(name: str, curve: gqm.Curve, force: gqm.Kernel) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
-@pytest.fixture(scope="module")
-def rough(build: Callable[..., ModuleType]) -> ModuleType:
+def rough(built: Callable[..., ModuleType]) -> ModuleType:
     """Return the track above with friction and drag, banked by an angle."""
     curve = gqm.Curve.space(**WAY, roll=ROLLS["angle"], heartline="0.9")
-    return build("rough", curve, gqm.Gravity() + gqm.CoulombFriction(mu="1/50") + gqm.QuadraticDrag(b="1/200"))
+    return built("rough", curve, gqm.Gravity() + gqm.CoulombFriction(mu="1/50") + gqm.QuadraticDrag(b="1/200"))
 
 
 @pytest.fixture(scope="module")
-def loop(build: Callable[..., ModuleType]) -> ModuleType:
+def loop(built: Callable[..., ModuleType]) -> ModuleType:
     """Return a vertical loop of radius R that begins at its bottom."""
     curve = gqm.Curve.space(x="R*sin(u)", y="0", z="-R*cos(u)", parameter="u", roll="coordinated", parameters={"R": 7})
-    return build("loop", curve, gqm.Gravity())
+    return built("loop", curve, gqm.Gravity())
 
 
 def test_states_of_a_rough_track(rough: ModuleType) -> None:
@@ -212,10 +199,10 @@ def test_levels_along_legs(rough: ModuleType) -> None:
         assert above.total == pytest.approx(np.mean(values > level) * 12.0, abs=6e-4 * (crossings + 1))
 
 
-def test_the_banking_of_a_helix(build: Callable[..., ModuleType]) -> None:
+def test_the_banking_of_a_helix(built: Callable[..., ModuleType]) -> None:
     """On a helix the curvature is horizontal, so that the banking is atan(kappa V**2/(g cos(slope)))."""
     curve = gqm.Curve.space(x="5*cos(u)", y="5*sin(u)", z="-3*u", parameter="u", roll="coordinated", heartline="h")
-    module = build("helix_ride", curve, gqm.Gravity())
+    module = built("helix_ride", curve, gqm.Gravity())
     motion = module.solve(0, 4, h="9/10", t_max=9)
     state = motion.state(np.array([0.0, 2.0, 8.5]))
     kappa, slope = 5.0 / 34.0, np.arctan2(3.0, 5.0)
@@ -227,7 +214,7 @@ def test_the_banking_of_a_helix(build: Callable[..., ModuleType]) -> None:
     assert offset == pytest.approx(0.9 * force, abs=1e-13)
 
 
-def test_a_leaning_rider_in_a_vertical_plane(build: Callable[..., ModuleType]) -> None:
+def test_a_leaning_rider_in_a_vertical_plane(built: Callable[..., ModuleType]) -> None:
     """The force is along the normal of the plane, so that a roll to the left gives it a component to the right."""
     curve = gqm.Curve.space(x="u", y="0", z="u**2/2", parameter="u", roll="psi")
     model = gqm.derive(curve, gqm.Gravity())
@@ -259,7 +246,7 @@ def test_what_is_no_banking_is_refused(ask: Callable[[], object], message: str) 
         ask()
 
 
-def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., ModuleType]) -> None:
+def test_bad_questions_about_loads(loop: ModuleType, built: Callable[..., ModuleType]) -> None:
     """Loads, levels, sides and limits that do not exist are refused, and so is a roll angle where the tangent is
     vertical.
     """
@@ -279,7 +266,7 @@ def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., Module
     upright = gqm.Curve.space(x="sin(u)", y="u**3", z="-cos(u)", parameter="u", roll=0)
     tall = gqm.Curve.space(x="u**2", y="u**3", z="u", parameter="u", roll="1/3")
     assert gqm.derive(upright, gqm.Gravity()).rider is not None
-    module = build("tall", tall, gqm.Gravity())
+    module = built("tall", tall, gqm.Gravity())
     with pytest.raises(SolutionError, match=r"roll: the tangent is vertical at u = 0\.0"):
         module.pass1([0.5, 0.0], lam0=0, v0=1)
     with pytest.raises(InputError, match="gradient: there is none of n_vertical_max"):

@@ -18,24 +18,11 @@ STANDARD_GRAVITY = 9.80665
 VIVIANI = {"x": "1 + cos(u)", "y": "sin(u)", "z": "2*sin(u/2)", "parameter": "u"}
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("rolling_in_space"), {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
-def test_on_a_helix_the_centre_moves_along_a_helix(build: Build) -> None:
+def test_on_a_helix_the_centre_moves_along_a_helix(built: Build) -> None:
     """The centre falls with a constant acceleration along a helix of the same pitch and another radius."""
     radius, pitch, roll, rho = mp.mpf(2), mp.mpf("-0.5"), mp.pi / 6, mp.mpf("0.1")
     curve = gqm.Curve.space(x="2*cos(u)", y="2*sin(u)", z="-u/2", parameter="u", roll="pi/6")
-    motion = build("helix_ball", curve, BALL).solve(0, 1, rho="0.1")
+    motion = built("helix_ball", curve, BALL).solve(0, 1, rho="0.1")
     size = mp.sqrt(radius**2 + pitch**2)
     # In polar coordinates the horizontal direction to the left is inwards.
     outwards, onwards = -mp.sin(roll), -pitch / size * mp.cos(roll)
@@ -53,9 +40,9 @@ def test_on_a_helix_the_centre_moves_along_a_helix(build: Build) -> None:
         assert [state.track_x, state.track_y, state.track_z] == pytest.approx(on_track, rel=1e-13, abs=1e-13)
 
 
-def test_it_is_the_declared_path_of_the_centre(build: Build) -> None:
+def test_it_is_the_declared_path_of_the_centre(built: Build) -> None:
     """Along Viviani's curve the answers are those along the path of the centre, declared by hand."""
-    tracked = build("viviani_ball", gqm.Curve.space(**VIVIANI, roll=0), BALL)
+    tracked = built("viviani_ball", gqm.Curve.space(**VIVIANI, roll=0), BALL)
     across = "sqrt(1 + cos(u/2)**2)"
     centre = gqm.Curve.space(
         x=f"1 + cos(u) + rho*cos(u/2)*sin(u)/{across}",
@@ -63,7 +50,7 @@ def test_it_is_the_declared_path_of_the_centre(build: Build) -> None:
         z=f"2*sin(u/2) + rho/{across}",
         parameter="u",
     )
-    declared = build("viviani_centre", centre, gqm.Gravity() + gqm.Rolling(beta="2/5"))
+    declared = built("viviani_centre", centre, gqm.Gravity() + gqm.Rolling(beta="2/5"))
     one, other = (module.solve(-2, 3, rho="0.05") for module in (tracked, declared))
     assert one.period == pytest.approx(other.period, rel=2e-15)
     states = [motion.state(np.linspace(0.0, 3.0 * one.period, 31)) for motion in (one, other)]
@@ -106,10 +93,10 @@ def derivative(of: Callable[[Any], Any], u: Any, order: int = 1) -> Any:
 
 @pytest.mark.parametrize(("written", "track", "roll"), TRACKS)
 def test_forces_by_the_definition(
-    written: dict[str, str], track: Callable[[Any], Any], roll: Callable[[Any], Any], build: Build
+    written: dict[str, str], track: Callable[[Any], Any], roll: Callable[[Any], Any], built: Build
 ) -> None:
     """Place, energy, contact force and the loads along the direction to the centre are right to 13 digits."""
-    module = build("ball_" + written["roll"].replace("/", "_over_"), gqm.Curve.space(**written, parameter="u"), BALL)
+    module = built("ball_" + written["roll"].replace("/", "_over_"), gqm.Curve.space(**written, parameter="u"), BALL)
     rho, lam0 = mp.mpf("0.1"), mp.mpf("0.3")
 
     def upwards(u: Any) -> Any:
@@ -141,10 +128,10 @@ def test_forces_by_the_definition(
             assert on_track == pytest.approx([*map(float, track(u))], rel=1e-13, abs=1e-13)
 
 
-def test_rates_of_loads(build: Build) -> None:
+def test_rates_of_loads(built: Build) -> None:
     """The rates of the loads are the differences of the loads."""
     written = TRACKS[0][0]
-    module = build("ball_u_over_3", gqm.Curve.space(**written, parameter="u"), BALL)
+    module = built("ball_u_over_3", gqm.Curve.space(**written, parameter="u"), BALL)
     motion = module.solve(0.3, 1, rho="0.1")
     before, here, after = (motion.state(0.5 + step) for step in (-1e-5, 0.0, 1e-5))
     for name in ("vertical", "lateral", "longitudinal"):
@@ -152,10 +139,10 @@ def test_rates_of_loads(build: Build) -> None:
         assert getattr(here, f"onset_{name}") == pytest.approx(rate, rel=1e-6, abs=1e-8)
 
 
-def test_contact_is_lost_where_the_track_no_longer_pushes(build: Build) -> None:
+def test_contact_is_lost_where_the_track_no_longer_pushes(built: Build) -> None:
     """On a crest a ball that only lies on the track leaves it where the load along its upward direction vanishes."""
     curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="3*cos(u)", parameter="u", roll="0")
-    module = build("crest_ball", curve, BALL)
+    module = built("crest_ball", curve, BALL)
     motion = module.solve(-3, 30, contact="above", rho="0.2")
     assert [event.kind for event in motion.events] == ["liftoff"]
     assert motion.state(motion.t_end).n_vertical == pytest.approx(0.0, abs=1e-12)
@@ -163,10 +150,10 @@ def test_contact_is_lost_where_the_track_no_longer_pushes(build: Build) -> None:
     assert before.n_vertical.min() > 0.0
 
 
-def test_in_a_vertical_plane_it_is_the_planar_one(build: Build) -> None:
+def test_in_a_vertical_plane_it_is_the_planar_one(built: Build) -> None:
     """An upright track in a vertical plane gives the answers of the planar curve."""
-    space = build("plane_ball", gqm.Curve.space(x="u", y="0", z="u**2", parameter="u", roll=0), BALL)
-    plane = build("graph_ball", gqm.Curve.graph("x**2"), BALL)
+    space = built("plane_ball", gqm.Curve.space(x="u", y="0", z="u**2", parameter="u", roll=0), BALL)
+    plane = built("graph_ball", gqm.Curve.graph("x**2"), BALL)
     one, other = space.solve(0.3, 1, rho="0.1"), plane.solve(0.3, 1, rho="0.1")
     assert one.period == pytest.approx(other.period, rel=4e-16)
     assert one.state(1.0).normal_force == pytest.approx(other.state(1.0).normal_force, rel=1e-14)
@@ -175,11 +162,11 @@ def test_in_a_vertical_plane_it_is_the_planar_one(build: Build) -> None:
 COIL = {"yaw": "1/8", "pitch": "1/50", "length": 20}
 
 
-def test_along_pieces_the_declared_line_is_the_path_of_the_centre(build: Build) -> None:
+def test_along_pieces_the_declared_line_is_the_path_of_the_centre(built: Build) -> None:
     """A rail whose heartline is the radius of the body needs nothing derived."""
     rail = gqm.Curve.piecewise([gqm.transition(**COIL)], roll=0, heartline="1/10")
-    with_radius = build("rail_ball", rail, gqm.Gravity() + gqm.Rolling(beta="2/5", radius="1/10"))
-    without = build("rail_bead", rail, gqm.Gravity() + gqm.Rolling(beta="2/5"))
+    with_radius = built("rail_ball", rail, gqm.Gravity() + gqm.Rolling(beta="2/5", radius="1/10"))
+    without = built("rail_bead", rail, gqm.Gravity() + gqm.Rolling(beta="2/5"))
     states = [module.solve(0, 20).state(0.5) for module in (with_radius, without)]
     assert states[0] == states[1]
 

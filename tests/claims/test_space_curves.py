@@ -35,19 +35,6 @@ def derived(row: dict[str, Any]) -> gqm.Model:
     return gqm.derive(gqm.Curve.space(x=x, y=y, z=z, parameter="u"), force)
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("space"), {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
 @pytest.mark.parametrize("name", ROWS)
 def test_closed_forms_of_the_twelve(name: str) -> None:
     """Closed forms of the twelve give V**2 and the contact force, along each axis and in length, to 30 digits."""
@@ -67,14 +54,14 @@ def test_closed_forms_of_the_twelve(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*BUILT, "viviani"])
-def test_motions_of_some_of_the_twelve(name: str, build: Build) -> None:
+def test_motions_of_some_of_the_twelve(name: str, built: Build) -> None:
     """Periods are right to half an ulp, turning points to one, and contact forces to some roundings of their terms."""
     row, model = ROWS[name], None
     if name == "viviani":
         module = generated.viviani
     else:
         model = derived(row)
-        module = build(name, model.curve, model.force)
+        module = built(name, model.curve, model.force)
     expected, launch = row["expected"], row["launch"]
     motion = module.solve(launch["lam0"], launch["v0"])
     assert motion.kind == expected["kind"]
@@ -117,10 +104,10 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
     assert (data.y.item(), data.normal_y.item(), data.y.units) == (one.y, one.normal_y, "m")
 
 
-def test_states_of_laps_and_of_legs_in_space(build: Build) -> None:
+def test_states_of_laps_and_of_legs_in_space(built: Build) -> None:
     """After a thousand laps the body is still on the curve; along legs, states at one time are those at many."""
     model = derived(ROWS["saddle_lap"])
-    motion = build("saddle_lap", model.curve, model.force).solve("1", "5")
+    motion = built("saddle_lap", model.curve, model.force).solve("1", "5")
     late = motion.state(1000.4 * motion.period)
     assert late.x**2 + late.y**2 == pytest.approx(1.0, rel=4e-16)
     assert late.z == pytest.approx((late.x**2 - late.y**2) / 2, abs=4e-16)
@@ -169,13 +156,13 @@ def test_a_helix_with_friction() -> None:
 
 
 @pytest.mark.parametrize("mu", ["0.2", "0"])
-def test_sweeps_of_a_helix_in_pieces(mu: str, build: Build) -> None:
+def test_sweeps_of_a_helix_in_pieces(mu: str, built: Build) -> None:
     """Along a rail of many pieces of a helix, with friction or with drag alone, sweeps agree with the closed forms."""
     curvature, pieces = "cos(1/2)**2/2", 40
     piece = gqm.transition(length="3/10", yaw=curvature, roll="cos(1/2)*sin(1/2)/2")
     rail = gqm.Curve.piecewise([piece] * pieces, start=("0", "0", "0"), heading=("0", "-1/2"))
     force = gqm.Gravity() + (gqm.CoulombFriction() if mu != "0" else gqm.QuadraticDrag(b="1/10"))
-    module = build(f"helix_in_pieces_{mu[-1]}", rail, force)
+    module = built(f"helix_in_pieces_{mu[-1]}", rail, force)
     given = {"mu": float(mu)} if mu != "0" else {}
     cosine, kappa = np.cos(0.5), np.cos(0.5) ** 2 / 2
     with mp.workdps(30):
@@ -201,14 +188,14 @@ def test_sweeps_of_a_helix_in_pieces(mu: str, build: Build) -> None:
 
 
 @pytest.mark.parametrize("force", [gqm.CoulombFriction(), gqm.QuadraticDrag(b="1/20")])
-def test_a_length_that_almost_vanishes_is_not_negative(force: gqm.Kernel, build: Build) -> None:
+def test_a_length_that_almost_vanishes_is_not_negative(force: gqm.Kernel, built: Build) -> None:
     """On a vertical part of a rail N is zero, and its square has few digits beside that; further on a body begins with
     the contact force of its weight.
     """
     bend = {"yaw": "1/10", "pitch": "pi/8"}
     pieces = [gqm.transition(length="1"), gqm.transition(length="4", **bend), gqm.transition(length="1")]
     rail = gqm.Curve.piecewise(pieces, start=("0", "0", "4"), heading=("0", "-pi/2"))
-    module = build(f"vertical_part_{force.drag != 0}", rail, gqm.Gravity() + force)
+    module = built(f"vertical_part_{force.drag != 0}", rail, gqm.Gravity() + force)
     given = {} if force.drag else {"mu": 0.05}
     launches = np.linspace(0.5, 1.5, 11)
     swept = module.sweep("normal_force_min", launches, 0.0, t_max=1.0, **given).values
@@ -253,9 +240,9 @@ def dop853(mu: float, b: float, lam0: float, v0: float, times: list[float]) -> A
     return solve_ivp(slopes, (0.0, max(times)), start, method="DOP853", rtol=1e-13, atol=1e-14, t_eval=times)
 
 
-def test_friction_and_drag_against_dop853(build: Build) -> None:
+def test_friction_and_drag_against_dop853(built: Build) -> None:
     """The place, V**2, and the work of friction and drag agree with DOP853 through a turn."""
-    module = build("rough_viviani", generated_curve(), gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag())
+    module = built("rough_viviani", generated_curve(), gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag())
     motion = module.solve(-2.0, 4.0, mu=0.1, b=0.02, t_max=20)
     turn = motion.legs[0].t_end
     # DOP853 cannot pass the jump of friction at a turn, so that it is asked for times before the first.
@@ -372,9 +359,9 @@ def test_sweeps_of_a_space_curve() -> None:
     assert rough.values == pytest.approx(found, rel=1e-13)
 
 
-def test_drag_without_friction_on_a_space_curve(build: Build) -> None:
+def test_drag_without_friction_on_a_space_curve(built: Build) -> None:
     """On a helix V**2 tends to g sin/(b/m) exponentially; the contact force of a sweep is that of the motions."""
-    module = build("dragged_helix", gqm.families.helix(R=2, c=-1), gqm.Gravity() + gqm.QuadraticDrag(b="1/10"))
+    module = built("dragged_helix", gqm.families.helix(R=2, c=-1), gqm.Gravity() + gqm.QuadraticDrag(b="1/10"))
     motion = module.solve(0, 0, t_max=10)
     slope, size = 1.0 / np.sqrt(5.0), np.sqrt(5.0)
     state = motion.state(np.array([0.5, 2.0, 9.0]))
@@ -492,9 +479,9 @@ def test_a_central_force_in_space() -> None:
         gqm.derive(gqm.families.circle(), gqm.CentralForce(centre=(0, 2, 0)))
 
 
-def test_droplet_on_a_helix(build: Build) -> None:
+def test_droplet_on_a_helix(built: Build) -> None:
     """The resistance is constant, so that both legs are those of a body on an incline, until it rests."""
-    module = build("droplet_on_helix", gqm.families.helix(R="2", c="3/4"), gqm.Gravity() + gqm.SurfaceTension())
+    module = built("droplet_on_helix", gqm.families.helix(R="2", c="3/4"), gqm.Gravity() + gqm.SurfaceTension())
     rate = mp.sqrt(4 + mpf(9) / 16)
     pull, drag = mpf("9.81") * mpf(3) / 4 / rate, mpf("0.07") * 9 * 2 / rate**2
     motion = module.solve(0, v0=4, gamma="0.07", ell_c=3, t_max=3)

@@ -6,7 +6,8 @@ cancel. Roundings count as independent, and those of what does not depend on the
 digits may have cancelled. Variances are in units of the square of a typical rounding error (`operations.ROUNDING`).
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from gqm_sym.runtime.double_double import interpreter
@@ -24,6 +25,14 @@ SLOPES = {
     (SINC_PAIR, 3): SECOND,
     (SINC_PAIR, 4): THIRD,
     (SINC_PAIR, 5): THIRD,
+}
+
+# The relative changes of the results of operations by those of their operands, where they are constants.
+MULTIPLES: dict[int, tuple[Fraction, ...]] = {
+    interpreter.MULTIPLY: (Fraction(1), Fraction(1)),
+    interpreter.DIVIDE: (Fraction(1), Fraction(-1)),
+    interpreter.SQUARE_ROOT: (Fraction(1, 2),),
+    interpreter.ABSOLUTE: (Fraction(1),),
 }
 
 # Factors by which a product is exact.
@@ -58,37 +67,102 @@ def _alone(terms: Sequence[Terms]) -> list[int]:
 
 def _variance(op: LaneRecorder, wanted: int) -> TapeNumber:
     """Return the variance of one register: the sum of the squares of the changes by all roundings on the way to it."""
-    total, adjoints = op.number(0), {wanted: op.number(1)}
+    ways = _Ways(op, wanted)
+    shares, uncertain = defaultdict[int, Fraction](Fraction), list[TapeNumber]()
     for k in range(wanted, -1, -1):
-        if k not in adjoints:
+        if not ways.lead_from(k):
             continue
-        adjoint = adjoints[k]
         if not op.depends(k):
             if k in op.uncertain:
-                total = _with_square(total, adjoint * op.error_bound(k))
+                uncertain.append(ways.slope(k) * op.error_bound(k))
             continue
-        if not _is_exact(op, k):
-            total = _with_square(total, adjoint * op.at(k))
-        for operand, partial in _partials(op, k):
-            part = adjoint * partial
-            adjoints[operand] = adjoints[operand] + part if operand in adjoints else part
-    return total
+        share, base = ways.change(k)
+        if share and not _is_exact(op, k):
+            shares[op.register(base)] += share * share
+        ways.follow(k)
+    found = [_square(op.at(register)) * share for register, share in shares.items()]
+    return sum([*found, *map(_square, uncertain)], op.number(0))
 
 
-def _with_square(total: TapeNumber, change: TapeNumber) -> TapeNumber:
-    """Return a sum with the square of one more change."""
-    return change * change if total.known == 0 else total + change * change
+def _square(number: TapeNumber) -> TapeNumber:
+    """Return the square of a number."""
+    return number * number
 
 
-def _partials(op: LaneRecorder, k: int) -> list[tuple[int, TapeNumber]]:
-    """Return the operands of an entry, each with the entry's partial derivative by it; of those that are not on the
-    tape, with the absolute value of that at 0.
+class _Ways:
+    """The ways on which changes of registers lead to one of them, found from its operations back to its operands.
+
+    A relative change of one factor changes the result as much as the same relative change of the product does. So most
+    changes are multiples of others, and take no operation; the derivatives by registers are recorded where they are
+    needed.
+
+    Parameters
+    ----------
+    op : LaneRecorder
+        The tape.
+    wanted : int
+        The register that changes.
+    """
+
+    def __init__(self, op: LaneRecorder, wanted: int) -> None:
+        self._op = op
+        self._slopes = {wanted: op.number(1)}
+        # For each register, the operations on it with its partial derivatives, and changes as multiples of others.
+        self._uses = defaultdict[int, list[tuple[int, TapeNumber]]](list)
+        self._changes = defaultdict[int, dict[int, Fraction]](dict)
+        self._changes[wanted] = {wanted: Fraction(1)}
+
+    def lead_from(self, k: int) -> bool:
+        """Return whether a way leads from a register."""
+        return k in self._slopes or k in self._uses
+
+    def slope(self, k: int) -> TapeNumber:
+        """Return the derivative by a register."""
+        if k not in self._slopes:
+            self._slopes[k] = sum((self.slope(use) * by for use, by in self._uses[k]), self._op.number(0))
+        return self._slopes[k]
+
+    def change(self, k: int) -> tuple[Fraction, TapeNumber]:
+        """Return the derivative by a register times the number in it, as a multiple of another number."""
+        op, parts = self._op, {base: share for base, share in self._changes[k].items() if share}
+        if len(parts) != 1:
+            total = sum((op.at(base) * share for base, share in parts.items()), op.number(0))
+            parts = {} if total.known == 0 else {op.register(total): Fraction(1)}
+            self._changes[k] = parts
+        base, share = next(iter(parts.items()), (k, Fraction(0)))
+        return share, op.at(base)
+
+    def follow(self, k: int) -> None:
+        """Let ways lead to a register from its operands."""
+        op, (share, base) = self._op, self.change(k)
+        for operand, partial, multiple in _partials(op, k):
+            self._uses[operand].append((k, partial))
+            if not op.depends(operand):
+                continue
+            number, part = base, share
+            if multiple is None:
+                number, part = self.slope(k) * partial * op.at(operand), Fraction(1)
+            else:
+                part = share * multiple
+            changes, register = self._changes[operand], op.register(number)
+            changes[register] = changes.get(register, Fraction(0)) + part
+
+
+def _partials(op: LaneRecorder, k: int) -> Iterator[tuple[int, TapeNumber, Fraction | None]]:
+    """Yield the operands of an entry, each with the entry's partial derivative by it, and the relative change of the
+    entry by one of the operand if that is a constant (otherwise None).
+
+    Of partial derivatives that are not on the tape, the absolute value at 0 is taken.
     """
     base, which = op.base(k)
     code, *operands = op.entries[base]
     if (code, which) in SLOPES:
-        return [(operand, op.number(SLOPES[code, which])) for operand in operands]
-    return list(partials(op, k))
+        for operand in operands:
+            yield operand, op.number(SLOPES[code, which]), None
+        return
+    multiples = MULTIPLES.get(code, (None, None))
+    for (operand, partial), multiple in zip(partials(op, k), multiples, strict=False):
+        yield operand, partial, multiple
 
 
 def _is_exact(op: LaneRecorder, k: int) -> bool:
