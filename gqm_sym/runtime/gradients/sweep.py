@@ -213,8 +213,8 @@ def _extreme_gradients(formulas: Formulas, quantity: str, launches: Launches, va
     found = np.full((len(table), table.shape[1]), nan)
     if circulates.any():
         assert formulas.domain_of is not None
-        laps = np.broadcast_to(formulas.domain_of(ARRAYS, tuple(launches.given.T))[2], circulates.shape)
-        begins = launches.given[:, -2]
+        laps = np.broadcast_to(formulas.domain_of(ARRAYS, tuple(launches.lines))[2], circulates.shape)
+        begins = np.broadcast_to(launches.lines[-2], circulates.shape)
         table[circulates, -2:] = np.stack([begins, begins + laps], axis=1)[circulates]
 
     def work(part: slice) -> None:

@@ -326,7 +326,8 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     width = expected_width(body)
     blocks, branch = blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
     # Along a chart, legs are followed by other data.
-    has_kinks = dissipation.kinked and dissipation.linear and joints.breaks.size == 0
+    may_divide = dissipation.kinked or dissipation.squared_contact != 0
+    has_kinks = may_divide and dissipation.linear and joints.breaks.size == 0
     kinks = body[KINKS : KINKS + (ROOM_FOR_KINKS if has_kinks else 1)]
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:

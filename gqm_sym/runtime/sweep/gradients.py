@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError
+from gqm_sym.runtime.compiled.strided import lay_out, widen
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.lanes.launches import launches_of
 from gqm_sym.runtime.gradients.orbit import check_force
@@ -53,37 +54,41 @@ def sweep_with_gradient(
     is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
     is_compiled = quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None
     width = UPPER_END + 1 if is_compiled and quantity in PERIODS else 0
-    found, columns = sweep_with_columns(formulas, quantity, launches, parameters, lam, solve, width)
+    found, table = sweep_with_columns(formulas, quantity, launches, parameters, lam, solve, width)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
     size, shape = found.status.size, (*found.values.shape[found.status.ndim :], len(rows))  # two turning points
-    table = np.empty((len(names), size))
-    by_launch = table.reshape(len(names), *found.status.shape)
-    for row, (value, name) in enumerate(zip(given, names, strict=True)):
-        by_launch[row] = as_doubles(value, name)
+    columns = [widen(as_doubles(value, name), found.status.shape) for value, name in zip(given, names, strict=True)]
+    lines = lay_out(columns, 0, size)
     answered, route = np.flatnonzero(found.status.reshape(-1) == ANSWERED), found.route.reshape(-1)
-    gradient = np.full((size, *shape), nan)
+    slopes, which = None, answered
     if is_compiled:
-        periods = found
         if quantity not in PERIODS:
             width = UPPER_END + 1
-            periods, columns = sweep_with_columns(formulas, "period", launches, parameters, None, solve, width)
-        are_periodic = periods.status.reshape(-1)[answered] == ANSWERED
-        which = answered if are_periodic.all() else answered[are_periodic]
+            periods, table = sweep_with_columns(formulas, "period", launches, parameters, None, solve, width)
+            which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
         some: Any = slice(None) if which.size == size else which
-        ends = columns[some, LOWER_END:]
-        values, launched = found.values.reshape(size, *shape[:-1])[some], table[:, some]
-        _fill_missing_ends(formulas, launched, ends, solve)
-        several = launches_of(formulas, launched[:-2].T, launched[-2], ends)
+        launched = [line if line.size == 1 else line[some] for line in lines]
+        values, ends = found.values.reshape(size, *shape[:-1])[some], table[some, LOWER_END:]
+        several, missing = launches_of(formulas, launched[:-2], launched[-2], ends)
+        if missing:
+            _fill_missing_ends(formulas, launched, ends, solve)
+            several, _ = launches_of(formulas, launched[:-2], launched[-2], ends)
         if which.size:
-            gradient[some] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
+            slopes = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
+    if slopes is not None and which.size == size:
+        gradient = slopes
+    else:
+        gradient = np.full((size, *shape), nan)
+        if slopes is not None:
+            gradient[which] = slopes
     for k in answered[_are_open(gradient, answered)].tolist():
-        *p, lam0, v0, direction, place = table[:, k].tolist()
+        *p, lam0, v0, direction, place = (float(line[k % line.size]) for line in lines)
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
         route[k] = SOLVE
         with suppress(GQMError):
-            slopes = motion.gradient(quantity, tuple(rows), lam=None if lam is None else place)
-            by_name = np.stack(list(slopes.values()), axis=-1)
+            by = motion.gradient(quantity, tuple(rows), lam=None if lam is None else place)
+            by_name = np.stack(list(by.values()), axis=-1)
             falls = quantity == "turning_points" and motion.turning_points[0] > motion.turning_points[1]
             gradient[k] = by_name[::-1] if falls else by_name
     found.route[...] = route.reshape(found.status.shape)
@@ -91,19 +96,16 @@ def sweep_with_gradient(
     return found
 
 
-def _fill_missing_ends(formulas: "Formulas", table: Array, ends: Array, solve: Solve) -> None:
+def _fill_missing_ends(formulas: "Formulas", lines: list[Array], ends: Array, solve: Solve) -> None:
     """Fill the turning points of launches for which batches have found none.
 
-    The rows of ``table`` are the run-time parameters, lam0, v0, the direction and a place.
+    The ``lines`` are the run-time parameters, lam0, v0, the direction and a place.
     """
-    if not np.isnan(ends.sum()):
-        return
     missing = np.flatnonzero(np.isnan(ends).all(axis=1))
-    if missing.size:
-        *parameters, lam0, v0, direction, _ = table[:, missing]
-        ends[missing] = sweep(
-            formulas, "turning_points", LaunchRequest(lam0, v0, direction), tuple(parameters), None, solve
-        ).values
+    *parameters, lam0, v0, direction, _ = (line[missing if line.size > 1 else [0] * missing.size] for line in lines)
+    ends[missing] = sweep(
+        formulas, "turning_points", LaunchRequest(lam0, v0, direction), tuple(parameters), None, solve
+    ).values
 
 
 def _are_open(gradient: Array, answered: NDArray[np.intp]) -> NDArray[np.bool_]:

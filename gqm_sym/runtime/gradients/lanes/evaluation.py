@@ -123,19 +123,20 @@ def take_step(work, position, is_last, lanes, places, found):  # type: ignore[no
 
 @Inner
 def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: ignore[no-untyped-def]
-    """Fill the inputs of the orbits' program from register ``first`` on: both turning points, then their derivatives.
+    """Fill the inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
 
-    The turning points of the launches are improved by some steps of Newton's method.
+    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by
+    some steps of Newton's method.
     """
     places = np.empty((3, BLOCK))
     for program, work in ((ends[0], works[0]), (ends[1], works[1])):
         for k in range(program[3]):
             fill_input(work, k, launches, k, lanes)
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
-    (step, moves), count = ends, launches.shape[1] - 2
+    (step, moves), sides = ends, launches.shape[1] - first
     wanted = moves[4].size
-    for end in range(2):
-        fill_column(places[0], launches, count + end, lanes)
+    for end in range(sides):
+        fill_column(places[0], launches, first + end, lanes)
         places[1:, :] = 0.0
         found = rows_of(target, (first + end) * ROW)
         for number in range(steps):
@@ -145,13 +146,13 @@ def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: igno
             places[2, i] = found[2][i]
         fill_place(moves, works[1], places, lanes)
         for j in range(wanted):
-            source, to = moves[4][j], (first + 2 + end * wanted + j) * ROW
+            source, to = moves[4][j], (first + sides + end * wanted + j) * ROW
             target[to : to + ROW] = works[1][source : source + ROW]
 
 
 @Inner
 def fill_inputs(ends, works, launches, count, steps, lanes, target):  # type: ignore[no-untyped-def]
-    """Fill the inputs of the orbits' program: the first columns of the launches, then what `fill_ends` fills.
+    """Fill the inputs of the orbits' program: so many columns of the launches, then what `fill_ends` fills.
 
     If ``ends`` has no results, the program does not depend on the turning points.
     """
@@ -331,9 +332,9 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
     limits : (int, int, int)
         The number of columns of the launches that are inputs of the program, and the largest numbers of intervals in
         this call and in any call.
-    launches : (m, n + 2) array
-        The n variables of each launch, and its turning points to the accuracy of doubles; for launches from rest, the
-        inputs of the program (`programs.Orbits`).
+    launches : (m, k) array
+        The inputs of the program, and then turning points to the accuracy of doubles if the program needs them
+        (`launches`).
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
     answers : ((m, k) array, (m,) array)

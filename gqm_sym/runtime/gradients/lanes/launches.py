@@ -9,15 +9,24 @@ from numpy.typing import NDArray
 
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.runtime.compiled.intrinsics import nearest_whole
-from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.strided import number_at, pointers
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.formulas import Formulas
 
-# The kinds of librations by their symmetry.
-UNEVEN, EVEN, ABOUT_ONE_AXIS = range(3)
+# The kinds of orbits: librations by their symmetry, and circulations. Those from EVEN on are mirror images of
+# themselves.
+UNEVEN, LAP, EVEN, ABOUT_ONE_AXIS = range(4)
+
+# The layouts of launches as compiled code takes them. The run-time parameters and lam0 are first. From v0 and the
+# change of the energy, which is zero, with both turning points; from the number of the axis and the sign of the
+# launch's distance from it; or from v0, the energy, the number of the axis, and the upper turning point.
+BETWEEN_TURNS, FROM_AXIS, AROUND_AXIS = range(3)
 
 # The largest distance of the middle of an even orbit from its axis of symmetry, as a share of the places.
 EVEN_TOLERANCE = 4.0 * 2.0**-52
+
+COLUMNS, SPANS = types.int64[:, ::1], types.float64[:, :]
 
 
 class Launches(NamedTuple):
@@ -25,81 +34,128 @@ class Launches(NamedTuple):
 
     Attributes
     ----------
-    given : (m, n) array
-        The run-time parameters, lam0 and v0 of each launch.
-    directions : (m,) array
-        The sign of ds/dt at launch.
+    lines : list of arrays
+        The run-time parameters, lam0 and v0: each a vector, or one number that all launches have in common.
+    directions : array
+        The sign of ds/dt at launch, in the same form.
     spans : (m, 2) array
         The turning points of each launch; NaN for a circulation.
-    even : (m,) array
+    kinds : (m,) array
         UNEVEN, or EVEN if the orbit is even about an axis of symmetry, or ABOUT_ONE_AXIS if it also contains no other
-        and is an even number of steps away from the axis whose well has a closed form.
-    from_axis : (m, n + 1) array
-        The run-time parameters and lam0, the number of the axis, and the sign of the launch's distance from it.
+        and is an even number of steps away from the axis whose well has a closed form; LAP for a circulation.
+    axes : pair of arrays
+        A place of symmetry and the distance to the next, in the form of ``lines``; empty if there are none.
     """
 
-    given: Array
+    lines: list[Array]
     directions: Array
     spans: Array
-    even: NDArray[np.int8]
-    from_axis: Array
+    kinds: NDArray[np.int8]
+    axes: tuple[Array, Array]
+
+    def laid_out(self, layout: int) -> Array:
+        """Return the launches with their orbits in one of the layouts, a row for each."""
+        found = np.empty((self.kinds.size, len(self.lines) + (1 if layout == FROM_AXIS else 3)))
+        fill_rows(pointers(self.lines), *self.axes, self.spans, layout, found)
+        return found
 
     @property
     def table(self) -> Array:
         """The arguments of compiled code: the variables of each launch, then its turning points."""
-        count = self.given.shape[1]
-        found = np.empty((len(self.given), count + 3))
-        found[:, :count], found[:, count], found[:, count + 1 :] = self.given, 0.0, self.spans
-        return found
+        return self.laid_out(BETWEEN_TURNS)
 
     @property
     def circulates(self) -> NDArray[np.bool_]:
         """Whether each motion is a circulation."""
-        circulates: NDArray[np.bool_] = np.isnan(self.spans[:, 0])
-        return circulates
+        return np.asarray(self.kinds == LAP)
 
 
-@entry(
-    types.void(VECTOR, VECTOR, types.float64[:, :], types.float64[:, :], types.Tuple((types.int8[::1], MATRIX))),
-    nogil=True,
-)
-def fill_symmetry(places, steps, given, spans, found):  # type: ignore[no-untyped-def]
-    """Fill the kind of each orbit by its symmetry, and its axis.
+@Inner
+def number_of_axis(place, step, middle):  # type: ignore[no-untyped-def]
+    """Return the number of the axis of symmetry that is nearest to a place."""
+    number = nearest_whole((middle - place) / step) if step != 0.0 else 0.0
+    return number if number - number == 0.0 else 0.0
+
+
+@entry(INTEGER(VECTOR, VECTOR, SPANS, types.int8[::1]), nogil=True)
+def fill_kinds(places, steps, spans, kinds):  # type: ignore[no-untyped-def]
+    """Fill the kind of each orbit, and return how many have no turning points although they are no circulations.
 
     Parameters
     ----------
     places, steps : arrays
-        A place of symmetry and the distance to the next for each launch, or one that all launches have in common. The
-        distance is 0 if there is no other axis.
-    given, spans : arrays
+        ``axes`` of `Launches`. The distance is 0 if there is no other axis.
+    spans, kinds : arrays
         As in `Launches`.
-    found : (array, array)
-        Filled: ``even`` and ``from_axis`` of `Launches`.
     """
-    (even, from_axis), count = found, given.shape[1] - 1
-    for i in range(even.size):
-        place, step = places[min(i, places.size - 1)], steps[min(i, steps.size - 1)]
+    missing, place, step, has_axes = 0, 0.0, 0.0, places.size > 0
+    if has_axes:
+        place, step = places[0], steps[0]
+    for i in range(kinds.size):
+        if places.size > 1:
+            place = places[i]
+        if steps.size > 1:
+            step = steps[i]
         low, high = spans[i, 0], spans[i, 1]
-        middle, number = 0.5 * (low + high) - place, 0.0
-        if step != 0.0:
-            number = nearest_whole(middle / step)
-            number = number if number - number == 0.0 else 0.0
-        axis = step * number
-        is_even = fabs(middle - axis) <= EVEN_TOLERANCE * (fabs(low) + fabs(high) + fabs(place))
+        if low != low:
+            kinds[i] = LAP
+            missing += high != high
+            continue
+        if not has_axes:
+            kinds[i] = UNEVEN
+            continue
+        number = number_of_axis(place, step, 0.5 * (low + high))
+        middle = 0.5 * (low + high) - place
+        is_even = fabs(middle - step * number) <= EVEN_TOLERANCE * (fabs(low) + fabs(high) + fabs(place))
         # Wells about axes that are an odd number of steps away may have another shape than the one that is known.
         is_known = number == 2.0 * nearest_whole(0.5 * number)
         is_alone = is_known and (step == 0.0 or high - low < 2.0 * fabs(step))
-        even[i] = (ABOUT_ONE_AXIS if is_alone else EVEN) if is_even else UNEVEN
+        kinds[i] = (ABOUT_ONE_AXIS if is_alone else EVEN) if is_even else UNEVEN
+    return missing
+
+
+@entry(types.void(COLUMNS, VECTOR, VECTOR, SPANS, INTEGER, MATRIX), nogil=True)
+def fill_rows(columns, places, steps, spans, layout, rows):  # type: ignore[no-untyped-def]
+    """Fill launches in one of the layouts.
+
+    Parameters
+    ----------
+    columns : array
+        The run-time parameters, lam0 and v0, as `strided.pointers` gives them.
+    places, steps, spans : arrays
+        As for `fill_kinds`.
+    layout : int
+        BETWEEN_TURNS, FROM_AXIS or AROUND_AXIS.
+    rows : (m, k) array
+        Filled with a row for each launch.
+    """
+    count = columns.shape[0] - 1
+    for i in range(rows.shape[0]):
         for k in range(count):
-            from_axis[i, k] = given[i, k]
-        from_axis[i, count], from_axis[i, count + 1] = number, 1.0 if given[i, count - 1] >= place + axis else -1.0
+            rows[i, k] = number_at(columns[k, 0] + i * columns[k, 1])
+        low, high = spans[i, 0], spans[i, 1]
+        if layout != FROM_AXIS:
+            rows[i, count], rows[i, count + 1] = number_at(columns[count, 0] + i * columns[count, 1]), 0.0
+        if layout == BETWEEN_TURNS:
+            rows[i, count + 2], rows[i, count + 3] = low, high
+            continue
+        place, step = places[min(i, places.size - 1)], steps[min(i, steps.size - 1)]
+        number = number_of_axis(place, step, 0.5 * (low + high))
+        if layout == AROUND_AXIS:
+            rows[i, count + 2], rows[i, count + 3] = number, high
+        else:
+            axis = place + step * number
+            rows[i, count], rows[i, count + 1] = number, 1.0 if rows[i, count - 1] >= axis else -1.0
 
 
-def launches_of(formulas: Formulas, given: Array, directions: Array, spans: Array) -> Launches:
-    """Return launches, whose librations may be even about an axis of symmetry of the curve and the forces on it."""
-    even, from_axis = np.full(len(spans), UNEVEN, dtype=np.int8), np.empty((len(spans), given.shape[1] + 1))
-    place, step = formulas.axes(ARRAYS, tuple(given[:, :-2].T))
+def launches_of(formulas: Formulas, lines: list[Array], directions: Array, spans: Array) -> tuple[Launches, int]:
+    """Return launches, whose librations may be even about an axis of symmetry of the curve and the forces on it, and
+    how many of them lack their turning points.
+    """
+    kinds, axes = np.empty(len(spans), dtype=np.int8), (np.empty(0), np.empty(0))
+    place, step = formulas.axes(ARRAYS, tuple(lines[:-2]))
     if place is not None and len(spans):
-        places, steps = (np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (place, 0.0 if step is None else step))
-        fill_symmetry(np.ascontiguousarray(places), np.ascontiguousarray(steps), given, spans, (even, from_axis))
-    return Launches(given, directions, spans, even, from_axis)
+        places, steps = (np.asarray(v, dtype=np.float64).reshape(-1) for v in (place, 0.0 if step is None else step))
+        axes = np.ascontiguousarray(places), np.ascontiguousarray(steps)
+    missing = fill_kinds(*axes, spans, kinds)
+    return Launches(lines, directions, spans, kinds, axes), int(missing)

@@ -127,7 +127,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         the table of shares (`nodes.trapezoidal_nodes`); and the largest error of a derivative as a share of it, in
         addition to the share of the mean of absolute values.
     launches : (m, n) array
-        The launches; the turning points, to the accuracy of doubles, are last.
+        The inputs of the program, and then turning points to the accuracy of doubles if the program needs them.
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
     found : (m, k) array

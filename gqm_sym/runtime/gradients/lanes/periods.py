@@ -29,7 +29,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     fill_mean_gradients,
 )
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
-from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, UNEVEN, Launches
+from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
 from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
@@ -123,15 +123,16 @@ def period_gradients(formulas: Formulas, launches: Launches, values: Array, rows
     rows : tuple of int
         The variables of differentiation.
     """
-    found = np.full((len(launches.given), len(rows)), nan)
+    found = np.full((launches.kinds.size, len(rows)), nan)
     source, circulates = source_of(formulas), launches.circulates
     if not rows:
         return found
-    for group in groups_of(source, launches, rows):
+    for group in groups_of(source, launches, rows, ~circulates):
         direct, plan = plan_of(source, rows, at_rest=group.at_rest, is_scaled=group.is_scaled)
         which: Any = slice(None) if group.serves.all() else group.serves
         for position, k, exponent in direct.scaled:
-            found[which, position] = values[which] * float(exponent) / launches.given[which, k]
+            line = launches.lines[k]
+            found[which, position] = values[which] * float(exponent) / (line if line.size == 1 else line[which])
         for position in direct.zeros:
             found[which, position] = 0.0
         if plan.wanted:
@@ -160,15 +161,15 @@ class Group(NamedTuple):
     is_scaled: bool
 
 
-def groups_of(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Group]:
+def groups_of(source: Source, launches: Launches, rows: tuple[int, ...], swings: NDArray[np.bool_]) -> Iterator[Group]:
     """Yield the groups of librations that are not empty."""
-    swings, at_rest = ~launches.circulates, launches.given[:, -1] == 0.0
-    is_scaled = np.ones(len(swings), dtype=np.bool_)
+    at_rest, is_scaled = launches.lines[-1] == 0.0, np.array([True])
     for k in scalings(source, rows):
-        is_scaled &= launches.given[:, k] != 0.0
+        is_scaled = is_scaled & (launches.lines[k] != 0.0)
     for are_scaled in (True, False):
         for are_at_rest in (True, False):
-            serves = swings & (at_rest == are_at_rest) & (is_scaled == are_scaled)
+            is_like_this = (at_rest == are_at_rest) & (is_scaled == are_scaled)
+            serves = swings & is_like_this if is_like_this.any() else is_like_this
             if serves.any():
                 yield Group(serves, are_at_rest, are_scaled)
 
@@ -206,7 +207,7 @@ def fill_by_stages(
         for most in () if program is None else PASSES if has_levels else (0,):
             if not chosen.size:
                 break
-            out, states = carried_out(stage, program, len(columns), (chosen, launches.even[chosen] != UNEVEN), most)
+            out, states = carried_out(stage, program, len(columns), (chosen, launches.kinds[chosen] >= EVEN), most)
             is_answered = states == ANSWERED
             answered = chosen[is_answered]
             if answered.size == len(found):
@@ -220,18 +221,19 @@ def fill_by_stages(
 def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> Iterator[Stage]:
     """Yield the programs for the half periods of a group, the fastest first."""
     source, serves, at_rest = source_of(formulas), group.serves, group.at_rest
-    n, table = source.parameters, launches.table
-    about_axis = serves & (launches.even == ABOUT_ONE_AXIS)
+    about_axis = serves & (launches.kinds == ABOUT_ONE_AXIS)
     has_form = source.formulas.agm_arguments is not None or source.formulas.time_integrand is not None
     if has_form and formulas.axes_of is not None and about_axis.any():
         given = (Orbits(source, formulas.axes_of, at_rest, plan),)
-        launched, inputs = (launches.from_axis, n + 3) if at_rest else (table, n + 2)
+        launched = launches.laid_out(FROM_AXIS if at_rest else AROUND_AXIS)
+        inputs = source.variables if at_rest else source.variables + 1
         for make in (mean_program, axis_program, exact_axis_program):
             yield Stage(about_axis, make, given, launched, inputs, not at_rest)
     uneven = serves if source.formulas.time_integrand is None else serves & ~about_axis
-    yield Stage(uneven, swing_program, (source, plan), table, n + 2, True)
-    yield Stage(serves, libration_program, (source, plan.wanted), table, source.variables, True)
-    yield Stage(serves, exact_swing_program, (source, plan), table, n + 2, True)
+    table, inputs = launches.table, source.variables
+    yield Stage(uneven, swing_program, (source, plan), table, inputs, True)
+    yield Stage(serves, libration_program, (source, plan.wanted), table, inputs, True)
+    yield Stage(serves, exact_swing_program, (source, plan), table, inputs, True)
 
 
 def lap_stages(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:

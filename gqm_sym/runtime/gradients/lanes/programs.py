@@ -76,15 +76,15 @@ class Swing(NamedTuple):
 
 def swing_inputs(source: Source, plan: Plan) -> int:
     """Return the number of inputs of the program of a libration."""
-    return source.parameters + 4 + 2 * len(moved_variables(source, plan))
+    return source.variables + 2 + 2 * len(moved_variables(source, plan))
 
 
 def swing_of(op: Recorder, source: Source, plan: Plan) -> Swing:
-    """Return the inputs of the program of a libration: the run-time parameters, lam0 and v0, both turning points, and
-    the derivatives of the lower and then of the upper turning point.
+    """Return the inputs of the program of a libration: the variables of the source, both turning points, and the
+    derivatives of the lower and then of the upper turning point.
     """
     n, variables = source.parameters, moved_variables(source, plan)
-    p, (lam0, v0, a, b), moves = op.values[:n], op.values[n : n + 4], op.values[n + 4 :]
+    p, (lam0, v0, _, a, b), moves = op.values[:n], op.values[n : n + 5], op.values[n + 5 :]
     moved = [
         (moves[j], moves[len(variables) + j], *(op.number(int(i == k)) for i in range(n)))
         for j, k in enumerate(variables)
@@ -128,7 +128,8 @@ class Orbits(NamedTuple):
         ``f(op, p)`` gives a place of symmetry and the distance to the next (`Formulas.axes_of`).
     at_rest : bool
         Whether the launches are from rest. The inputs are then the run-time parameters, the launch place, the number of
-        the axis, and the sign of the place's distance from it; otherwise those of `swing_program`.
+        the axis, and the sign of the place's distance from it; otherwise the variables of the source, the number of the
+        axis, the upper turning point, and its derivatives.
     plan : Plan
         How derivatives are found.
     """
@@ -141,25 +142,26 @@ class Orbits(NamedTuple):
     @property
     def inputs(self) -> int:
         """The number of inputs."""
-        return self.source.parameters + 3 if self.at_rest else swing_inputs(self.source, self.plan)
+        variables = self.source.variables
+        return variables if self.at_rest else variables + 2 + len(moved_variables(self.source, self.plan))
 
     def widths(self, op: Recorder) -> tuple[TapeNumber, list[list[TapeNumber]]]:
         """Record half the width of an orbit, and its changes and those of the parameters (`Plan.moves`)."""
-        n, half = self.source.parameters, Fraction(1, 2)
-        if not self.at_rest:
-            _, _, (a, b), moves = swing_of(op, self.source, self.plan)
-            # As a product with a constant, the width would be joined with other constants, and no derivative found.
-            return (b - a) / 2, [[(high - low) * half, *move] for low, high, *move in moves]
-        p, (lam0, number, sign) = op.values[:n], op.values[n:]
-        variables = self.plan.moves(n)
-        moves = [[op.number(int(i == k)) for i in range(n)] for k in variables]
+        n, variables = self.source.parameters, self.source.variables
+        p, moved = op.values[:n], self.plan.moves(n)
+        parts = [[op.number(int(i == k)) for i in range(n)] for k in moved]
+        if self.at_rest:
+            end, number, sign = op.values[n:]
+            changes = [op.number(int(k == n)) for k in moved]
+        else:
+            number, end, *changes = op.values[variables:]
+            sign = op.number(1)
         place, step = self.axes(op, p)
         axis = op.number(place) if step is None else place + number * step
         found = []
-        for move, k in zip(moves, variables, strict=True):
-            change = sign * (int(k == n) - total_change(op, gradient(op, axis, p), move))
-            found.append([change, *move])
-        return sign * (lam0 - axis), found
+        for part, change in zip(parts, changes, strict=True):
+            found.append([sign * (change - total_change(op, gradient(op, axis, p), part)), *part])
+        return sign * (end - axis), found
 
     def terms(self, op: Recorder) -> list[Terms]:
         """Record the derivatives that are wanted as sums (`scaling.terms_of`)."""

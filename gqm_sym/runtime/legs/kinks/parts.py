@@ -1,4 +1,5 @@
-"""A leg from one turn to the next past kinks of the law (`kinks.places`), as a polynomial for each part between them.
+"""A leg from one turn to the next past kinks of the law (`kinks.places`), or past places beside which it has branch
+points, as a polynomial for each part between them.
 
 On the first part, ``W = h y C`` as in `arrival`; between two kinks W begins with its value at the first. On the last
 part, the distance h to the turn is sought as the width of a whole leg is (`whole_leg`), and ``W = h (1 - y) C`` comes
@@ -132,8 +133,11 @@ def reverse_row(blocks, work, row):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_v2_to_turn(blocks, h, work):  # type: ignore[no-untyped-def]
-    """Fill the rows W_FACTOR and W of a part that ends at a turn."""
+def fill_v2_to_turn(blocks, v2, h, work):  # type: ignore[no-untyped-def]
+    """Fill the rows W_FACTOR and W of a part that ends at a turn.
+
+    On its first half W comes from the value ``v2`` at its start, so that the rounding of the turn has no effect there.
+    """
     last = blocks * WIDE - 1
     for at in range(0, last, WIDE):
         copy(work, blocks * MEAN + at, work, blocks * FORCE + at)
@@ -146,16 +150,27 @@ def fill_v2_to_turn(blocks, h, work):  # type: ignore[no-untyped-def]
         product(work, factor, factor, -1.0)
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
         left_row(work, blocks * W + at, factor, blocks * NODES + at, -h)
+    fill_gained(blocks, v2, SPEED, work)
+    for j in range(last // 2):
+        w = work[blocks * SPEED + j]
+        work[blocks * W + j], work[blocks * W_FACTOR + j] = w, w / (h * (1.0 - work[blocks * NODES + j]))
+
+
+@Inner
+def fill_gained(blocks, v2, row, work):  # type: ignore[no-untyped-def]
+    """Fill a row with W, which begins with the value ``v2``."""
+    to_means(blocks, work, blocks * FORCE, work, blocks * SPEED)
+    for at in range(0, blocks * WIDE, WIDE):
+        gained = blocks * SPEED + at
+        product(work, gained, gained, blocks * OFFSET + at)
+        solution_row(work, blocks * row + at, gained, blocks * EXPM1_Q + at, v2)
 
 
 @Inner
 def fill_v2_onwards(blocks, v2, work):  # type: ignore[no-untyped-def]
     """Fill the rows W_FACTOR and W of a part between two kinks with W, which begins with the value ``v2``."""
-    to_means(blocks, work, blocks * FORCE, work, blocks * SPEED)
+    fill_gained(blocks, v2, W, work)
     for at in range(0, blocks * WIDE, WIDE):
-        gained = blocks * SPEED + at
-        product(work, gained, gained, blocks * OFFSET + at)
-        solution_row(work, blocks * W + at, gained, blocks * EXPM1_Q + at, v2)
         copy_row(work, blocks * W_FACTOR + at, blocks * W + at)
 
 
@@ -242,7 +257,7 @@ def lay_part(forces, march, panel, blocks, distances, branch, work):  # type: ig
 def solve_part(part, blocks, h, is_last, work):  # type: ignore[no-untyped-def]
     """Fill the rows W_FACTOR and W of a part; return V**2 at its end, and the largest on the leg so far."""
     if is_last:
-        fill_v2_to_turn(blocks, h, work)
+        fill_v2_to_turn(blocks, part.v2, h, work)
     elif part.v2 == 0.0:
         fill_v2(blocks, h, FROM_TURN, work)
     else:
@@ -366,7 +381,9 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
             rest = TO_SEEK * room
             continue
         ends = (part.is_kink, stop == AT_KINK and not is_last)
-        verdict, ratio, has_more = verdict_on_curve(forces, march, blocks, variable, ends, kinks, work)
+        verdict, ratio, has_more = RESOLVED, 0.0, False
+        if forces.kinked:
+            verdict, ratio, has_more = verdict_on_curve(forces, march, blocks, variable, ends, kinks, work)
         if has_more:
             continue
         if verdict == RESOLVED:

@@ -5,6 +5,9 @@ They are found on a leg that is not one polynomial because of them, and kept for
 of a leg that so many do not resolve, or 0, and then the places. If the number is negative, legs past kinks are not
 followed in parts. Nothing depends on all kinks being known, because each part of a leg is proved to have none within it
 (`whole_rows.curvature_sign`).
+
+The turning rate of a curve in space is the root of a sum of squares. Where this almost vanishes, a law that contains it
+has branch points beside a leg, which is divided between them in the same way (`whole_leg.note_branch_of_turning`).
 """
 
 from math import fabs, inf
@@ -46,6 +49,19 @@ def bend_at(forces, place, point):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def note_place(place, kinks):  # type: ignore[no-untyped-def]
+    """Note a place at which legs are divided; return whether there is space for it, and it is not known yet."""
+    count = int(kinks[0])
+    if count < 0 or FIRST_PLACE + count >= kinks.size:
+        return False
+    for k in range(FIRST_PLACE, FIRST_PLACE + count):
+        if kinks[k] == place:
+            return False
+    kinks[FIRST_PLACE + count], kinks[0] = place, 1.0 + count
+    return True
+
+
+@Inner
 def note_kink_between(forces, a, b, kinks):  # type: ignore[no-untyped-def]
     """Note the kink between two places at which the curvature has different signs."""
     point, count = point_buffer(), int(kinks[0])
@@ -63,10 +79,7 @@ def note_kink_between(forces, a, b, kinks):  # type: ignore[no-untyped-def]
         b, value = new, bend
         if done or bend == 0.0:
             break
-    for k in range(FIRST_PLACE, FIRST_PLACE + count):
-        if kinks[k] == b:
-            return
-    kinks[FIRST_PLACE + count], kinks[0] = b, 1.0 + count
+    note_place(b, kinks)
 
 
 @Inner

@@ -13,10 +13,13 @@ from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
+    FORCE,
+    KAPPA,
     MEAN,
     NODES,
     SERIES,
     SPEED,
+    TAILS,
     D,
     W,
     copy_row,
@@ -33,7 +36,7 @@ from gqm_sym.runtime.legs.runs.leg_variable import (
     variable_for,
 )
 from gqm_sym.runtime.legs.runs.whole_rows import begin_leg, examine_row, size_of_row, size_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_tails
 
 # The largest number of steps of Newton's method to a branch point, and the last step as a share of its height. The map
 # need not be that of the exact place.
@@ -44,6 +47,13 @@ MAX_HEIGHT = 2.0
 
 # The number of blocks of a leg that has not been tried without a map.
 NOT_TRIED = -1
+
+# The last coefficients of the force are those of the turning rate if they differ from a multiple of them by less than
+# this share of their size.
+MAX_DIFFERENCE = 0.5
+
+# A branch point of the turning rate divides a leg if it is not beside this share of its half width, or less, at an end.
+LEAST_PART = 0.1
 
 # A map must be expected to save this factor of nodes, because estimates are rough, and other branch points may be as
 # near.
@@ -120,23 +130,64 @@ def zero_of_series(terms, x, y):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def zero_beside(work):  # type: ignore[no-untyped-def]
+    """Return the zero of the row SERIES beside a leg, as real and imaginary part of a place in [-1, 1], given rows with
+    23 nodes; NaN if there is none.
+    """
+    terms = series_buffer()
+    x, y = first_guess(work[SERIES : SERIES + COUNT])
+    if y > 0.0:
+        to_coefficients(1, work, SERIES, terms, 0)
+        x, y = zero_of_series(terms, x, y)
+    return (x, y) if fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT else (np.nan, np.nan)
+
+
+@Inner
 def branch_beside(march, width, work):  # type: ignore[no-untyped-def]
     """Return a branch point of ds beside a leg, given rows with 23 nodes without a map; its height is infinite if there
     is none, or ds is resolved.
     """
-    terms, none = series_buffer(), BranchPoint(0.0, inf)
+    none = BranchPoint(0.0, inf)
     if examine_row(1, work, DS, size_of_row(1, work, DS))[2]:
         return none
     product(work, SERIES, DS, DS)
-    x, y = first_guess(work[SERIES : SERIES + COUNT])
+    x, y = zero_beside(work)
     if not y > 0.0:
-        return none
-    to_coefficients(1, work, SERIES, terms, 0)
-    x, y = zero_of_series(terms, x, y)
-    if not (fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT):
         return none
     distance = 0.5 * width * (1.0 + x)
     return BranchPoint(march.origin[0] + (march.direction * distance + march.origin[1]), 0.5 * width * y)
+
+
+@Inner
+def is_bent_by_turning(blocks, work):  # type: ignore[no-untyped-def]
+    """Return whether the last coefficients of the force on a leg are mostly those of a multiple of the turning rate, ds
+    times the curvature.
+    """
+    at, rate = blocks * TAILS, blocks * SERIES
+    for k in range(0, blocks * WIDE, WIDE):
+        product(work, rate + k, blocks * DS + k, blocks * KAPPA + k)
+    to_tails(blocks, work, rate, work, at)
+    a, b, c = work[at], work[at + 1], work[at + 2]
+    to_tails(blocks, work, blocks * FORCE, work, at)
+    d, e, f = work[at], work[at + 1], work[at + 2]
+    one, other, both = a * a + b * b + c * c, d * d + e * e + f * f, a * d + b * e + c * f
+    # The square of the difference is less by the square of the multiple.
+    return one * other - both * both <= MAX_DIFFERENCE * MAX_DIFFERENCE * one * other and both != 0.0
+
+
+@Inner
+def branch_of_turning(march, width, work):  # type: ignore[no-untyped-def]
+    """Return the place beside a leg over which the turning rate of a space curve, the root of a sum of squares, has a
+    branch point, given rows with 23 nodes without a map; NaN if there is none.
+    """
+    product(work, SERIES, DS, DS)
+    product(work, SERIES, SERIES, DS)
+    product(work, SERIES, SERIES, KAPPA)  # in its square nothing is divided by ds
+    product(work, SERIES, SERIES, SERIES)
+    x, _ = zero_beside(work)
+    distance = 0.5 * width * (1.0 + x)
+    place = march.origin[0] + (march.direction * distance + march.origin[1])
+    return place if fabs(x) <= 1.0 - LEAST_PART else np.nan
 
 
 @Inner

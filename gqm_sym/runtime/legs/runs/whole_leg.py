@@ -18,7 +18,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.legs.kinks.places import note_kinks
+from gqm_sym.runtime.legs.kinks.places import note_kinks, note_place
 from gqm_sym.runtime.legs.leg_record import (
     EXTENT,
     FALLING,
@@ -55,7 +55,15 @@ from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.panels.solving import is_settled
-from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2, first_attempt, next_attempt
+from gqm_sym.runtime.legs.runs.branch_points import (
+    NOT_TRIED,
+    Attempt,
+    branch_of_turning,
+    carry_v2,
+    first_attempt,
+    is_bent_by_turning,
+    next_attempt,
+)
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_TURN, End
 from gqm_sym.runtime.legs.runs.leg_variable import distance_at, lengthened, unstretched
 from gqm_sym.runtime.legs.runs.whole_rows import (
@@ -235,6 +243,26 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
 
 
 @Inner
+def note_branch_of_turning(forces, march, panel, blocks, variable, kinks, work):  # type: ignore[no-untyped-def]
+    """Note the place beside a leg over which the turning rate has a branch point, if that is what the last coefficients
+    of the force are due to; return whether there is one.
+
+    The turning rate of a planar curve has a sign, and no branch points; legs past places where it vanishes are those
+    past kinks.
+    """
+    if forces.squared_contact == 0 or not forces.linear or kinks.size == 1 or kinks[0] < 0.0:
+        return False
+    if not (sample_leg(forces, march, panel, blocks, variable, work) and is_bent_by_turning(blocks, work)):
+        return False
+    begin_leg(1, work)
+    h = variable.width
+    if not sample_leg(forces, march, panel, 1, unstretched(h), work):
+        return False
+    place = branch_of_turning(march, h, work)
+    return place == place and note_place(place, kinks)
+
+
+@Inner
 def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type: ignore[no-untyped-def]
     """Return the attempt that resolves a leg; it has 0 blocks if there is none."""
     most = 2 if reading.what == PASSAGE else MAX_BLOCKS
@@ -258,6 +286,12 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
         if onwards == HAS_KINKS:
             break
         attempt = next_attempt(attempt, onwards, ratio, march, work)
+        if (
+            not 0 < attempt.blocks < MAX_BLOCKS
+            and reading.what < PANELS
+            and note_branch_of_turning(forces, march, panel, blocks, variable, start.kinks, work)
+        ):
+            break
         aim = CHECK if carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work) else FIND
         variable = attempt.variable
     return Attempt(0, variable, attempt.branch, NOT_TRIED, 1.0)

@@ -1,6 +1,9 @@
-"""Legs of a droplet past places where the curvature changes its sign, compared with closed forms of V**2."""
+"""Legs of a droplet past places where the curvature changes its sign, or almost vanishes in space, compared with
+definitions of V**2.
+"""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -109,3 +112,79 @@ def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
             time = float(body.time(a, b, place))
             assert swept("time_at", lam=float(place)) == pytest.approx(time, rel=2e-15)
             assert abs(motion.lam(time) - place) <= min(motion.error_bound(time), 2e-15)
+
+
+class SpaceDroplet(Droplet):
+    """A droplet on the space curve ``(t, sin(2 t)/5, t**2/2 + sin(3 t)/10)``, which is almost straight at t = 0.24.
+
+    Its turning rate, the length of ``r' x r''`` over ds**2, has branch points at 0.2436 + 0.2130 i there.
+    """
+
+    def __init__(self, b: float) -> None:
+        super().__init__(b)
+        self.kinks = [mpf("0.2436"), mpf("-0.39"), mpf("0.9")]  # where its integral is divided
+
+    def height(self, t: Any) -> Any:
+        """Return z."""
+        return t * t / 2 + mp.sin(3 * t) / 10
+
+    def rates(self, t: Any) -> tuple[Any, Any]:
+        """Return the first and the second derivative of the coordinates."""
+        first = (mpf(1), 2 * mp.cos(2 * t) / 5, t + 3 * mp.cos(3 * t) / 10)
+        return first, (mpf(0), -4 * mp.sin(2 * t) / 5, 1 - 9 * mp.sin(3 * t) / 10)
+
+    def ds(self, t: Any) -> Any:
+        """Return ds/dt."""
+        return mp.sqrt(mp.fsum(c * c for c in self.rates(t)[0]))
+
+    def vector(self, t: Any) -> list[Any]:
+        """Return the derivative of the unit tangent with respect to t."""
+        (first, second), ds = self.rates(t), self.ds(t)
+        along = mp.fsum(c * d for c, d in zip(first, second, strict=True)) / ds**2
+        return [(d - along * c) / ds for c, d in zip(first, second, strict=True)]
+
+    def turning(self, t: Any) -> Any:
+        """Return the turning rate."""
+        return mp.sqrt(mp.fsum(c * c for c in self.vector(t)))
+
+    def v2(self, a: mpf, x: Any) -> Any:
+        """Return V**2 at x after a turn at a."""
+        ends = [min(a, x), *sorted(k for k in self.kinks if min(a, x) < k < max(a, x)), max(a, x)]
+        bent = mp.quad(self.turning, ends, method="gauss-legendre", maxdegree=4)
+        return 2 * self.g * (self.height(a) - self.height(x)) - 2 * self.b * bent
+
+    def load(self, a: mpf, x: mpf) -> Any:
+        """Return the contact force per mass."""
+        tangent, ds, v2 = self.rates(x)[0], self.ds(x), self.v2(a, x)
+        slope = tangent[2] / ds**2
+        parts = [v2 * c / ds - self.g * slope * d for c, d in zip(self.vector(x), tangent, strict=True)]
+        return mp.sqrt(parts[0] ** 2 + parts[1] ** 2 + (parts[2] + self.g) ** 2)
+
+
+@pytest.mark.parametrize(("start", "b"), [(1.125, 0.0625), (-1.0, 0.000625)])
+def test_droplet_past_branch_points(start: float, b: float, generated_folder: Path) -> None:
+    """Extremes and times on a space curve that is almost straight at one place agree, as long as a droplet swings."""
+    curve = gqm.Curve.space(x="t", y="sin(2*t)/5", z="t**2/2+sin(3*t)/10", parameter="t")
+    model = gqm.derive(curve, gqm.Gravity() + gqm.SurfaceTension())
+    module = gqm.build(model, name="droplet_past_branch_points", folder=generated_folder)
+    given = {"gamma": 1.0, "ell_c": b**0.5, "t_max": 10.0}
+
+    def swept(quantity: str, **more: Any) -> float:
+        return float(module.sweep(quantity, [start], 0.0, **(given | more)).values[0])
+
+    with mp.workdps(20):
+        body, a = SpaceDroplet(b), mpf(start)
+        for quantity, function, power in (("v_max", body.v2, 0.5), ("normal_force_max", body.load, 1.0)):
+            best = max(np.linspace(-0.9, 0.9, 31).tolist(), key=lambda x, f=function: f(a, mpf(x)))
+            slope = partial(mp.diff, partial(function, a))
+            top = mp.findroot(slope, mpf(best), tol=1e-16, verify=False)
+            assert swept(quantity) == pytest.approx(float(function(a, top) ** power), rel=1e-15)
+        target = mpf("-0.5") if start > 0 else mpf("0.5")
+
+        def rate(y: mpf) -> Any:
+            place = a + (target - a) * y * y  # there is a root of the distance in V**2 at the start
+            return 2 * y * abs(target - a) * body.ds(place) / mp.sqrt(body.v2(a, place))
+
+        ends = sorted(mp.sqrt((k - a) / (target - a)) for k in body.kinks if min(a, target) < k < max(a, target))
+        time = mp.quad(rate, [0, *ends, 1], method="gauss-legendre", maxdegree=4)
+        assert swept("time_at", lam=float(target)) == pytest.approx(float(time), rel=2e-15)
