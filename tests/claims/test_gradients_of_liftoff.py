@@ -33,19 +33,6 @@ LEANING = gqm.Curve.piecewise(PIECES, start=(0, 0, 0), roll="q*s")
 STEP = 1e-30
 
 
-@pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return a module, built once."""
-    folder, built = tmp_path_factory.mktemp("liftoff"), {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
 def leaning(t: Any, roll: Any) -> Any:
     """Return the upward direction that leans to the left of the level by an angle."""
     left = np.array([-t[1], t[0], 0.0]) / np.sqrt(t[0] ** 2 + t[1] ** 2)
@@ -153,14 +140,14 @@ class OnLeaningRail(OnRail):
 
 
 @pytest.mark.parametrize("way", [1, -1])
-def test_along_a_curve_with_formulas(way: int, build: Build) -> None:
+def test_along_a_curve_with_formulas(way: int, built: Build) -> None:
     """All derivatives of the time of lift-off are right to rounding, on both ways in a frame that turns; so are those
     of motions with losses that are zero.
     """
     given = {"h": 3.0, "r": 0.125 * way, "g": 9.8125, "Omega": 0.25, "lam0": -3.0 * way, "v0": 30.0}
     launch = {**given, "direction": way, "contact": "above"}
-    motion = build("hill", HILL, FRAME).solve(**launch)
-    rough = build("rough_hill", HILL, FRAME + gqm.CoulombFriction()).solve(mu=0.0, **launch)
+    motion = built("hill", HILL, FRAME).solve(**launch)
+    rough = built("rough_hill", HILL, FRAME + gqm.CoulombFriction()).solve(mu=0.0, **launch)
     assert motion.events[-1].kind == rough.events[-1].kind == "liftoff"
     found, of_rough = motion.gradient("t_end"), rough.gradient("t_end")
     for name in given:
@@ -170,12 +157,12 @@ def test_along_a_curve_with_formulas(way: int, build: Build) -> None:
     assert found["m"] == 0.0
 
 
-def test_extremes_on_both_ways(build: Build) -> None:
+def test_extremes_on_both_ways(built: Build) -> None:
     """Where it is smallest on a way backwards, the contact force in a frame that turns changes as at a fixed place and
     as at a fixed time; at the launch it changes as there.
     """
     given = {"h": 3.0, "r": 0.125, "g": 9.8125, "Omega": 0.25, "lam0": 3.0, "v0": 30.0}
-    motion = build("hill", HILL, FRAME).solve(direction=-1, t_max=1.0, **given)
+    motion = built("hill", HILL, FRAME).solve(direction=-1, t_max=1.0, **given)
     least, first = motion.normal_force_min, motion.normal_force_max
     assert first.t == 0.0 < least.t < 1.0
     by_place, by_time = motion.gradient("normal_force_min"), motion.sensitivity(least.t, wrt=tuple(given)).normal_force
@@ -189,10 +176,10 @@ def test_extremes_on_both_ways(build: Build) -> None:
             assert at_launch[name] == pytest.approx(moved.length(3.0).imag / STEP, rel=1e-12, abs=1e-13)
 
 
-def test_with_friction(build: Build) -> None:
+def test_with_friction(built: Build) -> None:
     """The derivative with respect to the coefficient of friction is that of motions that DOP853 follows."""
     given = {"h": 3.0, "r": 0.125, "g": 9.81, "Omega": 0.0, "lam0": -3.0, "v0": 30.0}
-    rough = build("rough_hill", HILL, FRAME + gqm.CoulombFriction())
+    rough = built("rough_hill", HILL, FRAME + gqm.CoulombFriction())
     motion = rough.solve(contact="above", mu=0.05, **given)
 
     def hill(u: float) -> tuple[Any, Any, Any]:
@@ -218,13 +205,13 @@ def test_with_friction(build: Build) -> None:
 
 
 @pytest.mark.parametrize(("curve", "losses"), [(RAIL, ""), (RAIL, "drag"), (LEANING, "")])
-def test_along_a_rail(curve: Any, losses: str, build: Build) -> None:
+def test_along_a_rail(curve: Any, losses: str, built: Build) -> None:
     """Derivatives of the time of lift-off from a rail, by its shape and its roll too, are right to rounding, without
     losses and with losses that are zero.
     """
     given = {"a": 20.0, "c": 0.05, "q": 0.002, "g": 9.8125, "Omega": 0.25, "lam0": 2.0, "v0": 12.0}
     force, more = (FRAME + gqm.QuadraticDrag(), {"b": 0.0}) if losses else (FRAME, {})
-    module = build(f"{losses}rail" if curve is RAIL else "leaning", curve, force)
+    module = built(f"{losses}rail" if curve is RAIL else "leaning", curve, force)
     motion = module.solve(contact="above", **given, **more)
     assert motion.events[-1].kind == "liftoff"
     assert motion.events[-1].lam > given["a"] + 1.0
