@@ -386,17 +386,28 @@ def sided_program(source: Source, direction: int) -> Program:
     return with_derivatives(op, [force], [op.place, *op.values])
 
 
+def extreme_quantity(op: Recorder, source: Source, of_speed: bool, direction: int = 1) -> TapeNumber:
+    """Record half of V**2, or the contact force, at the place of a tape whose inputs are the variables."""
+    half = source.half(op, op.place)
+    if of_speed:
+        return half
+    forms = contact_forms(op, source.formulas, op.place, op.values)
+    force: TapeNumber = op.values[source.mass] * length_of_contact(op, forms, 2 * half, direction)
+    return force
+
+
 @lru_cache(maxsize=64)
-def extreme_program(source: Source, of_speed: bool, direction: int = 1) -> Program:
+def extreme_program(
+    source: Source, of_speed: bool, direction: int = 1, wanted: tuple[int, ...] | None = None
+) -> Program:
     """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative
     with respect to the place.
 
-    The inputs are the variables; the derivatives with respect to them follow. ``direction`` is the sign of ds/dt.
+    The inputs are the variables; the derivatives with respect to them, or to those that are ``wanted``, follow.
+    ``direction`` is the sign of ds/dt.
     """
     op = Recorder(source.variables)
-    quantity = source.half(op, op.place)
-    if not of_speed:
-        forms = contact_forms(op, source.formulas, op.place, op.values)
-        quantity = op.values[source.mass] * length_of_contact(op, forms, 2 * quantity, direction)
-    slope, *partials = gradient(op, quantity, [op.place, *op.values])
+    quantity = extreme_quantity(op, source, of_speed, direction)
+    rows = range(source.variables) if wanted is None else wanted
+    slope, *partials = gradient(op, quantity, [op.place, *(op.values[k] for k in rows)])
     return assemble(op, [quantity, slope, *gradient(op, slope, [op.place]), *partials])

@@ -49,6 +49,7 @@ from gqm_sym.runtime.legs.body import (
     V2,
     WIDTH_BEFORE,
 )
+from gqm_sym.runtime.legs.gaps.data import GAP_COLUMNS
 from gqm_sym.runtime.legs.kinks.places import ROOM_FOR_KINKS
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -80,7 +81,6 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TURN,
 )
 from gqm_sym.runtime.legs.runs.follow import IN_PARTS, direction_from_rest, follow
-from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
@@ -168,22 +168,24 @@ def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: igno
     """
     count, first_break = 0, 0
     low, high = min(begin, limit), max(begin, limit)
-    first, last = 0, 0
+    first_lap, last_lap = 0, 0
     if period > 0.0 and breaks.size > 0:
-        first, last = int((low - breaks[-1]) // period), -int((breaks[0] - high) // period)
-    laps = last - first + 1
-    for i in range(laps):
-        lap = (first + i if direction > 0 else last - i) * period
+        first_lap, last_lap = int((low - breaks[-1]) // period), -int((breaks[0] - high) // period)
+    for i in range(last_lap - first_lap + 1):
+        lap = (first_lap + i if direction > 0 else last_lap - i) * period
         # One more break is taken on either side, because the subtraction of a lap is rounded.
         from_k = max(np.searchsorted(breaks, low - lap) - 1, 0)
         to_k = min(np.searchsorted(breaks, high - lap) + 1, breaks.size)
-        for j in range(to_k - from_k):
-            k = from_k + j if direction > 0 else to_k - 1 - j
-            place = breaks[k] + lap
-            if low < place < high and count < ahead.size:
-                first_break = k if count == 0 else first_break
-                ahead[count] = place
-                count += 1
+        while from_k < to_k and not breaks[from_k] + lap > low:
+            from_k += 1
+        while from_k < to_k and not breaks[to_k - 1] + lap < high:
+            to_k -= 1
+        first, step = (from_k, 1) if direction > 0 else (to_k - 1, -1)
+        first_break = first if count == 0 else first_break
+        passed = min(to_k - from_k, ahead.size - count)
+        for j in range(passed):
+            ahead[count + j] = breaks[first + step * j] + lap
+        count += passed
     return ahead[:count], first_break
 
 

@@ -53,6 +53,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
+from gqm_sym.runtime.legs.gaps.data import forget_gaps
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -82,7 +83,6 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_NARROW,
     END_TURN,
 )
-from gqm_sym.runtime.legs.runs.gap_data import GAP_COLUMNS
 from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
 from gqm_sym.runtime.legs.runs.route import Reading
 
@@ -405,7 +405,7 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
         if parameters.shape[0] > 1:
-            joints.gaps[::GAP_COLUMNS] = 0.0
+            forget_gaps(joints.gaps)
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
             is_swing = question == FIRST_LEGS and not dissipation.friction

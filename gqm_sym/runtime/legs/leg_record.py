@@ -32,7 +32,7 @@ at the end           the places at which N changes sign, the first one last
 A panel is a row of COLUMNS numbers. It has, at its nodes, the rates of time and of arc length, Y, and the contact force
 per mass (from NORMAL_LOAD on). After each of the first three there is one more number: RIGHT (the march variable at the
 panel's end), TIME, and TIME_ERROR (the error of the time). The last number is INHERITED (`leg_errors`). A panel that
-was passed by the data kept of a gap (`runs.gaps`) has its nodes in terms of distance, V in place of Y, no rates, and
+was passed by the data kept of a gap (`gaps.passing`) has its nodes in terms of distance, V in place of Y, no rates, and
 TIME_ERROR = NO_RATES; with NO_VALUES it has RIGHT and TIME alone. A leg past kinks (`kinks.parts`) has one panel
 like the latter, or with TIME_ERROR = KNOWN_PEAK and the peak that is read in place of Y.
 

@@ -63,13 +63,15 @@ def sweep_with_gradient(
     answered, route = np.flatnonzero(found.status.reshape(-1) == ANSWERED), found.route.reshape(-1)
     slopes, which = None, answered
     if is_compiled:
-        if quantity not in PERIODS:
+        values = found.values.reshape(size, *shape[:-1])
+        ends = values if quantity == "turning_points" else table[:, LOWER_END:]
+        if quantity not in (*PERIODS, "turning_points"):
             width = UPPER_END + 1
             periods, table = sweep_with_columns(formulas, "period", launches, parameters, None, solve, width)
-            which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
+            ends, which = table[:, LOWER_END:], answered[periods.status.reshape(-1)[answered] == ANSWERED]
         some: Any = slice(None) if which.size == size else which
         launched = [line if line.size == 1 else line[some] for line in lines]
-        values, ends = found.values.reshape(size, *shape[:-1])[some], table[some, LOWER_END:]
+        values, ends = values[some], ends[some]
         several, missing = launches_of(formulas, launched[:-2], launched[-2], ends)
         if missing:
             _fill_missing_ends(formulas, launched, ends, solve)

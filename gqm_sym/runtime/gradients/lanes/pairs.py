@@ -1,4 +1,6 @@
-"""Compiled code for gradients of many half periods or laps in double-double arithmetic, with one orbit in each lane."""
+"""Compiled code for gradients of many half periods, laps or turning points in double-double arithmetic, with one orbit
+in each lane.
+"""
 
 from math import fabs, inf, nan
 
@@ -20,7 +22,7 @@ from gqm_sym.runtime.gradients.evaluation import (
     is_significant,
     rounding_of,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
+from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_ends, fill_inputs, rows_of
 
 # The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
@@ -153,3 +155,28 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
                 high, low, error = means[1 + j, 0, i], means[1 + j, 1, i], means[1 + j, 2, i]
                 is_known = states[DONE, i] == 1.0 and not error > most * fabs(high)
                 found[start + i, j] = multiply(high, low, phase[0], phase[1])[0] if is_known else nan
+
+
+@entry(types.void(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), MATRIX, MATRIX), nogil=True)
+def fill_turn_gradients(ends, works, launches, found):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of the lower and then of the upper turning point.
+
+    Parameters
+    ----------
+    ends, works
+        As for `fill_pair_gradients`.
+    launches : (m, n + 2) array
+        The n variables of each launch, and its turning points to the accuracy of doubles.
+    found : (m, 2*k) array
+        Filled with the derivatives.
+    """
+    first = launches.shape[1] - 2
+    target = np.zeros((first + 2 + found.shape[1]) * ROW)
+    for start in range(0, launches.shape[0], BLOCK):
+        size = min(BLOCK, launches.shape[0] - start)
+        lanes = -(-size // WIDTH) * WIDTH
+        fill_ends(ends, works, launches[start : start + size], NEWTON_STEPS, lanes, first, target)
+        for j in range(found.shape[1]):
+            values = rows_of(target, (first + 2 + j) * ROW)[0]
+            for i in range(size):
+                found[start + i, j] = values[i]

@@ -1,4 +1,5 @@
-"""Gradients of half periods and times of laps of many launches, by the fastest program that keeps its digits.
+"""Gradients of half periods, times of laps and turning points of many launches, by the fastest program that keeps its
+digits.
 
 Where a derivative is a multiple of the half period, it takes no program (`scaling`).
 About an axis of symmetry that is an arithmetic-geometric mean or an integral without divided differences. For other
@@ -6,7 +7,7 @@ librations it is an integral in double precision, and for what remains and for l
 for the smallest swings with divided differences.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from math import inf, nan
 from typing import Any, NamedTuple
@@ -31,7 +32,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
-from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients
+from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients, fill_turn_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
     axis_program,
@@ -256,6 +257,45 @@ def moves_of(stage: Stage) -> tuple[Source, tuple[int, ...]]:
     return source, moved_variables(source, plan) if isinstance(plan, Plan) else plan
 
 
+def programs_for(makers: Sequence[tuple[Any, ...]], size: int) -> tuple[list[Any], list[Any]]:
+    """Return programs, and the same as machine code if it is worth making for so many launches.
+
+    The code lives as long as the second list. Each maker is a function with its arguments.
+    """
+    programs = [make(*given) for make, *given in makers]
+    so_far = launches_so_far(*makers[-1])
+    so_far[0] += size
+    if size >= MIN_LAUNCHES_FOR_CODE or so_far[0] >= MIN_LAUNCHES_IN_ALL:
+        return programs, [machine_code(*maker) for maker in makers]
+    return programs, programs
+
+
+def turn_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]) -> Array:
+    """Return the derivatives of both turning points of each launch, of shape (m, 2, k), with NaN where there are none.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        The model of a generated module.
+    launches : Launches
+        The launches, which are librations.
+    rows : tuple of int
+        The variables of differentiation.
+    """
+    source, table = source_of(formulas), launches.table
+    found = np.empty((len(table), 2, len(rows)))
+    programs, in_code = programs_for([(end_program, end, source, rows) for end in range(2)], len(table))
+    ends, out = tuple(one.operands for one in in_code), found.reshape(len(table), -1)
+
+    def work(part: slice) -> None:
+        fill_turn_gradients(ends, tuple(one.work.copy() for one in programs), table[part], out[part])
+
+    run_in_threads(work, len(table), MIN_LAUNCHES_PER_THREAD)
+    if not np.isfinite(found.sum()):
+        found[~np.isfinite(found)] = nan
+    return found
+
+
 def carried_out(
     stage: Stage, program: Any, count: int, which: tuple[NDArray[np.intp], NDArray[np.bool_]], most: int
 ) -> tuple[Array, NDArray[np.int8]]:
@@ -278,15 +318,8 @@ def carried_out(
     launched = stage.launched if chosen.size == len(stage.launched) else stage.launched[chosen]
     out, states = np.empty((chosen.size, count)), np.full(chosen.size, ANSWERED, dtype=np.int8)
     turns = [(end_program, end, source, moved) for end in range(2)] if stage.has_turns else []
-    makers = [*turns, (stage.make, *stage.given)]
-    programs = [make(*given) for make, *given in makers]
-    so_far = launches_so_far(*makers[-1])
-    so_far[0] += chosen.size
-    if chosen.size >= MIN_LAUNCHES_FOR_CODE or so_far[0] >= MIN_LAUNCHES_IN_ALL:
-        programs_in_code = [machine_code(*maker) for maker in makers]  # the code lives as long as this list
-        addressed = [one.operands for one in programs_in_code]
-    else:
-        addressed = [one.operands for one in programs]
+    programs, in_code = programs_for([*turns, (stage.make, *stage.given)], chosen.size)
+    addressed = [one.operands for one in in_code]
     ends = tuple(addressed[:-1]) or (NO_PROGRAM, NO_PROGRAM)
 
     def work(part: slice) -> None:

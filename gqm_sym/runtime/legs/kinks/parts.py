@@ -16,6 +16,7 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.legs.gaps.passing import ROUNDINGS_OF_TIMES
 from gqm_sym.runtime.legs.kinks.places import next_kink, note_kinks
 from gqm_sym.runtime.legs.leg_record import HEAD, KNOWN_PEAK, NO_VALUES, PASSAGE, PEAKS, RIGHT, TIME, TIME_ERROR, Y_ROW
 from gqm_sym.runtime.legs.panels.breaks import offset, place_after
@@ -43,7 +44,6 @@ from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.runs.branch_points import branch_beside
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, END_TURN, End
-from gqm_sym.runtime.legs.runs.gaps import ROUNDINGS_OF_TIMES
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, unstretched, variable_for
 from gqm_sym.runtime.legs.runs.peaks import Stretch, peak_of_part
 from gqm_sym.runtime.legs.runs.whole_leg import CHECK, variable_of_leg

@@ -7,6 +7,8 @@ to its end, from which time is then counted back (`follow`).
 from math import inf
 
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.gaps.passing import RunState, pass_gaps
+from gqm_sym.runtime.legs.gaps.turns import turn_on_gaps
 from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
 from gqm_sym.runtime.legs.panels.equation import (
     EXPM1_Q,
@@ -38,7 +40,6 @@ from gqm_sym.runtime.legs.runs.ends import (
     what_after,
     what_before,
 )
-from gqm_sym.runtime.legs.runs.gaps import RunState, pass_gaps, turn_on_gaps
 from gqm_sym.runtime.legs.runs.route import CurveAhead, begin, limited, pass_break
 
 # The number of panels after which a run pauses.

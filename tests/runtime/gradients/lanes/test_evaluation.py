@@ -123,6 +123,25 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(*found)
 
 
+@pytest.mark.parametrize("quantity", ["turning_points", "v_min", "v_max", "normal_force_min", "normal_force_max"])
+def test_turning_points_and_extremes_in_any_company(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives of turning points and extremes have the same bits alone, anywhere among others, and by machine
+    code.
+    """
+    module, random = generated("ellipse"), np.random.default_rng(5)
+    lam0, v0 = random.uniform(-1.4, 1.4, 150), random.choice([0.0, 1.0, 12.0], 150)
+    names, order, found = (*module.PARAMETERS, "lam0", "v0"), random.permutation(150), []
+    for least in (1, 10**6):
+        monkeypatch.setattr(periods, "MIN_LAUNCHES_FOR_CODE", least)
+        found.append(module.sweep(quantity, lam0=lam0[order], v0=v0[order], gradient=names).gradient)
+        found.append(module.sweep(quantity, lam0=lam0, v0=v0, gradient=names).gradient[order])
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
+    for k in (0, 70, 149):
+        alone = module.sweep(quantity, lam0=lam0[order[k]], v0=v0[order[k]], gradient=names).gradient
+        np.testing.assert_array_equal(alone, found[0][k])
+
+
 def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Programs that have served enough launches in all become machine code, which gives the same bits."""
     monkeypatch.setattr(periods, "MIN_LAUNCHES_IN_ALL", 250)

@@ -19,6 +19,33 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.gaps.blocks import kept_block, kept_gap
+from gqm_sym.runtime.legs.gaps.data import (
+    BLOCK,
+    COEFFICIENTS,
+    END_EXPM1,
+    END_GAINED,
+    FACTORS,
+    FILLED,
+    FIRST_OF_FEW,
+    LARGEST_REST,
+    LEAST_DAMPING,
+    LEAST_KAPPA,
+    LEAST_N0,
+    MAX_SHARE,
+    MIDDLE_GAINED,
+    MOST_DAMPING,
+    MOST_KAPPA,
+    MOST_N0,
+    WITH_FEW,
+    Bounds,
+    fill_length_on_gap,
+    fill_load,
+    lengths_on,
+    range_of,
+    read_rows,
+    solve_on_gap,
+)
 from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
@@ -33,7 +60,7 @@ from gqm_sym.runtime.legs.leg_record import (
     Y_ROW,
     has_space,
 )
-from gqm_sym.runtime.legs.panels.breaks import clearance, offset
+from gqm_sym.runtime.legs.panels.breaks import offset
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
@@ -41,61 +68,22 @@ from gqm_sym.runtime.legs.panels.equation import (
     LOAD,
     MEAN,
     N0,
-    NODES,
-    SERIES,
     SPEED,
     TAILS,
     TIME_RATE,
-    March,
-    Panel,
     W,
     copy,
     load_per_mass_row,
-    load_row,
-    load_size_row,
     marched,
-    product,
     root_row,
-    solution_row,
     time_rate_row,
 )
 from gqm_sym.runtime.legs.panels.few_nodes import pass_few
-from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of, sum_and_slope, to_coefficients
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
-    CANCELLATION_NOISE,
     FAR_FROM_ZERO_RATIO,
     examine,
-    first_change_of,
     keeps_sign,
-)
-from gqm_sym.runtime.legs.runs.gap_data import (
-    END_EXPM1,
-    END_GAINED,
-    FACTORS,
-    FILLED,
-    FIRST_OF_FEW,
-    FIRST_ROW,
-    GAP_COLUMNS,
-    GAP_ROWS,
-    LARGEST_REST,
-    LEAST_DAMPING,
-    LEAST_KAPPA,
-    LEAST_N0,
-    MAX_SHARE,
-    MIDDLE_GAINED,
-    MOST_DAMPING,
-    MOST_KAPPA,
-    MOST_N0,
-    POWERS,
-    WITH_FEW,
-    Bounds,
-    fill_gap,
-    fill_length_on_gap,
-    lengths_on,
-    range_of,
-    solve_on_gap,
-    solve_towards_turn,
 )
 from gqm_sym.runtime.legs.runs.route import CurveAhead
 
@@ -109,7 +97,7 @@ FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
 
 @Inner
 def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
-    """Return the time over a gap at whose start V**2 is ``v2``, V**2 at its end, and bounds on the gap.
+    """Return the time over a gap or a block at whose start V**2 is ``v2``, V**2 at its end, and bounds on it.
 
     The time is NaN if V**2 changes too much for a few powers, or N may be near zero.
     """
@@ -122,28 +110,13 @@ def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
     load = bounds.least_load if contact_sign > 0 else -bounds.most_load
     if gaps[at] != FILLED or not h <= MAX_SHARE * u or not load > FAR_SHARE * size:
         return nan, nan, bounds
-    share, total = h / u, 0.0
-    for k in range(POWERS - 1, -1, -1):
-        total = fma(total, share, gaps[at + FACTORS + k])
+    # The terms of even and of odd degree are summed side by side.
+    t, even, odd = 2.0 / MAX_SHARE * (h / u) - 1.0, 0.0, 0.0
+    for k in range(COEFFICIENTS - 2, -1, -2):
+        odd = fma(odd, t * t, gaps[at + FACTORS + k + 1])
+        even = fma(even, t * t, gaps[at + FACTORS + k])
     lost = gaps[at + END_EXPM1]
-    return total / sqrt(u), v2 + (gaps[at + END_GAINED] - v2 * lost) / (1.0 + lost), bounds
-
-
-@Inner
-def read_rows(v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Read the rows kept of a gap at whose start V**2 is ``v2``, for forces that are linear in V**2, and fill W."""
-    for k, row in enumerate(GAP_ROWS):
-        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
-    product(work, SPEED, NODES, width)
-    product(work, SPEED, SPEED, MEAN)
-    solution_row(work, W, SPEED, EXPM1_Q, v2)
-
-
-@Inner
-def fill_load(work):  # type: ignore[no-untyped-def]
-    """Fill the row LOAD, and the size of its terms in MEAN."""
-    load_row(work, LOAD, DS, N0, KAPPA, W)
-    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+    return fma(odd, t, even) / sqrt(u), v2 + (gaps[at + END_GAINED] - v2 * lost) / (1.0 + lost), bounds
 
 
 @Inner
@@ -171,13 +144,6 @@ def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: igno
     return width * work[TAILS + 6], end, high, lost
 
 
-# A turn nearer to the start of a gap than this share of it is sought with the mean force from there, which must be more
-# than a share of its largest values.
-SHORT_SHARE, LEAST_MEAN = 0.25, 0.125
-
-# The number of gaps on which a turn is sought. Gaps before the one with the turn are passed as elsewhere.
-GAPS_TO_TURN = 4
-
 # The relative error of times that are summed in another order.
 ROUNDINGS_OF_TIMES = 1e-12
 
@@ -202,29 +168,6 @@ class RunState(NamedTuple):
     largest_v2: float
     ahead: CurveAhead
     panel_count: int
-
-
-@Inner
-def ends_of_gap(all_breaks, period, gap):  # type: ignore[no-untyped-def]
-    """Return the places between which a gap lies; the last gap of a closed curve extends to the first break of the next
-    lap.
-    """
-    return all_breaks[gap], (all_breaks[gap + 1] if gap + 1 < all_breaks.size else all_breaks[0] + period)
-
-
-@Inner
-def kept_gap(forces, route, upcoming, v, contact_sign, work):  # type: ignore[no-untyped-def]
-    """Return the position of the data kept of the gap ahead of the break at ``upcoming``, and its width; the data are
-    filled in if they are not known yet.
-    """
-    gaps, gap = route.gaps, (route.first_break + (upcoming if v > 0 else -upcoming - 1)) % route.all_breaks.size
-    low, high = ends_of_gap(route.all_breaks, route.period, gap)
-    at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), high - low
-    if gaps[at] == 0.0:
-        off, begin_at = clearance(low, high), low if v > 0 else high
-        panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
-        fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
-    return at, width
 
 
 @Inner
@@ -260,12 +203,72 @@ def pass_gap(forces, reading, v2, contact_sign, width, gaps, at, work):  # type:
 
 
 @Inner
+def pass_block(forces, route, v2, v, contact_sign, upcoming, work):  # type: ignore[no-untyped-def]
+    """Return the time over the block ahead of the break at ``upcoming``, V**2 at its end, the largest V**2 on it, and E
+    at its end; the time is NaN if there is no such block, it cannot be passed by powers, or it has to be read.
+    """
+    at = kept_block(forces, route, upcoming, v, contact_sign, work)
+    if at < 0:
+        return nan, nan, nan, nan
+    time, end, bounds = pass_by_powers(v2, contact_sign, route.gaps, at)
+    if route.reading.what == PEAKS and time > 0.0:
+        if route.reading.length:
+            bounds = lengths_on(route.gaps, at, bounds.least_v2, bounds.most_v2)
+        time = nan if may_be_peak(route.reading, bounds) else time
+    return time, end, bounds.most_v2, route.gaps[at + END_EXPM1]
+
+
+@Inner
 def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
     """Return whether a gap contains the place or the time up to which a leg is read, which requires a panel."""
     if route.reading.what == PASSAGE:
         return min(places) <= route.target <= max(places)
     near = ROUNDINGS_OF_TIMES * times[1]
     return times[0] - near <= route.until <= times[1] + near
+
+
+class Passed(NamedTuple):
+    """A gap or a block that a body has passed.
+
+    Attributes
+    ----------
+    gap_count : int
+        The number of gaps; 0 if the next one cannot be passed.
+    time : float
+    end, top : float
+        V**2 at the end, and the largest.
+    lost : float
+        E at the end.
+    has_values : bool
+        Whether V**2 and the contact force are in the buffer of rows, to be read.
+    at : int
+        The position of the data kept of the gap.
+    """
+
+    gap_count: int
+    time: float
+    end: float
+    top: float
+    lost: float
+    has_values: bool
+    at: int
+
+
+@Inner
+def pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work):  # type: ignore[no-untyped-def]
+    """Pass the block ahead of the break at ``upcoming``, or the gap; ``spent`` is the time up to there."""
+    breaks = route.breaks
+    if forces.linear:
+        time, end, top, lost = pass_block(forces, route, v2, v, contact_sign, upcoming, work)
+        if time > 0.0 and not is_read_inside(
+            route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)
+        ):
+            return Passed(BLOCK, time, end, top, lost, False, 0)
+    at, width = kept_gap(forces, route, upcoming, v, contact_sign, work)
+    time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, route.gaps, at, work)
+    places, times = (breaks[upcoming], breaks[upcoming + 1]), (spent, spent + time)
+    count = 1 if time > 0.0 and not is_read_inside(route, places, times) else 0
+    return Passed(count, time, end, top, lost, has_values, at)
 
 
 @Inner
@@ -277,25 +280,24 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
     for k in range(count):
         spent += record[HEAD + k * COLUMNS + TIME]
     while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
-        start, stop = breaks[upcoming], breaks[upcoming + 1]
         # If a panel is laid once more, the break may lie behind already.
-        is_ahead = offset(start, march.origin, v) == run_length
+        is_ahead = offset(breaks[upcoming], march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
-        at, width = kept_gap(forces, route, upcoming, v, contact_sign, work)
-        time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, gaps, at, work)
-        if not time > 0.0 or is_read_inside(route, (start, stop), (spent, spent + time)):
+        passed = pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work)
+        if passed.gap_count == 0:
             break
-        largest_v2 = max(largest_v2 / (1.0 + lost), max(v2, top))
-        v2, upcoming, spent = end, upcoming + 1, spent + time
-        run_length = offset(stop, march.origin, v)
+        time, has_values = passed.time, passed.has_values
+        largest_v2 = max(largest_v2 / (1.0 + passed.lost), max(v2, passed.top))
+        v2, upcoming, spent = passed.end, upcoming + passed.gap_count, spent + time
+        run_length = offset(breaks[upcoming], march.origin, v)
         # Successive gaps from which only the time is read become one entry of the record.
         to += COLUMNS if may_join and has_values else 0
         total, rounding = two_sum(total if may_join and not has_values else 0.0, time)
         total_low = rounding + (total_low if may_join and not has_values else 0.0)
         if has_values:
             if route.reading.length:
-                fill_length_on_gap(gaps, at, work)
+                fill_length_on_gap(gaps, passed.at, work)
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
@@ -306,74 +308,3 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         left, ahead = marched(run_length, march), CurveAhead(upcoming, ahead.span, inf, True)
         count = (to - HEAD) // COLUMNS + (1 if may_join else 0)
     return RunState(left, run_length, v2, largest_v2, ahead, count)
-
-
-@Inner
-def distance_to_turn(v2, turn, width, work):  # type: ignore[no-untyped-def]
-    """Return the distance from the start of a gap or of its first part, where V**2 is ``v2``, at which it vanishes,
-    near the zero x = ``turn`` of the series of W; infinity if that has none, and 0 if the distance is not resolved.
-
-    Of a short distance that series has few digits. But the force times exp(q) has the mean ``-v2/d`` up to the distance
-    d where V**2 vanishes, and this mean has its digits if it is not small.
-    """
-    share = 0.5 * (1.0 + turn)
-    if share > SHORT_SHARE:
-        return width * share if share <= 1.0 else inf
-    to_coefficients(work, MEAN, work, SERIES)
-    c = work[SERIES : SERIES + COUNT]
-    far = v2 / -sum_and_slope(c, turn)[0]
-    # A step of Newton's method, written so that nothing is subtracted from the distance.
-    share = far / width
-    mean, slope = sum_and_slope(c, 2.0 * share - 1.0)
-    far = (v2 - 2.0 * share * far * slope) / -(mean + 2.0 * share * slope)
-    return far if -mean >= LEAST_MEAN * size_of(work, MEAN) else 0.0
-
-
-@Inner
-def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type: ignore[no-untyped-def]
-    """Return the distance at which a body that becomes slower turns, by the rows kept of the next gaps, and the data of
-    the curve ahead of it there; the distance is 0 if they do not show a turn, or N may change its sign before.
-
-    V**2 is a polynomial on each gap, so that the curve is not evaluated.
-
-    Parameters
-    ----------
-    timed : LastTimed
-        The break at which the body is, with V**2 and the sign of N there.
-    largest_v2 : float
-        The largest V**2 so far.
-    ahead : CurveAhead
-    """
-    v, nu, v2, first, breaks = march.direction, timed.contact_sign, timed.v2, ahead.upcoming, route.breaks
-    if nu in (0, -route.only_sign) or route.gaps.size == 0 or first + 1 >= breaks.size:
-        return 0.0, ahead
-    # If a panel is laid once more, the break at which the body is lies behind already.
-    if offset(breaks[first], march.origin, v) != timed.distance:
-        return 0.0, ahead
-    for upcoming in range(first, min(first + GAPS_TO_TURN, breaks.size - 1)):
-        begin = offset(breaks[upcoming], march.origin, v)
-        at, width = kept_gap(forces, route, upcoming, v, nu, work)
-        if route.gaps[at] != FILLED:
-            break
-        part = width
-        if forces.linear:
-            read_rows(v2, width, route.gaps, at, work)
-        else:
-            part = solve_towards_turn(forces, v2, width, route.gaps, at, work)
-        if part == 0.0:
-            break
-        noise = CANCELLATION_NOISE * max(largest_v2, extent(work, W)[1])
-        turn, _, touch = first_change_of(work, W, 1, noise)
-        far = distance_to_turn(v2, turn, part, work)
-        fill_load(work)
-        load, _, no_load = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * extent(work, MEAN)[1])
-        # Behind the turn V**2 is negative, and N may be anything.
-        if not (touch > 1.0 and min(load, no_load) > min(turn, 1.0) and far > 0.0):
-            break
-        if far < inf:
-            return begin + far, CurveAhead(upcoming + 1, ahead.span, inf, True)
-        v2 = work[W + COUNT]
-        # Where the body does not become slower, this is not the end of its leg.
-        if part < width or not noise < v2 <= work[W]:
-            break
-    return 0.0, ahead

@@ -1,10 +1,12 @@
-"""The data kept of the gaps between two breaks of the curve (`gaps`), and V**2 on a gap with friction in space."""
+"""The data kept of the gaps between two breaks of the curve (`passing`), and V**2 on a gap with friction in space."""
 
+from itertools import accumulate
 from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.panels.equation import (
@@ -16,6 +18,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     GRADED,
     KAPPA,
     LENGTH,
+    LOAD,
     MEAN,
     MIXED,
     N0,
@@ -28,6 +31,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     SERIES,
     SPEED,
     TAILS,
+    TIME_RATE,
     TURNING,
     D,
     March,
@@ -39,7 +43,10 @@ from gqm_sym.runtime.legs.panels.equation import (
     fill_square,
     length_row,
     linear_row,
+    load_row,
+    load_size_row,
     product,
+    solution_row,
 )
 from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, keep_few
 from gqm_sym.runtime.legs.panels.polynomials import (
@@ -64,23 +71,30 @@ from gqm_sym.runtime.legs.panels.resolution import (
 )
 from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_nonlinear
 
-# The largest share of u that H may be, and the number of powers that are summed then.
-MAX_SHARE, POWERS = 0.1, 16
+# The largest share of u that H may be; the number of powers of the share in whose sum all others are below rounding
+# then; and the number of coefficients of a polynomial that differs from this sum by less than a rounding.
+MAX_SHARE, POWERS, COEFFICIENTS = 0.3, 32, 16
+
+# The number of gaps of a block, which are passed as one where V**2 changes little.
+BLOCK = 6
 
 # The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
 # largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature, and of the coefficients of
-# (N/m)**2; the factors of the powers; and rows from which V**2, N and time follow. With friction in space the first
-# two of the rows are those of P and Q without friction, and WITH_FEW tells whether the gap is so short that few nodes
-# suffice (`panels.few_nodes`), whose rows come last.
+# (N/m)**2; the coefficients of the polynomial for time; and rows from which V**2, N and time follow. With friction in
+# space the first two of the rows are those of P and Q without friction, and WITH_FEW tells whether the gap is so short
+# that few nodes suffice (`panels.few_nodes`), whose rows come next. The data of the block that begins with the gap, up
+# to the coefficients, come last; their state is 0 as long as they are not known.
 STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
 LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
 BOUNDS_OF_SQUARE, WITH_FEW, FACTORS = 11, 17, 24
-FIRST_ROW = FACTORS + POWERS
+LOWER_BOUNDS = (LEAST_DAMPING, LEAST_N0, LEAST_KAPPA, *range(BOUNDS_OF_SQUARE, WITH_FEW, 2))
+FIRST_ROW = FACTORS + COEFFICIENTS
 GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, MEAN, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
 SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
 FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
 FIRST_OF_FEW = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
-GAP_COLUMNS = FIRST_OF_FEW + ROOM_FOR_FEW
+FIRST_OF_BLOCK = FIRST_OF_FEW + ROOM_FOR_FEW
+GAP_COLUMNS = FIRST_OF_BLOCK + FIRST_ROW
 FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.
@@ -93,6 +107,24 @@ ENOUGH = 1.03
 # compared with this share of n0, because a rounding of a chart's angle changes it by a rounding of n0.
 NOISE_OF_FORCE = 2.0**-5
 
+# Rows of a panel that are not needed here, for the integrals of powers of H.
+MOMENTS = TIME_RATE
+
+
+def _to_coefficients() -> np.ndarray:
+    """Return the matrix that takes the integrals of the powers of H, in units of the largest H, to the coefficients of
+    the polynomial for time, in terms of t from -1, where the share H of u is 0, to 1, where it is MAX_SHARE.
+    """
+    rows = []
+    for k, binomial in enumerate(accumulate(range(1, POWERS), lambda b, k: -b * (k - 0.5) / k, initial=1.0)):
+        power = binomial * (0.5 * MAX_SHARE) ** k * np.polynomial.polynomial.polypow((1.0, 1.0), k)
+        series = np.polynomial.chebyshev.poly2cheb(power)[:COEFFICIENTS]
+        polynomial = np.polynomial.chebyshev.cheb2poly(series)
+        rows.append(np.pad(polynomial, (0, COEFFICIENTS - polynomial.size)))
+    return np.array(rows)
+
+
+to_time_coefficients = multiply(_to_coefficients())
 square_size_row = over_rows(lambda a, c, w: a + c * (w * w), WIDE)
 undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
 share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
@@ -129,6 +161,68 @@ def is_square_kept(gaps, at, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def forget_gaps(gaps):  # type: ignore[no-untyped-def]
+    """Forget the data kept of all gaps and blocks."""
+    gaps[::GAP_COLUMNS] = 0.0
+    gaps[FIRST_OF_BLOCK::GAP_COLUMNS] = 0.0
+
+
+@Inner
+def read_gained(width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Read the rows kept of a gap, for forces that are linear in V**2, and fill the row SPEED with G."""
+    for k, row in enumerate(GAP_ROWS):
+        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
+    product(work, SPEED, NODES, width)
+    product(work, SPEED, SPEED, MEAN)
+
+
+@Inner
+def read_rows(v2, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Read the rows kept of a gap at whose start V**2 is ``v2``, for forces that are linear in V**2, and fill W."""
+    read_gained(width, gaps, at, work)
+    solution_row(work, W, SPEED, EXPM1_Q, v2)
+
+
+@Inner
+def fill_load(work):  # type: ignore[no-untyped-def]
+    """Fill the row LOAD, and the size of its terms in MEAN."""
+    load_row(work, LOAD, DS, N0, KAPPA, W)
+    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+
+
+@Inner
+def clear_moments(work):  # type: ignore[no-untyped-def]
+    """Set the integrals of powers of H to 0."""
+    for k in range(POWERS):
+        work[MOMENTS + k] = 0.0
+
+
+@Inner
+def add_moments(width, before, middle, largest, work):  # type: ignore[no-untyped-def]
+    """Add the integrals of powers of H over a gap, from its rows, where G is the row SPEED.
+
+    ``before`` is E and G at the start of the gap, which are not 0 if other gaps lie before it in a block.
+    """
+    scale = 1.0 + before[0]
+    undamped_row(work, SERIES, DS, EXPM1_Q, width * sqrt(scale))
+    linear_row(work, MEAN, SPEED, before[1], scale)
+    share_row(work, MEAN, MEAN, middle, largest)
+    for k in range(POWERS):
+        to_tails(work, SERIES, work, TAILS)
+        work[MOMENTS + k] += work[TAILS + 6]
+        product(work, SERIES, SERIES, MEAN)
+
+
+@Inner
+def keep_range(low, high, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Keep the middle of the range of G, and the largest H, of a gap or a block; return them."""
+    middle, largest = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
+    gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
+    clear_moments(work)
+    return middle, largest
+
+
+@Inner
 def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
     """Fill the data kept of a gap, the panel from one break to the next, from ``gaps[at]`` on."""
     gaps[at] = REFUSED
@@ -157,21 +251,41 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
             return
     keep_rows(forces, gaps, at, work)
     (least, most), (low, high) = extent(work, EXPM1_Q), extent(work, SPEED)
-    middle, largest = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     gaps[at + END_EXPM1], gaps[at + END_GAINED] = work[EXPM1_Q + COUNT], work[SPEED + COUNT]
-    gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
     gaps[at + LEAST_DAMPING], gaps[at + MOST_DAMPING] = 1.0 / (1.0 + most), 1.0 / (1.0 + least)
     gaps[at + LEAST_N0], gaps[at + MOST_N0] = range_of(work, N0)
     gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = range_of(work, KAPPA)
-    undamped_row(work, SERIES, DS, EXPM1_Q, width)
-    share_row(work, MEAN, SPEED, middle, largest)
-    binomial = 1.0
-    for k in range(POWERS):
-        to_tails(work, SERIES, work, TAILS)
-        gaps[at + FACTORS + k] = binomial * work[TAILS + 6]
-        product(work, SERIES, SERIES, MEAN)
-        binomial *= -(k + 0.5) / (k + 1.0)
+    middle, largest = keep_range(low, high, gaps, at, work)
+    add_moments(width, (0.0, 0.0), middle, largest, work)
+    to_time_coefficients(work, MOMENTS, gaps, at + FACTORS)
     gaps[at] = FILLED
+
+
+@Inner
+def behind_gap(before, gaps, at):  # type: ignore[no-untyped-def]
+    """Return E and G at the end of a gap in a block, from those at its start."""
+    scale = 1.0 + before[0]
+    return before[0] + scale * gaps[at + END_EXPM1], before[1] + scale * gaps[at + END_GAINED]
+
+
+@Inner
+def widen_range(extremes, before, gaps, at):  # type: ignore[no-untyped-def]
+    """Return the range of G on the first gaps of a block, from that on the gaps before and E and G at the start of the
+    last one.
+    """
+    scale = 1.0 + before[0]
+    middle, rest = before[1] + scale * gaps[at + MIDDLE_GAINED], scale * gaps[at + LARGEST_REST]
+    return min(extremes[0], middle - rest), max(extremes[1], middle + rest)
+
+
+@Inner
+def widen_bounds(scale, is_first, gaps, at, to):  # type: ignore[no-untyped-def]
+    """Widen the bounds kept of a block, from ``gaps[to]`` on, for one more gap, at whose start 1 + E is ``scale``."""
+    for low in LOWER_BOUNDS:
+        share = 1.0 / scale if low == LEAST_DAMPING else 1.0
+        least, most = share * gaps[at + low], share * gaps[at + low + 1]
+        gaps[to + low] = least if is_first else min(least, gaps[to + low])
+        gaps[to + low + 1] = most if is_first else max(most, gaps[to + low + 1])
 
 
 class Bounds(NamedTuple):
