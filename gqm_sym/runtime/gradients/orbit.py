@@ -25,13 +25,6 @@ def requested_quantity(name: str) -> Iterator[None]:
         raise SolutionError(str(error).replace("gradients:", f"{name}:", 1)) from None
 
 
-def liftoff_in_space() -> SolutionError:
-    """Return the error for derivatives of an end by lift-off from a track in space."""
-    return SolutionError(
-        "gradient: the end of a motion by lift-off from a track in space has none; take differences of solved motions"
-    )
-
-
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(

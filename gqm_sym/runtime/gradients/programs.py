@@ -353,6 +353,39 @@ def length_of_contact(op: Recorder, forms: ContactForms, w: Any, direction: Any)
     return op.sqrt(square)
 
 
+def sided_force(op: Recorder, formulas: ExactFormulas | ExactLaw, place: tuple[TapeNumber, Any], direction: Any) -> Any:
+    """Record the force per unit mass whose sign shows on which side of the track a body is, given a place, V**2 there
+    and the sign of ds/dt: N/m, or its component along the upward direction of the riders of a banked track in space.
+    """
+    lam, w = place
+    if formulas.load_along_curvature is None:
+        return length_of_contact(op, contact_forms(op, formulas, lam, op.values), w, direction)
+    if formulas.upright_force is None:
+        raise SolutionError("gradients: no formula of this track shows on which side of it a body is")
+    return component_of_contact(op, formulas.upright_force(op, lam, op.values), w, direction)
+
+
+def component_of_contact(op: Recorder, parts: Sequence[Any], w: Any, direction: Any) -> Any:
+    """Record a component of N/m from its parts at rest and by V**2, and in a rotating frame by ds/dt."""
+    at_rest, by_square, *by_velocity = parts
+    found = at_rest + by_square * w
+    for part in by_velocity:
+        found = found + direction * op.sqrt(w) * part
+    return op.number(found)
+
+
+@lru_cache(maxsize=64)
+def sided_program(source: Source, direction: int) -> Program:
+    """Return the program of `sided_force` at a place, and of its derivatives with respect to the place and the
+    variables.
+
+    The inputs are the variables; ``direction`` is the sign of ds/dt.
+    """
+    op = Recorder(source.variables)
+    force = sided_force(op, source.formulas, (op.place, 2 * source.half(op, op.place)), direction)
+    return with_derivatives(op, [force], [op.place, *op.values])
+
+
 def extreme_quantity(op: Recorder, source: Source, of_speed: bool, direction: int = 1) -> TapeNumber:
     """Record half of V**2, or the contact force, at the place of a tape whose inputs are the variables."""
     half = source.half(op, op.place)

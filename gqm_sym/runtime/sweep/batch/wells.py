@@ -48,6 +48,10 @@ UNTRIED, PROVED, FAILED = range(3)
 # interval in which it is known then. Ends of orbits may be rounded by END_ROUNDING of places.
 MAX_STEPS, BOTTOM_WIDTH, END_ROUNDING = 20, 2.0**-51, 4.0 * 2.0**-52
 
+# The number of ranges, each of them half as far from the place as the one before, that are divided into LANES parts
+# where bounds on the whole ranges do not prove that the potential rises.
+DIVIDED_RANGES = 6
+
 
 class WellSide(NamedTuple):
     """What is known of one side of a place, or of both sides of an axis of symmetry.
@@ -141,11 +145,39 @@ def rises_up_to(fns, side, distance, inner):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def rises_in_parts(fns, side, distance, inner):  # type: ignore[no-untyped-def]
+    """Return what `rises_up_to` does, by bounds on parts of each range.
+
+    Where terms of the potential cancel, bounds on whole ranges are too wide. Close to the place the potential may fall
+    by less than it rises farther out, up to ``inner``.
+    """
+    near, far, box, rise = side.work[0], side.work[1], side.work[4:8], 0.0
+    place, above = side.place[0], side.sign > 0.0
+    for k in range(DIVIDED_RANGES + 1):
+        is_last = k == DIVIDED_RANGES
+        step = 0.0 if is_last else (distance - inner) / LANES
+        for i in range(LANES):
+            far[i] = place + side.sign * (distance - i * step)
+            near[i] = place + side.sign * (distance - (i + 1) * step)
+        near[LANES - 1] = place if is_last else place + side.sign * inner
+        call_bounds_batch(fns.bounds, LANES, near if above else far, far if above else near, side.params, box)
+        for i in range(LANES):
+            rises = box[0, i] if above else -box[1, i]
+            if not (box[2, i] > CUSP_SHARE * box[3, i] and (rises > 0.0 or is_last)):
+                return False
+            rise += step * rises if k > 0 else 0.0
+        distance, inner = distance if is_last else inner, 0.5 * inner
+    last = box[0, LANES - 1] if above else -box[1, LANES - 1]
+    return -last * distance < rise
+
+
+@Inner
 def try_proof(fns, side, k):  # type: ignore[no-untyped-def]
     """Set what is known of the proof number k."""
     part = FIRST_PART + k
     inner = from_bits(part // PARTS * PARTS << PART_BITS)
-    good = rises_up_to(fns, side, from_bits((part + 1) << PART_BITS), inner)
+    distance = from_bits((part + 1) << PART_BITS)
+    good = rises_up_to(fns, side, distance, inner) or rises_in_parts(fns, side, distance, inner)
     side.proofs[k] = PROVED if good else FAILED
 
 
