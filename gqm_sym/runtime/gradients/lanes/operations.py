@@ -52,6 +52,11 @@ class LaneRecorder(RecorderOfMore):
             self.entries += [("result", register, k) for k in range(1, RESULTS[entry[0]])]
         return register
 
+    def at(self, register: int) -> TapeNumber:
+        """Return the number in a register; a constant as such, so that it is joined with others."""
+        constant = self.exact.get(register)
+        return self.number(constant) if isinstance(constant, Fraction) else super().at(register)
+
     def depends(self, register: int) -> bool:
         """Return whether a register depends on the place."""
         found = self._depends
@@ -92,10 +97,20 @@ class LaneRecorder(RecorderOfMore):
             return None if negative is None else b - negative
         if code == DIVIDE and a.known == 0:
             return a
-        if code == DIVIDE and self.depends(self.register(a)) and not self.depends(self.register(b)):
+        return self._quotient(a, b) if code == DIVIDE else None
+
+    def _quotient(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
+        """Return a quotient as a product with an inverse that others share; None if there is none."""
+        if b.known is not None:
+            return a * (1 / b.known) if b.known else None
+        if self.depends(b.register):
+            return self._by_inverse(a, b) if self.by_inverses else None
+        if self.depends(self.register(a)):
             return a * (self.number(1) / b)
-        is_shared = code == DIVIDE and self.by_inverses and self.depends(self.register(b))
-        return self._by_inverse(a, b) if is_shared else None
+        _, *operands = self.entries[b.register]
+        are_inputs = [self.entries[k][0] in ("parameter", "constant") for k in operands]
+        is_multiple = self.entries[b.register][0] == MULTIPLY and all(are_inputs)
+        return self._by_inverse(a, b) if is_multiple or self.entries[b.register][0] == "parameter" else None
 
     def _by_inverse(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
         """Return a quotient as a product with an inverse; None if it is one."""
@@ -129,13 +144,8 @@ class LaneRecorder(RecorderOfMore):
             if code == MULTIPLY and self.depends(number.register) and not self.depends(fixed.register):
                 for one, rest in (operands, operands[::-1]):
                     if not self.depends(one):
-                        return self.at(rest) * (self._factor(one) * fixed)
+                        return self.at(rest) * (self.at(one) * fixed)
         return None
-
-    def _factor(self, register: int) -> TapeNumber:
-        """Return the number in a register; a constant as such, so that it is joined with others."""
-        constant = self.exact.get(register)
-        return self.number(constant) if isinstance(constant, Fraction) else self.at(register)
 
     def _negated(self, number: TapeNumber) -> TapeNumber | None:
         """Return minus a number that was recorded as a product with -1; None for other numbers."""

@@ -199,8 +199,9 @@ def fill_by_stages(
     """
     is_open, first, stop = serves.copy(), columns[0], columns[-1] + 1
     which: Any = slice(first, stop) if stop - first == len(columns) else list(columns)
-    for stage in programs:
-        if not is_open.any():
+    while is_open.any():
+        stage = next(programs, None)
+        if stage is None:
             break
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
@@ -209,14 +210,14 @@ def fill_by_stages(
             if not chosen.size:
                 break
             out, states = carried_out(stage, program, len(columns), (chosen, launches.kinds[chosen] >= EVEN), most)
-            is_answered = states == ANSWERED
-            answered = chosen[is_answered]
-            if answered.size == len(found):
+            left = np.flatnonzero(states != ANSWERED)
+            out[left], is_open[chosen] = nan, False
+            if chosen.size == len(found):
                 found[:, which] = out
-                return
-            found[answered if isinstance(which, slice) else answered[:, np.newaxis], which] = out[is_answered]
-            is_open[answered] = False
-            chosen = chosen[states == OPEN]
+            else:
+                found[chosen if isinstance(which, slice) else chosen[:, np.newaxis], which] = out
+            is_open[chosen[left]] = True
+            chosen = chosen[left[states[left] == OPEN]]
 
 
 def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> Iterator[Stage]:
