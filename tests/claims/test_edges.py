@@ -192,6 +192,25 @@ def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, buil
     assert module.solve(4.0 * scale, 3.0, -1).events[-1].kind == "singular-point"
 
 
+def test_the_contact_force_before_a_pole(built: Build) -> None:
+    """On a parabola through the centre of a force the only change of the sign of N is one that is no rounding.
+
+    N/m is kappa V**2 + n0, in terms of x; kappa V**2 grows as 2 kappa k/r, and n0 as kappa k/(2 r), so that N keeps its
+    sign near the centre.
+    """
+    curve = gqm.Curve.implicit("z - x**2/4", start=(-3, "9/4"), tangent=-1)
+    module = built("parabola_to_a_centre", curve, gqm.CentralForce(k=1))
+    motion = module.solve(2)
+    x, end = np.linspace(motion.state(0.0).x, -1e-3, 100001)[1:], motion.state(0.0)
+    size, r = np.sqrt(1.0 + x * x / 4.0), np.hypot(x, x * x / 4.0)
+    w = 2.0 * (1.0 / r - 1.0 / np.hypot(end.x, end.z))
+    force = w / (2.0 * size**3) - (x * x / 4.0) / (r**3 * size)
+    assert [event.kind for event in motion.events] == ["contact-sign"] * (np.diff(np.sign(force)) != 0).sum() + [
+        "singular-point"
+    ]
+    assert module.solve(2, 3, contact="above").events[-1].kind == "singular-point"
+
+
 def test_a_force_without_a_bound_that_is_no_pole(built: Build) -> None:
     """Where a logarithm has its pole the motion ends, after sqrt(pi/2) d/sqrt(a); a body that passes by a centre at a
     small distance turns on the other side.
