@@ -48,6 +48,8 @@ def check_force(formulas: Formulas, quantity: str) -> None:
         aside = "coriolis" if isinstance(exact, ExactPotential) else "coriolis_loads"
         has_force = getattr(exact, aside, None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
+        if not formulas.directed:
+            raise without_formulas()
         raise SolutionError(
             f"gradients: there are none of {quantity}, because the contact force has no known derivatives on a space "
             "curve in a rotating frame"
