@@ -222,7 +222,9 @@ def turning_point_program(source: AnySource, wanted: tuple[int, ...] | None = No
 
 
 @lru_cache(maxsize=64)
-def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
+def libration_program(
+    source: AnySource, wanted: tuple[int, ...] | None = None, recorder: Callable[[int, int], Recorder] = Recorder
+) -> Program:
     """Return the program of the integrand over the phase angle of a libration, with its derivatives at the same phase
     angle.
 
@@ -230,10 +232,11 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives with respect to
     all variables, V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam with respect to the
     run-time parameters at the same place. If variables are ``wanted``, there are derivatives of the turning points with
-    respect to these alone, and the results are dt/dphi and its derivatives with respect to them.
+    respect to these alone, and the results are dt/dphi and its derivatives with respect to them. ``recorder`` makes the
+    tape.
     """
     n, rows = source.variables, range(source.variables) if wanted is None else wanted
-    op = Recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
+    op = recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
     share, (a, b, *ends) = op.place, op.values[source.inputs :]
     width, inertia = b - a, source.one_plus_beta(op)
     half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, a + width * share)
@@ -398,15 +401,19 @@ def extreme_quantity(op: Recorder, source: Source, of_speed: bool, direction: in
 
 @lru_cache(maxsize=64)
 def extreme_program(
-    source: Source, of_speed: bool, direction: int = 1, wanted: tuple[int, ...] | None = None
+    source: Source,
+    of_speed: bool,
+    direction: int = 1,
+    wanted: tuple[int, ...] | None = None,
+    recorder: Callable[[int, int], Recorder] = Recorder,
 ) -> Program:
     """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative
     with respect to the place.
 
     The inputs are the variables; the derivatives with respect to them, or to those that are ``wanted``, follow.
-    ``direction`` is the sign of ds/dt.
+    ``direction`` is the sign of ds/dt, and ``recorder`` makes the tape.
     """
-    op = Recorder(source.variables)
+    op = recorder(source.variables, 1)
     quantity = extreme_quantity(op, source, of_speed, direction)
     rows = range(source.variables) if wanted is None else wanted
     slope, *partials = gradient(op, quantity, [op.place, *(op.values[k] for k in rows)])

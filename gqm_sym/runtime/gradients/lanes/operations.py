@@ -24,8 +24,15 @@ ERROR_BOUND, ROUNDING = SINC_PAIR + 1, 0.3 * 2.0**-52
 # The number of results of each operation that has several; they are in consecutive registers.
 RESULTS = {SINE_COSINE: 2, SINC: 2, SINC_PAIR: 6}
 
+# The largest number of terms of a divided difference of a power.
+MAX_TERMS = 24
+
 # For the two results of SINC_PAIR that have derivatives: the results that are those with respect to p and to q.
 PAIR_PARTIALS = {0: (2, 3), 1: (4, 5)}
+
+
+class WithoutRuleError(Exception):
+    """A formula contains an operation whose divided differences have no rule here."""
 
 
 class LaneRecorder(RecorderOfMore):
@@ -157,6 +164,22 @@ class LaneRecorder(RecorderOfMore):
                 if self.exact.get(one) == -1:
                     return self.at(rest)
         return None
+
+    def divdiff1_ipow(self, x: TapeNumber, y: TapeNumber, h: TapeNumber, n: int) -> TapeNumber:
+        """Record the divided difference of the power with an integer exponent, as a sum of products."""
+        if n < 0:
+            a, b = 1 / x, 1 / y
+            return -1 * (self.divdiff1_ipow(a, b, h, -n) * (a * b))
+        return sum((x.to(k) * y.to(n - 1 - k) for k in range(n)), self.number(0))
+
+    def divdiff1_rpow(self, x: TapeNumber, y: TapeNumber, h: TapeNumber, exponent: TapeNumber) -> TapeNumber:
+        """Record the divided difference of the power with a rational exponent, by roots of both numbers."""
+        known = self.number(exponent).known
+        if known is None or abs(known.numerator) + known.denominator > MAX_TERMS:
+            raise WithoutRuleError
+        a, b = (number ** Fraction(1, known.denominator) for number in (x, y))
+        above, below = (self.divdiff1_ipow(a, b, h, n) for n in (known.numerator, known.denominator))
+        return above / below
 
     def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
         """Record sin(t)/t, or sinh(t)/t for the sign -1."""

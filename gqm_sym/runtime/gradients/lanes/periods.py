@@ -32,6 +32,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients, fill_turn_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
@@ -234,7 +235,7 @@ def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> 
     uneven = serves if source.formulas.time_integrand is None else serves & ~about_axis
     table, inputs = launches.table, source.variables
     yield Stage(uneven, swing_program, (source, plan), table, inputs, True)
-    yield Stage(serves, libration_program, (source, plan.wanted), table, inputs, True)
+    yield Stage(serves, libration_program, (source, plan.wanted, LaneRecorder), table, inputs, True)
     yield Stage(serves, exact_swing_program, (source, plan), table, inputs, True)
 
 
@@ -254,7 +255,7 @@ def moves_of(stage: Stage) -> tuple[Source, tuple[int, ...]]:
     source, *given = stage.given
     if isinstance(source, Orbits):
         return source.source, moved_variables(source.source, source.plan)
-    plan = given[-1]
+    plan = given[0]
     return source, moved_variables(source, plan) if isinstance(plan, Plan) else plan
 
 
