@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 15, input bcc7b1afa151, body 4e0a9f9f6f08
+# interface 16, input bcc7b1afa151, body 444242ed6a29
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=15)
+compiled = compiler(__file__, interface=16)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,

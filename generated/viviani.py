@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 15, input c93b8a64a5a5, body d2b5e804b712
+# interface 16, input c93b8a64a5a5, body 254b8f33cd99
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=15)
+compiled = compiler(__file__, interface=16)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,

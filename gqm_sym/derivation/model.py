@@ -117,6 +117,9 @@ class Model:
     sided
         Whether the sign of N, or of its component along the upward direction of riders on a banked space curve, shows
         on which side of the track a body is.
+    upright
+        n₀ and κ of that component, and in a rotating frame what it gains for each unit of ds/dt; empty for other curves
+        (`derivation.forces.rider.upright_force`).
     rider
         The loads on a rider of a banked space curve; None for other curves.
     common_factor
@@ -169,6 +172,7 @@ class Model:
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
     sided: bool = True
+    upright: tuple[sp.Expr, ...] = ()
     rider: Rider | None = None
     common_factor: sp.Expr = sp.S.One
 

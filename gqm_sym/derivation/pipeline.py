@@ -203,6 +203,7 @@ def derive(
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
         sided=not law.loads or bool(upright),
+        upright=upright,
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
         common_factor=shape.size,
     )

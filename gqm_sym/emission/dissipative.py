@@ -25,7 +25,16 @@ from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
-from gqm_sym.sympy_charts import AXES, SPACE_ROWS, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import (
+    AXES,
+    SPACE_ROWS,
+    ChartFunction,
+    chart_alpha,
+    chart_kappa,
+    chart_x,
+    chart_z,
+    space_roll,
+)
 
 _NAMES = {
     **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
@@ -44,6 +53,7 @@ ALONG_CURVATURE_TURNING = (
     "c, where |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2 + odd powers of V), n0 = |N|/m at rest."
 )
 CORIOLIS_LOADS = "a and b, so that the odd powers of V = ds/dt in |N|**2 are m**2*2*V*(a + b*V**2)."
+UPRIGHT_FORCE = "n0, kappa and perhaps c: N/m is n0 + kappa*V**2 + c*V along the upward direction, with V = ds/dt."
 CORIOLIS_VECTOR = "The vector that V = ds/dt adds to t x N/m for each unit of V, t being the tangent."
 
 
@@ -155,11 +165,9 @@ def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
     """
     model, place = lowering.model, lowering.place
     names: tuple[str, ...] = ("x", "z", "dxds", "dzds", "kappa")
-    forms = _planar_point(place)
+    point, forms = tuple(map(lowering.names.symbol, names)), _planar_point(place)
     if model.curve.in_space:
-        names = tuple(f"{d}{axis}{per}" for d, per in (("", ""), ("d", "ds"), ("dd", "ds2")) for axis in AXES)
-        forms = tuple(SPACE_ROWS[axis][order](place) for order in range(3) for axis in AXES)
-    point = tuple(map(lowering.names.symbol, names))
+        point, forms = point_in_space(lowering)
     w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
     known = {**dict(zip(forms, point, strict=True)), W: w, DIRECTION: v, CONTACT_SIGN: nu}
     load = model.static_normal_load.xreplace(known)
@@ -175,7 +183,33 @@ def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
         lowering.exact_function(name, text, tuple(form.xreplace(known) for form in forms), point)
         for name, text, forms in contact_products(model)
     )
-    return (*found, *products)
+    return (*found, *products, *upright_along_chart(lowering))
+
+
+def point_in_space(lowering: Lowering) -> tuple[tuple[Symbol, ...], tuple[Expr, ...]]:
+    """Return names for coordinates, tangent and curvature at a place of a charted curve in space, and their forms."""
+    named = tuple(f"{d}{axis}{per}" for d, per in (("", ""), ("d", "ds"), ("dd", "ds2")) for axis in AXES)
+    forms = tuple(SPACE_ROWS[axis][order](lowering.place) for order in range(3) for axis in AXES)
+    return tuple(map(lowering.names.symbol, named)), forms
+
+
+def upright_force(lowering: Lowering) -> tuple[ExactIR, ...]:
+    """Return the formula for the component of N that decides about contact on a banked track; nothing for others."""
+    upright = lowering.model.upright
+    return (lowering.exact_function("upright_force", UPRIGHT_FORCE, upright, (lowering.place,)),) if upright else ()
+
+
+def upright_along_chart(lowering: Lowering) -> tuple[ExactIR, ...]:
+    """Return the same in terms of the chart's values at a point, the roll angle and the arc length; nothing if it
+    depends on more than these.
+    """
+    place, roll, arc = lowering.place, lowering.names.symbol("roll"), lowering.names.symbol("arc")
+    point, forms = point_in_space(lowering)
+    known = {**dict(zip(forms, point, strict=True)), space_roll(place): roll}
+    upright = tuple(form.xreplace(known).xreplace({place: arc}) for form in lowering.model.upright)
+    if not upright or any(form.atoms(ChartFunction) for form in upright):
+        return ()
+    return (lowering.exact_function("upright_force", UPRIGHT_FORCE, upright, (*point, roll, arc)),)
 
 
 def _in_pieces(

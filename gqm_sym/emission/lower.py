@@ -16,6 +16,8 @@ from gqm_sym.emission.dissipative import (
     speed_slope,
     squared_contact,
     static_balance,
+    upright_along_chart,
+    upright_force,
 )
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
@@ -231,13 +233,13 @@ class _ModelLowering(Lowering):
         )
         path, space = ([self.exact_function(*entry, (self.place,)) for entry in of] for of in (named, self._space()))
         if loss is not None:
-            return (*path, speed_slope(self, loss), *space)
+            return (*path, speed_slope(self, loss), *space, *upright_force(self))
         potentials = (
             ("effective_potential", "U, so that V**2 + 2*U is constant (paper, eq. 13).", model.effective_potential),
             ("effective_potential_slope", f"dU/d{self.place}.", model.effective_potential_slope),
         )
         energy = (self.exact_function(name, doc, (form,), (self.place,)) for name, doc, form in potentials)
-        return (*path, *energy, *space)
+        return (*path, *energy, *space, *upright_force(self))
 
     def _space(self) -> tuple[tuple[str, str, tuple[Expr, ...]], ...]:
         """Return the additional formulas of a space curve, each with its name and description."""
@@ -257,11 +259,12 @@ class _ModelLowering(Lowering):
         named = "x, y and z" if self.model.curve.in_space else "x and z"
         doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
         found = self.exact_function("effective_potential", doc, outputs, places)
+        upright = upright_along_chart(self)
         if not self.model.coriolis:
-            return (found,)
+            return (found, *upright)
         tangent = {SPACE_ROWS[axis][1](self.place): self.names.symbol(f"d{axis}ds") for axis in AXES}
         aside = tuple(form.xreplace(tangent) for form in self.model.coriolis)
-        return found, self.exact_function("coriolis", CORIOLIS_VECTOR, aside, tuple(tangent.values()))
+        return found, self.exact_function("coriolis", CORIOLIS_VECTOR, aside, tuple(tangent.values())), *upright
 
     def domain(self) -> ExactIR:
         """Return the formula for the range of the curve's parameter."""

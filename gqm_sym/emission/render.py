@@ -18,7 +18,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 15
+INTERFACE = 16
 
 # Functions that the runtime has in vectorised forms; all others are those of the standard library.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh", "tanh"})
@@ -32,6 +32,7 @@ _BY_KEYWORD = {
     "exact_agm_arguments": "agm_arguments",
     "exact_coriolis_loads": "coriolis_loads",
     "exact_time_integrand": "time_integrand",
+    "exact_upright_force": "upright_force",
 }
 # The functions of one motion, as the interface orders them.
 _COMPILED_FUNCTIONS = (

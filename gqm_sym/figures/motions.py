@@ -31,6 +31,14 @@ SAMPLES_PER_BREAK, MOST_SAMPLES = 40, 4001
 # The distance by which a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
 PORTRAIT_MARGIN = 0.4
 
+# An axis in three dimensions is no shorter than this share of the longest, which has so many ticks.
+LEAST_SHARE, MOST_TICKS = 0.3, 6
+# They lie within this share of the axis about its middle.
+INNER_SHARE = 0.9
+
+# The distances of the labels of three-dimensional axes from their ticks, in points.
+LABEL_PADS = 16.0, 6.0, 2.0
+
 # The track is orange where the contact force points along the normal (to the left of increasing parameter), and purple
 # where it points against it.
 FORCE_COLOURS = "PuOr_r"
@@ -107,13 +115,26 @@ def draw_in_space(view: Any, path: Any, values: Array, label: str) -> None:
     line = Line3DCollection(_segments(path.x, path.y, path.z), **_coloured(values))
     view.plot(path.x, path.y, path.z, color=LINE_COLOUR, linewidth=5.0)
     view.add_collection3d(line)
-    view.set_aspect("equal")
+    _scale_equally(view)
+    for axis, pad in zip("xyz", LABEL_PADS, strict=True):
+        getattr(view, f"set_{axis}label")(f"{axis} (m)", labelpad=pad)
     # The bar is smaller than its space, because the layout does not know the width of three-dimensional labels.
-    view.set_box_aspect([np.ptp(ends()) for ends in (view.get_xlim, view.get_ylim, view.get_zlim)], zoom=0.85)
-    view.locator_params(nbins=5)
-    view.locator_params(axis="z", nbins=3)
-    view.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     figure_of(view).colorbar(line, ax=view, label=label, shrink=0.7, location="left")
+
+
+def _scale_equally(view: Any) -> None:
+    """Let a metre be as long along all axes, of which none is so short that its labels overlap."""
+    ends = np.array([view.get_xlim(), view.get_ylim(), view.get_zlim()])
+    middles, spans = ends.mean(axis=1), np.ptp(ends, axis=1)
+    shares = np.maximum(spans / spans.max(), LEAST_SHARE)
+    for axis, middle, share in zip("xyz", middles, shares, strict=True):
+        half = 0.5 * share * spans.max()
+        getattr(view, f"set_{axis}lim")(middle - half, middle + half)
+        view.locator_params(axis=axis, nbins=max(4, round(MOST_TICKS * share)))
+        # Labels at the ends of axes overlap where two of these meet.
+        ticks = getattr(view, f"get_{axis}ticks")()
+        getattr(view, f"set_{axis}ticks")(ticks[np.abs(ticks - middle) < INNER_SHARE * half])
+    view.set_box_aspect(shares, zoom=0.8)
 
 
 def _segments(*coordinates: Array) -> list[Array]:

@@ -97,7 +97,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 15
+INTERFACE = 16
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -277,11 +277,12 @@ class ExactPotential(NamedTuple):
 
     In space it is ``f(op, x, y, z, p)``, with the derivatives with respect to x, y and z. In a rotating frame there,
     ``coriolis`` gives the vector that V = ds/dt adds to t x N/m for each unit of V, along x, y and z, where t is the
-    tangent: ``f(op, dxds, dyds, dzds, p)``.
+    tangent: ``f(op, dxds, dyds, dzds, p)``. ``upright_force`` is that of `ExactChartLaw`.
     """
 
     effective_potential: Callable[..., Any]
     coriolis: Callable[..., Any] | None = None
+    upright_force: Callable[..., Any] | None = None
 
 
 class ExactChartLaw(NamedTuple):
@@ -290,13 +291,16 @@ class ExactChartLaw(NamedTuple):
     ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
     V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N). In space x, y and z take the
     place of x and z, so that there are three derivatives too, and their second derivatives that of kappa; n0 then is
-    the length |N|/m at rest, and ``load_along_curvature`` and ``coriolis_loads`` are those of `ExactFormulas`.
+    the length |N|/m at rest, and ``load_along_curvature`` and ``coriolis_loads`` are those of `ExactFormulas`. So is
+    ``upright_force``, which depends on the roll angle and the arc length as well: ``f(op, x, ..., ddzds2, roll, arc,
+    p)``.
     """
 
     static_normal_load: Callable[..., Any]
     speed_slope: Callable[..., Any]
     load_along_curvature: Callable[..., Any] | None = None
     coriolis_loads: Callable[..., Any] | None = None
+    upright_force: Callable[..., Any] | None = None
 
 
 class ExactFormulas(NamedTuple):
@@ -304,9 +308,11 @@ class ExactFormulas(NamedTuple):
 
     ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. A space curve has ``y``; one
     that lies in no vertical plane also has ``load_along_curvature``, half of the factor [1/s2] of V**2 in (N/m)**2. In
-    a rotating frame ``coriolis_loads`` has half of the factors of V = ds/dt [m/s3] and of V**3 [1/(m s)]. Where the
-    time of orbits about an axis of symmetry has a closed form, the formulas of ``agm_arguments_batch``, ``f(op, half,
-    p)``, or of ``time_integrand_batch``, ``f(op, half, sine2, cosine2, p)``, follow.
+    a rotating frame ``coriolis_loads`` has half of the factors of V = ds/dt [m/s3] and of V**3 [1/(m s)]. On a banked
+    track whose riders have an upward direction, ``upright_force`` has n0 and kappa for the component of N along it, in
+    a rotating frame also what is added to N/m for each unit of V. Where the time of orbits about an axis of symmetry
+    has a closed form, the formulas of ``agm_arguments_batch``, ``f(op, half, p)``, or of ``time_integrand_batch``,
+    ``f(op, half, sine2, cosine2, p)``, follow.
     """
 
     x: Callable[..., Any]
@@ -321,6 +327,7 @@ class ExactFormulas(NamedTuple):
     coriolis_loads: Callable[..., Any] | None = None
     agm_arguments: Callable[..., Any] | None = None
     time_integrand: Callable[..., Any] | None = None
+    upright_force: Callable[..., Any] | None = None
 
 
 class ExactLaw(NamedTuple):
@@ -339,3 +346,4 @@ class ExactLaw(NamedTuple):
     y: Callable[..., Any] | None = None
     load_along_curvature: Callable[..., Any] | None = None
     coriolis_loads: Callable[..., Any] | None = None
+    upright_force: Callable[..., Any] | None = None

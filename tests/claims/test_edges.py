@@ -153,12 +153,75 @@ def test_a_ball_does_not_roll_over_corners(built: Build) -> None:
 
 
 def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
-    """The error says where the potential energy is infinite; a division by zero was not caught."""
+    """Its motion ends there, although the curve goes on and is symmetric about the centre; so do sweeps say."""
     curve = gqm.Curve.graph("-cos(2*x)/3", parameter="x")
     module = built("into_the_centre", curve, gqm.CentralForce(centre=(0, "-1/3"), k=4))
-    with pytest.raises(SolutionError, match=r"potential energy is infinite at the place 0\.0 .* move the centre"):
-        assert module.solve(1.1437806281064022).half_period
-    assert np.isnan(module.sweep("half_period", [1.1437806281064022]).values).all()
+    for lam0 in (1.1437806281064022, 0.7):
+        motion, sweep = module.solve(lam0), module.sweep("half_period", [lam0])
+        assert (motion.kind, motion.events[-1].kind) == ("transit", "singular-point")
+        assert motion.events[-1].lam == pytest.approx(0.0, abs=1e-14)
+        assert np.isnan(sweep.values).all()
+        assert list(sweep.status_counts()) == ["the motion is not of a kind that has this quantity"]
+        assert module.sweep("t_end", [lam0]).values == pytest.approx([motion.t_end], rel=1e-15)
+        with pytest.raises(SolutionError, match="only a libration has one"):
+            assert motion.half_period
+
+
+ACROSS = np.linspace(-3.0, 3.0, 30)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.5, None])
+def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, built: Build) -> None:
+    """On a straight line of points or of a rail it falls from a distance d in the time pi*sqrt(d**3/(8 k)), and does
+    not pass the centre, whatever the speed.
+    """
+    if slope is None:
+        curve, scale = gqm.Curve.piecewise([gqm.line(length=6)], start=(-3, 0)), 1.0
+    else:
+        points = np.column_stack([ACROSS, *([slope * ACROSS] if slope else []), 0.0 * ACROSS])
+        curve, scale = gqm.Curve.sampled(points), np.sqrt(1.0 + slope**2)
+    module = built("points_to_a_centre" if slope is not None else "rail_to_a_centre", curve, gqm.CentralForce(k=1))
+    if slope:
+        module = built("points_in_space_to_a_centre", curve, gqm.CentralForce(k=1))
+    motion = module.solve(4.0 * scale)
+    assert (motion.kind, [event.kind for event in motion.events]) == ("transit", ["singular-point"])
+    assert motion.t_end == pytest.approx(np.pi * np.sqrt(scale**3 / 8.0), rel=1e-15)
+    assert motion.events[0].lam == pytest.approx(3.0 * scale, rel=1e-14)
+    assert module.sweep("t_end", [4.0 * scale]).values == pytest.approx([motion.t_end], rel=1e-15)
+    assert np.isnan(module.sweep("half_period", [4.0 * scale]).values).all()
+    assert module.solve(4.0 * scale, 3.0, -1).events[-1].kind == "singular-point"
+
+
+def test_the_contact_force_before_a_pole(built: Build) -> None:
+    """On a parabola through the centre of a force the only change of the sign of N is one that is no rounding.
+
+    N/m is kappa V**2 + n0, in terms of x; kappa V**2 grows as 2 kappa k/r, and n0 as kappa k/(2 r), so that N keeps its
+    sign near the centre.
+    """
+    curve = gqm.Curve.implicit("z - x**2/4", start=(-3, "9/4"), tangent=-1)
+    module = built("parabola_to_a_centre", curve, gqm.CentralForce(k=1))
+    motion = module.solve(2)
+    x, end = np.linspace(motion.state(0.0).x, -1e-3, 100001)[1:], motion.state(0.0)
+    size, r = np.sqrt(1.0 + x * x / 4.0), np.hypot(x, x * x / 4.0)
+    w = 2.0 * (1.0 / r - 1.0 / np.hypot(end.x, end.z))
+    force = w / (2.0 * size**3) - (x * x / 4.0) / (r**3 * size)
+    assert [event.kind for event in motion.events] == ["contact-sign"] * (np.diff(np.sign(force)) != 0).sum() + [
+        "singular-point"
+    ]
+    assert module.solve(2, 3, contact="above").events[-1].kind == "singular-point"
+
+
+def test_a_force_without_a_bound_that_is_no_pole(built: Build) -> None:
+    """Where a logarithm has its pole the motion ends, after sqrt(pi/2) d/sqrt(a); a body that passes by a centre at a
+    small distance turns on the other side.
+    """
+    line = gqm.Curve.graph("c + 0*x", parameter="x")
+    log = built("into_a_logarithm", line, gqm.Potential("a*log(x**2)/2"))
+    motion = log.solve(0.7, a=1.0, c=0.0)
+    assert (motion.kind, motion.events[-1].kind) == ("transit", "singular-point")
+    assert motion.t_end == pytest.approx(0.7 * np.sqrt(np.pi / 2), rel=1e-15)
+    near = built("past_a_centre", line, gqm.CentralForce(k=1)).solve(0.7, c=1e-5)
+    assert near.turning_points == pytest.approx((0.7, -0.7), rel=1e-15)
 
 
 def test_a_ball_that_will_not_fit_is_told_at_once(built: Build) -> None:

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import generated.circle_drag
 import generated.helix_coulomb
 import gqm_sym as gqm
-from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
+from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError, SolutionError
 
 G = mpf("9.81")
 # Heights of a chart are right to a unit or two in the last place; half periods are tested to 2 of them.
@@ -272,6 +272,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
         (ParameterError, "length: must be positive", lambda: circle.solve(1, L=1, length=0)),
         (LaunchError, "is for one body", lambda: circle.solve(1, L=1, length=1, contact="above")),
         (InputError, "one body", lambda: circle.sweep("half_period", 1, L=1, length=1, contact="above")),
+        (SolutionError, "or of trains", lambda: circle.solve(1, L=1, length=1).gradient("normal_force_max")),
         (InputError, "is not a train", lambda: generated.circle_drag.solve(1, L=1).cars(0)),
     )
     for kind, message, call in cases:

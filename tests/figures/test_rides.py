@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpl_toolkits.mplot3d import proj3d
 from PIL import Image
 
 import generated.viviani
@@ -41,6 +42,23 @@ def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
     assert levels == [-1.0, 5.0, 1.5]
     figure.savefig(tmp_path / "ride.svg")
     assert (tmp_path / "ride.svg").stat().st_size > 10_000
+
+
+def test_the_labels_of_a_flat_track_do_not_overlap(tmp_path: Path) -> None:
+    """The numbers on all axes are apart from each other, although the track is 100 times as long as high."""
+    track = gqm.Curve.space(x="20*u", y="8*sin(u/2)", z="cos(u)/2", parameter="u", roll="u/8")
+    motion = gqm.build(gqm.derive(track, gqm.Gravity()), name="flat", folder=tmp_path).solve(-3, 30, t_max=4)
+    figure = gqm.figures.ride(motion)
+    figure.canvas.draw()
+    view = next(axes for axes in figure.axes if hasattr(axes, "get_zlim"))
+    corner = np.array([view.get_xlim()[1], view.get_ylim()[1], view.get_zlim()[1]])
+    for k, axis in enumerate((view.xaxis, view.yaxis, view.zaxis)):
+        ticks = axis.get_ticklocs()
+        places = np.tile(corner, (len(ticks), 1))
+        places[:, k] = ticks
+        shown = view.transData.transform(np.transpose(proj3d.proj_transform(*places.T, view.get_proj())[:2]))
+        assert len(ticks) > 1
+        assert np.linalg.norm(np.diff(shown, axis=0), axis=1).min() > axis.get_ticklabels()[0].get_size()
 
 
 def test_seats_and_their_animation(tmp_path: Path) -> None:

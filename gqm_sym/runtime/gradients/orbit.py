@@ -25,13 +25,6 @@ def requested_quantity(name: str) -> Iterator[None]:
         raise SolutionError(str(error).replace("gradients:", f"{name}:", 1)) from None
 
 
-def liftoff_in_space() -> SolutionError:
-    """Return the error for derivatives of an end by lift-off from a track in space."""
-    return SolutionError(
-        "gradient: the end of a motion by lift-off from a track in space has none; take differences of solved motions"
-    )
-
-
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
@@ -55,6 +48,8 @@ def check_force(formulas: Formulas, quantity: str) -> None:
         aside = "coriolis" if isinstance(exact, ExactPotential) else "coriolis_loads"
         has_force = getattr(exact, aside, None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
+        if not formulas.directed:
+            raise without_formulas()
         raise SolutionError(
             f"gradients: there are none of {quantity}, because the contact force has no known derivatives on a space "
             "curve in a rotating frame"

@@ -19,13 +19,24 @@ from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import liftoff_in_space
-from gqm_sym.runtime.gradients.path import CURVATURE, DS, LOAD, PRODUCT, SPACE_Y, X, Z, path_rows
+from gqm_sym.runtime.gradients.path import (
+    CURVATURE,
+    DS,
+    LOAD,
+    PRODUCT,
+    SPACE_Y,
+    PathRows,
+    X,
+    Z,
+    path_rows,
+    squared_force,
+)
 from gqm_sym.runtime.gradients.programs import (
     Program,
     extreme_program,
     libration_program,
     range_program,
+    sided_program,
     turning_point_program,
 )
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
@@ -270,35 +281,39 @@ class PassageChanges:
             found[:count] += path[row, 1:-1]
             return found
 
-        kappa, load, w = whole(CURVATURE), whole(LOAD), v * v
         if len(path) <= PRODUCT:
-            force = w * kappa + 2.0 * v * path[CURVATURE, 0] * faster + load
+            force = v * v * whole(CURVATURE) + 2.0 * v * path[CURVATURE, 0] * faster + whole(LOAD)
         else:
-            product = path[PRODUCT, 0]
-            force = path[CURVATURE, 0] * w * w * kappa + w * whole(PRODUCT) + path[LOAD, 0] * load
-            force += 2.0 * v * (path[CURVATURE, 0] ** 2 * w + product) * faster
-            force /= np.sqrt((path[CURVATURE, 0] * w) ** 2 + 2.0 * product * w + path[LOAD, 0] ** 2)
+            square = squared_force(PathRows(path), v, v * v)
+            changes = np.array([whole(row) for row in range(len(path))])
+            force = square.half_change(changes) + (v * square.even + square.odd) * faster
+            force /= np.sqrt(square.square)
         launched = self._path(np.array([self.launch.high]))[DS, 0, 0] * self.launch.moves[0]
         arc = ds * moved - launched[:, None]
         arc[:count] += arcs
         across = whole(SPACE_Y) if len(path) > SPACE_Y else np.zeros_like(moved)
         return np.array([moved, arc, whole(X), whole(Z), faster, force, across])
 
-    def extreme_rows(self, lam: float, *, of_speed: bool) -> Array:
+    def direction(self, *, has_turned: bool) -> int:
+        """Return the sign of ds/dt before or after the turn."""
+        return -self._heading if has_turned else self._heading
+
+    def extreme_rows(self, lam: float, direction: int, *, of_speed: bool) -> Array:
         """Return half of V**2, or the contact force, at a place, with two derivatives with respect to the place and
-        those with respect to all variables.
+        those with respect to all variables; ``direction`` is the sign of ds/dt.
         """
-        rows: Array = values(extreme_program(self.source, of_speed), self.variables, np.array([lam]))[:, 0, 0]
+        program = extreme_program(self.source, of_speed, 1 if of_speed else direction)
+        rows: Array = values(program, self.variables, np.array([lam]))[:, 0, 0]
         return rows
 
-    def end(self, what: str, lam: float) -> Array:
-        """Return the derivatives of the place where the motion ends, by the reason for it."""
+    def end(self, what: str, lam: float, direction: int) -> Array:
+        """Return the derivatives of the place where the motion ends, by the reason for it; ``direction`` is the sign of
+        ds/dt.
+        """
         count, moved = self.source.parameters, np.zeros(self.source.variables)
-        if what == "liftoff" and not self._problem.formulas.signed:
-            raise liftoff_in_space()
         if what == "liftoff":
-            rows = self.extreme_rows(lam, of_speed=False)
-            moved = -rows[3:] / rows[1]
+            rows = values(sided_program(self.source, direction), self.variables, np.array([lam]))[:, 0, 0]
+            moved = -rows[2:] / rows[1]
         elif what == "domain-end":
             found = values(range_program(self.source.domain, count), self._parameters, np.zeros(1))[:, 0, 0]
             at_high = abs(lam - self._problem.high) < abs(lam - self._problem.low)
@@ -346,8 +361,9 @@ def gradient(motion: Any, changes: PassageChanges, quantity: str) -> Array:
     what, state = motion.legs[-1].end, motion.state(motion.t_end)
     if what == "horizon" or motion.t_end == 0.0:
         return np.zeros(changes.source.variables)
-    moved = changes.end(what, state.lam)
-    return changes.time_slopes(state.lam, state.v, moved, has_turned=motion._has_turned(motion.t_end))
+    has_turned = motion._has_turned(motion.t_end)
+    moved = changes.end(what, state.lam, changes.direction(has_turned=has_turned))
+    return changes.time_slopes(state.lam, state.v, moved, has_turned=has_turned)
 
 
 def _extreme(motion: Any, changes: PassageChanges, quantity: str) -> Array:
@@ -359,8 +375,8 @@ def _extreme(motion: Any, changes: PassageChanges, quantity: str) -> Array:
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
         return np.zeros(changes.source.variables)
-    place, end = found.lam, motion.t_end
-    rows = changes.extreme_rows(place, of_speed=of_speed)
+    place, end, direction = found.lam, motion.t_end, changes.direction(has_turned=motion._has_turned(found.t))
+    rows = changes.extreme_rows(place, direction, of_speed=of_speed)
     if found.t == 0.0:
         moved = changes.launch.moves[0]
     elif isfinite(end) and abs(found.t - end) <= AT_END * end:
@@ -370,13 +386,13 @@ def _extreme(motion: Any, changes: PassageChanges, quantity: str) -> Array:
             at = np.array([state.lam]), np.array([state.v]), np.array([motion._has_turned(end)])
             moved = changes.states(*at)[0, :, 0]
         else:
-            moved = changes.end(what, state.lam)
+            moved = changes.end(what, state.lam, direction)
     elif motion.turning_points and abs(place - changes.turn.high) <= AT_END * abs(place - changes.launch.high):
         moved = changes.turn.moves[0]
     else:
         moved = np.zeros(changes.source.variables)
         for _ in range(NEWTON_STEPS):
             place = place - rows[1] / rows[2] if rows[2] != 0.0 else place
-            rows = changes.extreme_rows(place, of_speed=of_speed)
+            rows = changes.extreme_rows(place, direction, of_speed=of_speed)
     total: Array = (rows[3:] + rows[1] * moved) / (found.value if of_speed else 1.0)
     return total

@@ -60,14 +60,51 @@ def path_rows(
     return PathRows(found.reshape(len(found) // (count + 2), count + 2, high.size))
 
 
+class SquaredForce(NamedTuple):
+    """|N|**2 along a curve in no vertical plane, and how it changes.
+
+    Attributes
+    ----------
+    square : (n,) array
+        |N|**2.
+    factors : (k, n) array
+        The factors of the changes of ``kinds`` in half of its change.
+    kinds : list of int
+        The quantities of the path that it depends on.
+    even, odd : (n,) arrays
+        Parts of the derivative of half of it with respect to ds/dt = v, which is ``v * even + odd``.
+    """
+
+    square: Array
+    factors: Array
+    kinds: list[int]
+    even: Array
+    odd: Array
+
+    def half_change(self, changes: Array) -> Array:
+        """Return half of the change that follows from changes of all quantities of the path at a fixed speed."""
+        found: Array = np.einsum("kn,k...n->...n", self.factors, changes[self.kinds])
+        return found
+
+
+def squared_force(path: PathRows, v: Array, w: Array) -> SquaredForce:
+    """Return |N|**2 along a curve in no vertical plane, given velocities ds/dt along the path and their squares."""
+    rows, kinds = path.rows[:, 0], [CURVATURE, PRODUCT, LOAD]
+    kappa, load, product = rows[CURVATURE], rows[LOAD], rows[PRODUCT]
+    factors = [kappa * w * w, w, load]
+    square, even, odd = (kappa * w) ** 2 + 2.0 * product * w + load * load, 2.0 * (kappa * kappa * w + product), 0.0 * w
+    if len(rows) > ASIDE:
+        aside, turning = rows[ASIDE], rows[ASIDE_TURN]
+        kinds, factors = [*kinds, ASIDE, ASIDE_TURN], [*factors, v, v * w]
+        square, odd = square + 2.0 * v * (aside + turning * w), aside + 3.0 * turning * w
+    return SquaredForce(square, np.array(factors), kinds, even, odd)
+
+
 def squared_force_rate(path: PathRows, v: Array) -> Array:
     """Return half of d(N**2)/dt along a space curve in a rotating frame, given velocities ds/dt along the path."""
-    ds, along, w = path.ds[0], path.rows[:, -1] * (v / path.ds[0]), v * v
-    kinds = CURVATURE, LOAD, PRODUCT, ASIDE, ASIDE_TURN
-    (kappa, load, product, aside, turning), rates = path.rows[kinds, 0], along[list(kinds)]
-    factors = np.array([kappa * w * w, load, w, v, v * w])
-    by_speed = 2.0 * v * (kappa * kappa * w + product) + aside + 3.0 * turning * w
-    rate: Array = (factors * rates).sum(axis=0) - by_speed * path.rows[POTENTIAL, -1] / ds
+    force = squared_force(path, v, v * v)
+    along = path.rows[:, -1] * (v / path.ds[0])
+    rate: Array = force.half_change(along) - (v * force.even + force.odd) * path.rows[POTENTIAL, -1] / path.ds[0]
     return rate
 
 
@@ -100,9 +137,9 @@ def path_changes(path, v, places, found):  # type: ignore[no-untyped-def]
     found : (5, variables, n) array
         The changes of x, z, v, N and y. That of v is given; the others are filled.
     """
-    in_space, signed, spare = path.shape[0] > SPACE_Y, path.shape[0] <= PRODUCT, np.empty((2, v.size))
-    kappa, still, kappa_change, product = path[CURVATURE, 0], path[LOAD, 0], spare[0], spare[1]
-    turns, aside, aside_turn = path.shape[0] > ASIDE, np.empty(v.size), np.empty(v.size)
+    in_space, signed, turns = path.shape[0] > SPACE_Y, path.shape[0] <= PRODUCT, path.shape[0] > ASIDE
+    kappa, still, spare = path[CURVATURE, 0], path[LOAD, 0], np.empty((4 if turns else 1 if signed else 2, v.size))
+    kappa_change, product, aside, aside_turn = spare[0], spare[0 if signed else 1], spare[-2 if turns else 0], spare[-1]
     for j in range(places.shape[0]):
         faster, force = found[CHANGED_V, j], found[CHANGED_FORCE, j]
         fill_changed(path[X], j, places[j], found[CHANGED_X, j])

@@ -222,7 +222,9 @@ def turning_point_program(source: AnySource, wanted: tuple[int, ...] | None = No
 
 
 @lru_cache(maxsize=64)
-def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
+def libration_program(
+    source: AnySource, wanted: tuple[int, ...] | None = None, recorder: Callable[[int, int], Recorder] = Recorder
+) -> Program:
     """Return the program of the integrand over the phase angle of a libration, with its derivatives at the same phase
     angle.
 
@@ -230,10 +232,11 @@ def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) 
     are both turning points and then the derivatives of each. The results are dt/dphi, its derivatives with respect to
     all variables, V**2 dt/dphi (1+beta) with its derivatives, and the derivatives of ds/dlam with respect to the
     run-time parameters at the same place. If variables are ``wanted``, there are derivatives of the turning points with
-    respect to these alone, and the results are dt/dphi and its derivatives with respect to them.
+    respect to these alone, and the results are dt/dphi and its derivatives with respect to them. ``recorder`` makes the
+    tape.
     """
     n, rows = source.variables, range(source.variables) if wanted is None else wanted
-    op = Recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
+    op = recorder(source.inputs + 2 + 2 * len(rows), source.coordinates)
     share, (a, b, *ends) = op.place, op.values[source.inputs :]
     width, inertia = b - a, source.one_plus_beta(op)
     half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, a + width * share)
@@ -353,6 +356,39 @@ def length_of_contact(op: Recorder, forms: ContactForms, w: Any, direction: Any)
     return op.sqrt(square)
 
 
+def sided_force(op: Recorder, formulas: ExactFormulas | ExactLaw, place: tuple[TapeNumber, Any], direction: Any) -> Any:
+    """Record the force per unit mass whose sign shows on which side of the track a body is, given a place, V**2 there
+    and the sign of ds/dt: N/m, or its component along the upward direction of the riders of a banked track in space.
+    """
+    lam, w = place
+    if formulas.load_along_curvature is None:
+        return length_of_contact(op, contact_forms(op, formulas, lam, op.values), w, direction)
+    if formulas.upright_force is None:
+        raise SolutionError("gradients: no formula of this track shows on which side of it a body is")
+    return component_of_contact(op, formulas.upright_force(op, lam, op.values), w, direction)
+
+
+def component_of_contact(op: Recorder, parts: Sequence[Any], w: Any, direction: Any) -> Any:
+    """Record a component of N/m from its parts at rest and by V**2, and in a rotating frame by ds/dt."""
+    at_rest, by_square, *by_velocity = parts
+    found = at_rest + by_square * w
+    for part in by_velocity:
+        found = found + direction * op.sqrt(w) * part
+    return op.number(found)
+
+
+@lru_cache(maxsize=64)
+def sided_program(source: Source, direction: int) -> Program:
+    """Return the program of `sided_force` at a place, and of its derivatives with respect to the place and the
+    variables.
+
+    The inputs are the variables; ``direction`` is the sign of ds/dt.
+    """
+    op = Recorder(source.variables)
+    force = sided_force(op, source.formulas, (op.place, 2 * source.half(op, op.place)), direction)
+    return with_derivatives(op, [force], [op.place, *op.values])
+
+
 def extreme_quantity(op: Recorder, source: Source, of_speed: bool, direction: int = 1) -> TapeNumber:
     """Record half of V**2, or the contact force, at the place of a tape whose inputs are the variables."""
     half = source.half(op, op.place)
@@ -365,15 +401,19 @@ def extreme_quantity(op: Recorder, source: Source, of_speed: bool, direction: in
 
 @lru_cache(maxsize=64)
 def extreme_program(
-    source: Source, of_speed: bool, direction: int = 1, wanted: tuple[int, ...] | None = None
+    source: Source,
+    of_speed: bool,
+    direction: int = 1,
+    wanted: tuple[int, ...] | None = None,
+    recorder: Callable[[int, int], Recorder] = Recorder,
 ) -> Program:
     """Return the program of half of V**2, or of the contact force, at a place, with its first and second derivative
     with respect to the place.
 
     The inputs are the variables; the derivatives with respect to them, or to those that are ``wanted``, follow.
-    ``direction`` is the sign of ds/dt.
+    ``direction`` is the sign of ds/dt, and ``recorder`` makes the tape.
     """
-    op = Recorder(source.variables)
+    op = recorder(source.variables, 1)
     quantity = extreme_quantity(op, source, of_speed, direction)
     rows = range(source.variables) if wanted is None else wanted
     slope, *partials = gradient(op, quantity, [op.place, *(op.values[k] for k in rows)])

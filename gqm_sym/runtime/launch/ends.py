@@ -9,7 +9,7 @@ from numba import types
 
 from gqm_sym.budgets import check_budget
 from gqm_sym.errors import LaunchError, SolutionError
-from gqm_sym.runtime.compiled.calls import call_effective_potential
+from gqm_sym.runtime.compiled.calls import call_bounds, call_effective_potential
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, REAL, VECTOR
@@ -18,7 +18,16 @@ from gqm_sym.runtime.launch.kinds import EndKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.rounded import ZERO_SHARE
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
-from gqm_sym.runtime.launch.zeros import CRITICAL, LIMIT, TURN, FoundEnd, SearchArrays, first_zero, speed_squared
+from gqm_sym.runtime.launch.zeros import (
+    CRITICAL,
+    LIMIT,
+    MIN_STEP_SHARE,
+    TURN,
+    FoundEnd,
+    SearchArrays,
+    first_zero,
+    speed_squared,
+)
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS
 from gqm_sym.runtime.multiprecision.exact_problem import End
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -92,7 +101,11 @@ def mirror_image(fns, p, lam0, direction, length, domain):  # type: ignore[no-un
     if near_axis or (step > 0.0 and ahead > MAX_AXIS_STEP_SHARE * step):
         return 0.0
     guess *= direction
-    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(0))
+    arrays, middle = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4)), lam0 + 0.5 * guess
+    error = MIN_STEP_SHARE * (fabs(lam0) + fabs(middle))
+    call_bounds(fns.bounds, middle - error, middle + error, p, arrays.bounds)
+    if not isfinite(arrays.bounds[1] - arrays.bounds[0]):
+        return 0.0  # the potential may have a pole there
     v2, _size = speed_squared(fns, p, lam0, 0.0, guess, arrays)
     call_effective_potential(fns.effective_potential, 1, arrays.point, p, arrays.rows)
     correction = v2 / (2.0 * arrays.rows[1, 0])  # one step of Newton's method, because the axis is rounded

@@ -39,6 +39,11 @@ TERMS_GROWTH = 1e3
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
 CUSP_SHARE = 1e-6
 
+# V**2 has a pole on a narrow step on which its slope has no bound if it gains no less than the first share of what it
+# gained before, each time that the distance is divided by the second number, beginning with the third times the width
+# of the step. Near a logarithm these gains are equal; where only the slope is infinite, as for a root, they decrease.
+POLE_GAIN, POLE_RATIO, POLE_BEGIN = 0.8, 256.0, 2.0**24
+
 # Width of the narrowest step as a share of the parameter: a few units in the last place.
 MIN_STEP_SHARE = 1e-15
 
@@ -163,6 +168,23 @@ def stays_positive(lower, upper, width, narrow, v2_near, v2_far, size):  # type:
 
 
 @Inner
+def is_pole(fns, p, lam0, w0, near, far, arrays):  # type: ignore[no-untyped-def]
+    """Return whether V**2 becomes infinite on a narrow step, given the signed offsets of its ends, on which its slope
+    has no bound.
+    """
+    width = POLE_BEGIN * (far - near)
+    before, _size = speed_squared(fns, p, lam0, w0, near - width, arrays)
+    gained = 0.0
+    for _ in range(3):
+        width /= POLE_RATIO
+        v2, _size = speed_squared(fns, p, lam0, w0, near - width, arrays)
+        if not v2 - before > POLE_GAIN * gained:
+            return False
+        before, gained = v2, v2 - before
+    return True
+
+
+@Inner
 def without_length(near, far, ds_high, last_ds, widest_ds):  # type: ignore[no-untyped-def]
     """Return what ends a search at a step on which ds > 0 cannot be proved.
 
@@ -232,6 +254,12 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
             if upper <= 0.0 and v2_far <= 0.0:
                 return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, (size, passed), arrays)
             positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, size)
+            if (
+                narrow
+                and not isfinite(upper - lower)
+                and is_pole(fns, p, lam0, w0, direction * near, direction * far, arrays)
+            ):
+                return FoundEnd(NOT_FINITE, direction * near, direction * far)
         if positive < 0:
             return FoundEnd(CRITICAL, direction * near, direction * far)
         if positive:

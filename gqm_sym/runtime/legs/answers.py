@@ -43,6 +43,7 @@ from gqm_sym.runtime.legs.body import (
     PAUSES,
     PERIOD,
     PLACE,
+    RETRY_WIDTH,
     SIZE,
     STATUS,
     STEP,
@@ -52,7 +53,7 @@ from gqm_sym.runtime.legs.body import (
     V2,
     VALUE,
 )
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
+from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, SMALL_SHARE, may_be_small
 from gqm_sym.runtime.legs.gaps.data import forget_gaps
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
@@ -315,7 +316,9 @@ def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
         return True
     if dissipation.friction:
         return slides_little(record, body)
-    return fabs(end - start) < SMALL_SHARE * max(fabs(end), body[LEAST_SIZE])
+    width = fabs(end - start)
+    is_too_wide = body[RETRY_WIDTH] < width <= body[RETRY_WIDTH] / LEAST_RETRY_SHARE
+    return width < SMALL_SHARE * max(fabs(end), body[LEAST_SIZE]) and not is_too_wide
 
 
 @Inner

@@ -37,6 +37,8 @@ FROM_REST             1 if the launch was from rest
 ENDING                the code of what has ended the motion (`advance`), or 0
 PANEL_COUNT           how many panels the records of the legs had, with one more for each (counted for `solve`)
 LEAST_SIZE            a size of places below which their roundings do not decrease; 0 on a curve with formulas
+RETRY_WIDTH           the width of a leg below which the body may be followed by its distance from an equilibrium, as it
+                      could not on a wider one; 0 if that was not tried
 TOTAL, LAST_AT        how many elements the records of the last call take, and where the last of them begins (counted
                       for `solve`)
 BRANCH, BRANCH_HEIGHT the branch point of ds that the last leg passed by (`runs.leg_variable`)
@@ -56,7 +58,7 @@ LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
 LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
-UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, KINKS = range(34, 42)
+UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, RETRY_WIDTH, KINKS = range(34, 43)
 SIZE = KINKS + ROOM_FOR_KINKS
 
 # A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest

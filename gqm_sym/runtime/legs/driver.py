@@ -33,7 +33,6 @@ from gqm_sym.runtime.legs.body import (
     LAM0,
     LAPS,
     LAST_AT,
-    LEAST_SIZE,
     LEAST_SWING,
     LEG_TIME,
     LOW,
@@ -45,6 +44,7 @@ from gqm_sym.runtime.legs.body import (
     PLACE,
     PLACE_LOW,
     REACH,
+    RETRY_WIDTH,
     STATUS,
     STEP,
     TOTAL,
@@ -54,8 +54,9 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
 from gqm_sym.runtime.legs.endings import cusp_ahead, end_name, failure, force_cancels
-from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, entry_near
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame
+from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, Entry, entry_near
+from gqm_sym.runtime.legs.frames.fitting import TryLater
+from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, RETRY_MARGIN, Frame
 from gqm_sym.runtime.legs.frames.swings import may_have_died_away, move_swings, swings_per_call
 from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
@@ -330,9 +331,9 @@ class Driver:
         elif what == END_ASYMPTOTE and not linear:
             self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
         elif not in_frame and not self.dissipation.friction:  # with friction it slides (`_slides_nearby`)
-            turns_nearby = what == END_TURN and abs(end - start) < SMALL_SHARE * max(abs(end), self.body[0, LEAST_SIZE])
+            turns_nearby = what == END_TURN and self.number(STATUS)
             if turns_nearby or (what == END_PAUSE and self._creeps(self.body.item)):
-                self._enter_frame()
+                self._enter_frame(width=abs(end - start))
 
     def _slides_nearby(self, what: int, record: Array) -> bool:
         """Return whether a leg from rest is so short that it loses digits, or cannot be followed, by places; from its
@@ -384,15 +385,18 @@ class Driver:
             self.body[0, STEP] = 0.0
             self.launch_error = ULP * abs(float(self.body[0, PLACE]))
 
-    def _enter_frame(self, lam0: Number | None = None) -> None:
+    def _enter_frame(self, lam0: Number | None = None, width: float = 0.0) -> None:
         """From here on, follow the body by its distance from an equilibrium, if it is close to one and stays there for
         a while.
 
-        A body does not stay near an unstable equilibrium, so this is done only for a launch there, at ``lam0``.
+        A body does not stay near an unstable equilibrium, so this is done only for a launch there, at ``lam0``. If the
+        last leg, of a given ``width``, was too wide, it is not tried again before that makes sense.
         """
         line = self.body[0]
         entry = entry_near(self.problem, self.dissipation, line, lam0)
-        if entry is None:
+        if isinstance(entry, TryLater):
+            line[RETRY_WIDTH] = width * max(min(RETRY_MARGIN * entry.share, 1.0), LEAST_RETRY_SHARE)
+        if not isinstance(entry, Entry):
             return
         self._frame, self._place_in_frame, self._reach_in_frame = entry.frame, float(line[PLACE]), entry.reach
         frame = entry.frame

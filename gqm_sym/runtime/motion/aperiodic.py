@@ -9,7 +9,7 @@ import numpy as np
 
 from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.gradients.passage import PassageChanges, gradient
@@ -40,6 +40,10 @@ MAX_SEGMENTS_AHEAD, MAX_PANELS_AHEAD = 12, 200
 
 # The next segment is twice as long unless the last one has more panels than this.
 MAX_PANELS_TO_DOUBLE = 64
+
+# The distance from a pole, as a share of the parameter, within which contact forces are rounding: they grow as the
+# distance to the power -1, and the rounding of places in them as its power -3.
+NEAR_POLE = 1e-7
 
 # The phase angle up to which the approach to an equilibrium is shown; the rest of the way is less than a thousandth of
 # it.
@@ -90,6 +94,7 @@ class AperiodicMotion(Motion):
         # The reason for which a motion to infinity cannot be followed any farther.
         self._obstacle = ""
         self._segments_at_first, self._is_endless = 0, False
+        self._pole = inf  # the place of the pole into which the body falls
 
     @property
     @locked
@@ -147,7 +152,7 @@ class AperiodicMotion(Motion):
             return
         side = ONLY_SIGN[self.problem.launch.contact]
         lost = liftoff(self.problem.formulas, timed, side, first=not self._segments) if side else None
-        if lost is not None:
+        if lost is not None and not self._is_at_pole(timed, lost[1]):
             t_stop = stop_time(timed.sense, timed.r_start, lost[0], timed.t_start)
             timed = timed._replace(r_stop=lost[0], phi_stop=lost[1], t_stop=t_stop, end="liftoff")
             self.kind, self.open_end = "transit", None
@@ -158,10 +163,23 @@ class AperiodicMotion(Motion):
         if not self.lifted_off:
             self.add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
 
+    def _is_at_pole(self, timed: TimedSegment, phi: float) -> bool:
+        """Return whether a phase angle of a timed segment is so near to the pole into which the body falls that the
+        sign of the contact force there is rounding.
+        """
+        if not isfinite(self._pole):
+            return False
+        place = float(timed.segment.places(np.array([phi]))[0])
+        return abs(place - self._pole) <= NEAR_POLE * (abs(self._pole) + abs(self.problem.lam0))
+
+    def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
+        changes = super()._contact_changes(timed)
+        return [change for change in changes if not self._is_at_pole(timed, change[1])]
+
     def leave_open(self, end: OpenEnd) -> None:
         """Let the motion be continued beyond its segments, unless contact is lost on them."""
         if not self.lifted_off:
-            self.open_end = end
+            self.open_end, self._pole = end, end.limit
 
     def finish(self) -> "AperiodicMotion":
         """Compute at least the first segment; return the motion itself."""

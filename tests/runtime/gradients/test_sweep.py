@@ -73,6 +73,33 @@ def test_wells_of_two_shapes(lam0: float, generated_folder: Path) -> None:
             assert found.gradient[0, row] == pytest.approx(float((sides[0] - sides[1]) / (2 * step)), rel=1e-14)
 
 
+@pytest.mark.parametrize(("sign", "top", "bottom"), [(-1, -2, 1), (1, 4, 3)])
+def test_wells_of_powers(sign: int, top: int, bottom: int, generated_folder: Path) -> None:
+    """Along a graph of a power of 1 + x**2, whose time is an integral with a divided difference of the power, swept
+    derivatives are those of the integral with 40 digits.
+    """
+    curve = gqm.Curve.graph(z=f"{sign}*(1 + x**2)**({top}/{bottom})")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name=f"power_{bottom}", folder=generated_folder)
+    lam0 = [0.2, 0.7]
+    found = module.sweep("half_period", lam0=lam0, g=9.81, gradient=("lam0", "g"))
+
+    def half_period(width: mpf, power: mpf) -> mpf:
+        def rate(phi: mpf) -> mpf:
+            x = width * mp.sin(phi)
+            slope = 2 * power * x * (1 + x * x) ** (power - 1)
+            fall = sign * ((1 + width**2) ** power - (1 + x * x) ** power)
+            return mp.sqrt(1 + slope**2) * width * mp.cos(phi) / mp.sqrt(2 * mpf(9.81) * fall)
+
+        return 2 * mp.quad(rate, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
+
+    with mp.workdps(40):
+        for k, place in enumerate(lam0):
+            step, at, power = mpf(10) ** -10, mpf(place), mpf(top) / bottom
+            by_place = (half_period(at + step, power) - half_period(at - step, power)) / (2 * step)
+            assert found.gradient[k, 0] == pytest.approx(float(by_place), rel=4 * ULP)
+            assert found.gradient[k, 1] == pytest.approx(float(-half_period(at, power) / (2 * mpf(9.81))), rel=4 * ULP)
+
+
 def test_turning_points_come_with_times() -> None:
     """A pendulum at rest turns at its mirror image; a thrown one turns where its energy ends; a lap has no turns."""
     module, lam0, v0 = generated("circle"), np.array([0.3, -1.2, 0.0, 0.5]), np.array([0.0, 0.0, 1.0, 12.0])

@@ -408,6 +408,8 @@ class TruePieces:
         if it is that edge.
     in_space : bool
         Whether the curve has a third coordinate.
+    frame : callable, optional
+        ``frame(k, u, u_low)`` gives the frame of a rail in space at a place on piece k.
     """
 
     def __init__(
@@ -417,8 +419,9 @@ class TruePieces:
         start: tuple[float, float, float, float] | None = None,
         *,
         in_space: bool = False,
+        frame: Callable[[int, float, float], Array] | None = None,
     ) -> None:
-        count = chart.edges.size - 1
+        count, self._frame = chart.edges.size - 1, frame
         self._sample, self._point, self._tables = sample, start, _tables()
         self.curve = TrueCurve(
             np.zeros((count, ROWS_IN_SPACE if in_space else 4, NODES)),
@@ -441,6 +444,11 @@ class TruePieces:
         self.make(self.begin, self.begin)
         length: Pair = length_to(self.curve, self.begin, self._point)
         return length
+
+    def frame(self, k: int, u: float, u_low: float) -> Array:
+        """Return the rows t, l and u of the frame of a rail in space at a place on piece k, as two doubles each."""
+        assert self._frame is not None
+        return self._frame(k, u, u_low)
 
     def number_of(self, place: float) -> int:
         """Return the number of the piece on which a place lies, given by its arc length in doubles."""

@@ -180,7 +180,7 @@ class SpaceRail:
         if chart.edges.size > MAX_TRUE_PIECES:
             return None
         rail = TrueRail(self.pieces, self.placed, self.numbers, self.formulas, p, chart)
-        return TruePieces(chart, rail.sample, in_space=True)
+        return TruePieces(chart, rail.sample, in_space=True, frame=rail.frame)
 
 
 def _start(numbers: Long) -> Pose:

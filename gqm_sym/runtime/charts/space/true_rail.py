@@ -13,7 +13,7 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, NODES, Samples, sample_places, starting_context
 from gqm_sym.runtime.charts.exact_parts import samples_between
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
@@ -116,6 +116,33 @@ def value_of_series(series, row, axis, share, share_low):  # type: ignore[no-unt
     return high, low
 
 
+@Inner
+def rates_by_parts(rates, step):  # type: ignore[no-untyped-def]
+    """Return the coefficients in powers of the number of parts passed, from those in powers of the distance."""
+    whole = np.zeros((3, POWERS, 2))
+    for rate in range(3):
+        power, power_low = step[0], step[1]
+        for j in range(POWERS):
+            whole[rate, j] = multiply(rates[rate, j, 0], rates[rate, j, 1], power, power_low)
+            power, power_low = multiply(power, power_low, step[0], step[1])
+    return whole
+
+
+@entry(
+    types.void(types.float64[:, :, ::1], VECTOR, types.float64[:, :, ::1], INTEGER, VECTOR, types.float64[:, :, ::1])
+)
+def fill_frame(rates, step, pose, part, share, frame):  # type: ignore[no-untyped-def]
+    """Fill the frame's rows where a share of a part has been passed; the arguments are those of `fill_parts`, with the
+    pose at the left end of the part.
+    """
+    scaled, series = np.zeros((3, POWERS, 2)), np.zeros((TERMS + 1, 4, 3, 2))
+    shift_rates(rates_by_parts(rates, step), part, scaled)
+    fill_series(scaled, step, pose, series)
+    for row in range(3):
+        for axis in range(3):
+            frame[row, axis] = value_of_series(series, row, axis, share[0], share[1])
+
+
 @entry(types.void(types.float64[:, :, ::1], VECTOR, types.float64[:, :, ::1], types.float64[:, :, :, ::1], MATRIX))
 def fill_parts(rates, step, pose, samples, nodes):  # type: ignore[no-untyped-def]
     """Fill the coordinates x, z and y on the n equal parts of a piece, and move the pose to its right end.
@@ -133,12 +160,7 @@ def fill_parts(rates, step, pose, samples, nodes):  # type: ignore[no-untyped-de
     nodes : (2, NODES) array
         The Chebyshev points in [-1, 1], as two doubles each.
     """
-    whole, scaled, series = np.zeros((3, POWERS, 2)), np.zeros((3, POWERS, 2)), np.zeros((TERMS + 1, 4, 3, 2))
-    for rate in range(3):
-        power, power_low = step[0], step[1]
-        for j in range(POWERS):
-            whole[rate, j] = multiply(rates[rate, j, 0], rates[rate, j, 1], power, power_low)
-            power, power_low = multiply(power, power_low, step[0], step[1])
+    whole, scaled, series = rates_by_parts(rates, step), np.zeros((3, POWERS, 2)), np.zeros((TERMS + 1, 4, 3, 2))
     for part in range(samples.shape[0]):
         shift_rates(whole, part, scaled)
         fill_series(scaled, step, pose, series)
@@ -190,6 +212,7 @@ class TrueRail:
             place, angles = [*islice(given, 3)], [*islice(given, 3)]
             pose = _pairs([*starting_frame(context.cos, context.sin, *angles), place])
         self._parts: list[Array | Callable[[Any], tuple[Any, ...]]] = []
+        self._begins = list[tuple[Array, Array, Array] | None]()
         for kind, count in zip(kinds, counts, strict=True):
             own = [*islice(given, PIECE_NUMBERS[kind])]
             passed += count
@@ -199,14 +222,16 @@ class TrueRail:
                 size = context.sqrt(dx * dx + dy * dy + dz * dz)
                 pose = _pairs([*level_frame(context.hypot, [dx / size, dy / size, dz / size]), place])
                 self._parts.append(at)
+                self._begins.append(None)
                 continue
             length, rates = rates_of(kind, own)
             coefficients = np.zeros((3, POWERS, 2))
             for row, terms in zip(coefficients, rates, strict=True):
                 for j, term in enumerate(terms):
                     row[j] = two_doubles(term)
-            samples = np.empty((count, 3, 2, NODES))
-            fill_parts(coefficients, np.array(two_doubles(length / count)), pose, samples, sample_places())
+            samples, step = np.empty((count, 3, 2, NODES)), np.array(two_doubles(length / count))
+            self._begins.append((coefficients, step, pose.copy()))
+            fill_parts(coefficients, step, pose, samples, sample_places())
             self._parts.append(samples)
         self._error = ROUNDINGS * UNIT * (1.0 + passed) * float(np.abs(chart.edges[[0, -1]]).max())
 
@@ -223,6 +248,19 @@ class TrueRail:
             return [found[axis] for axis in IN_SAMPLES]
 
         return samples_between(self._context, coordinates, low, high)
+
+    def frame(self, k: int, u: float, u_low: float) -> Array:
+        """Return the rows t, l and u of the frame at a place on a piece of the chart that is no curve with formulas, as
+        two doubles each.
+        """
+        number, low, _ = self._origins[k]
+        begin = self._begins[number]
+        assert begin is not None
+        coefficients, step, pose = begin[0], begin[1], begin[2].copy()
+        fill_parts(coefficients, step, pose, np.empty((int(low), 3, 2, NODES)), sample_places())
+        frame, share = np.empty((3, 3, 2)), np.array(add.py_func(0.5 * u, 0.5 * u_low, 0.5, 0.0))
+        fill_frame(coefficients, step, pose, int(low), share, frame)
+        return frame
 
 
 def _pairs(values: Any) -> Array:

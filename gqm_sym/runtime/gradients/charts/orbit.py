@@ -42,7 +42,7 @@ from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_p
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
-from gqm_sym.runtime.gradients.path import ASIDE, ASIDE_TURN, CURVATURE, LOAD, PRODUCT, PathRows
+from gqm_sym.runtime.gradients.path import ASIDE, PathRows, squared_force
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
 from gqm_sym.runtime.interface import ExactPotential
@@ -390,16 +390,10 @@ def _length_rows(path: PathRows, rows: Array, direction: int) -> tuple[list[Arra
     respect to all variables, given half of V**2 with its derivatives in the same order, and the sign of ds/dt.
     """
     w = 2.0 * rows[0]
-    kappa, load, product = path.curvature[0], path.load[0], path.rows[PRODUCT, 0]
-    # Half of the square of N, and of its derivative with respect to half of V**2, have a term for each of these rows.
-    kinds, factors = [CURVATURE, PRODUCT, LOAD], [kappa * w**2, w, load]
-    square, by_half = (kappa * w) ** 2 + 2.0 * product * w + load**2, 2.0 * (kappa**2 * w + product)
-    if len(path.rows) > ASIDE:
-        v = direction * np.sqrt(np.maximum(w, 0.0))  # at a turn rounding may leave W below zero
-        kinds, factors = [*kinds, ASIDE, ASIDE_TURN], [*factors, v, v * w]
-        aside, turning = path.rows[ASIDE, 0], path.rows[ASIDE_TURN, 0]
-        square, by_half = square + 2.0 * v * (aside + turning * w), by_half + (aside / v + 3.0 * turning * v)
-    length, of_path = np.sqrt(square), np.einsum("kn,kmn->mn", np.array(factors), path.rows[kinds])
+    v = direction * np.sqrt(np.maximum(w, 0.0))  # at a turn rounding may leave W below zero
+    force = squared_force(path, v, w)
+    by_half = force.even + force.odd / v if len(path.rows) > ASIDE else force.even
+    length, of_path = np.sqrt(force.square), force.half_change(path.rows)
     along = (of_path[-1] + by_half * rows[1]) / length
     by_variables = np.vstack([of_path[1:-1], np.zeros((LAUNCH_VARIABLES, length.size))])
     return [length, along], (by_variables + by_half * rows[2:]) / length

@@ -253,6 +253,22 @@ class ShapedPieces:
             found.append(_quotient(before, after, step)[0])
         return np.array(found).reshape(-1, places.shape[1])
 
+    def roll_changes(self, place: Array) -> Array:
+        """Return the increase of the roll angle of a banked rail at the point of equal u, for one place: a number for
+        each parameter.
+        """
+        number, (u, u_low) = int(place[0, 0]) % len(self.pieces.curve.counts), place[1:, 0].tolist()
+        found, (left, up) = [], self.pieces.frame(number, u, u_low)[1:, 2, 0]
+        for step, *sides in self._beside:
+            if not sides:
+                found.append(np.nan)
+                continue
+            # The vertical components of l and u are -sin(roll) and cos(roll), each times the same number.
+            before, after = (side.frame(number, u, u_low)[1:, 2].reshape(-1, 1) for side in sides)
+            by_left, by_up = _quotient(before, after, step)[::2, 0]
+            found.append((left * by_up - up * by_left) / (left * left + up * up))
+        return np.array(found)
+
     def shifts(self, places: Array) -> Array:
         """Return the increase of the arc length from the start point to the points of the curve at places: a row for
         each parameter.

@@ -9,10 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from gqm_sym.runtime.double_double.recording import TapeNumber
-
-
-class WithoutRuleError(Exception):
-    """A formula contains an operation whose divided differences have no rule here."""
+from gqm_sym.runtime.gradients.lanes.operations import WithoutRuleError
 
 
 def is_same(a: TapeNumber, b: TapeNumber) -> bool:

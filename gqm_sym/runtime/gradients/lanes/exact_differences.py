@@ -10,9 +10,10 @@ from functools import lru_cache
 from math import factorial
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
-from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
+from gqm_sym.runtime.gradients.lanes.differences import Places
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.programs import swing_inputs, swing_of, total_change
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source, assemble
@@ -21,7 +22,7 @@ from gqm_sym.runtime.gradients.programs import Program, Source, assemble
 TERMS = tuple(Fraction((-1) ** k, factorial(2 * k + 1)) for k in reversed(range(16)))
 
 
-class SeriesRecorder(Recorder):
+class SeriesRecorder(LaneRecorder):
     """A tape on which ``S(t**2) = sin(t)/t`` and its divided differences are series.
 
     Attributes
@@ -31,7 +32,7 @@ class SeriesRecorder(Recorder):
     """
 
     def __init__(self, parameters: int) -> None:
-        super().__init__(parameters)
+        super().__init__(parameters, 1)
         self.squares = self.number(0)
 
     def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:

@@ -251,7 +251,7 @@ def extreme_gradients(
         begins = np.broadcast_to(launches.lines[-2], circulates.shape)
         table[circulates, -2:] = np.stack([begins, begins + laps], axis=1)[circulates]
     ends = [(end_program, end, source, rows) for end in range(2)]
-    own = [(grid_program, source, of_speed), (extreme_program, source, of_speed, 1, rows)]
+    own = [(grid_program, source, of_speed), (extreme_program, source, of_speed, 1, rows, LaneRecorder)]
     programs, in_code = programs_for([*ends, *own], len(table))
     low, high, grid, program = (one.operands for one in in_code)
 

@@ -24,8 +24,15 @@ ERROR_BOUND, ROUNDING = SINC_PAIR + 1, 0.3 * 2.0**-52
 # The number of results of each operation that has several; they are in consecutive registers.
 RESULTS = {SINE_COSINE: 2, SINC: 2, SINC_PAIR: 6}
 
+# The largest number of terms of a divided difference of a power.
+MAX_TERMS = 24
+
 # For the two results of SINC_PAIR that have derivatives: the results that are those with respect to p and to q.
 PAIR_PARTIALS = {0: (2, 3), 1: (4, 5)}
+
+
+class WithoutRuleError(Exception):
+    """A formula contains an operation whose divided differences have no rule here."""
 
 
 class LaneRecorder(RecorderOfMore):
@@ -51,6 +58,11 @@ class LaneRecorder(RecorderOfMore):
         if is_new and entry[0] in (SINC, SINC_PAIR):
             self.entries += [("result", register, k) for k in range(1, RESULTS[entry[0]])]
         return register
+
+    def at(self, register: int) -> TapeNumber:
+        """Return the number in a register; a constant as such, so that it is joined with others."""
+        constant = self.exact.get(register)
+        return self.number(constant) if isinstance(constant, Fraction) else super().at(register)
 
     def depends(self, register: int) -> bool:
         """Return whether a register depends on the place."""
@@ -92,10 +104,20 @@ class LaneRecorder(RecorderOfMore):
             return None if negative is None else b - negative
         if code == DIVIDE and a.known == 0:
             return a
-        if code == DIVIDE and self.depends(self.register(a)) and not self.depends(self.register(b)):
+        return self._quotient(a, b) if code == DIVIDE else None
+
+    def _quotient(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
+        """Return a quotient as a product with an inverse that others share; None if there is none."""
+        if b.known is not None:
+            return a * (1 / b.known) if b.known else None
+        if self.depends(b.register):
+            return self._by_inverse(a, b) if self.by_inverses else None
+        if self.depends(self.register(a)):
             return a * (self.number(1) / b)
-        is_shared = code == DIVIDE and self.by_inverses and self.depends(self.register(b))
-        return self._by_inverse(a, b) if is_shared else None
+        _, *operands = self.entries[b.register]
+        are_inputs = [self.entries[k][0] in ("parameter", "constant") for k in operands]
+        is_multiple = self.entries[b.register][0] == MULTIPLY and all(are_inputs)
+        return self._by_inverse(a, b) if is_multiple or self.entries[b.register][0] == "parameter" else None
 
     def _by_inverse(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
         """Return a quotient as a product with an inverse; None if it is one."""
@@ -129,13 +151,8 @@ class LaneRecorder(RecorderOfMore):
             if code == MULTIPLY and self.depends(number.register) and not self.depends(fixed.register):
                 for one, rest in (operands, operands[::-1]):
                     if not self.depends(one):
-                        return self.at(rest) * (self._factor(one) * fixed)
+                        return self.at(rest) * (self.at(one) * fixed)
         return None
-
-    def _factor(self, register: int) -> TapeNumber:
-        """Return the number in a register; a constant as such, so that it is joined with others."""
-        constant = self.exact.get(register)
-        return self.number(constant) if isinstance(constant, Fraction) else self.at(register)
 
     def _negated(self, number: TapeNumber) -> TapeNumber | None:
         """Return minus a number that was recorded as a product with -1; None for other numbers."""
@@ -147,6 +164,22 @@ class LaneRecorder(RecorderOfMore):
                 if self.exact.get(one) == -1:
                     return self.at(rest)
         return None
+
+    def divdiff1_ipow(self, x: TapeNumber, y: TapeNumber, h: TapeNumber, n: int) -> TapeNumber:
+        """Record the divided difference of the power with an integer exponent, as a sum of products."""
+        if n < 0:
+            a, b = 1 / x, 1 / y
+            return -1 * (self.divdiff1_ipow(a, b, h, -n) * (a * b))
+        return sum((x.to(k) * y.to(n - 1 - k) for k in range(n)), self.number(0))
+
+    def divdiff1_rpow(self, x: TapeNumber, y: TapeNumber, h: TapeNumber, exponent: TapeNumber) -> TapeNumber:
+        """Record the divided difference of the power with a rational exponent, by roots of both numbers."""
+        known = self.number(exponent).known
+        if known is None or abs(known.numerator) + known.denominator > MAX_TERMS:
+            raise WithoutRuleError
+        a, b = (number ** Fraction(1, known.denominator) for number in (x, y))
+        above, below = (self.divdiff1_ipow(a, b, h, n) for n in (known.numerator, known.denominator))
+        return above / below
 
     def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
         """Record sin(t)/t, or sinh(t)/t for the sign -1."""

@@ -32,6 +32,7 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients, fill_turn_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
@@ -199,8 +200,9 @@ def fill_by_stages(
     """
     is_open, first, stop = serves.copy(), columns[0], columns[-1] + 1
     which: Any = slice(first, stop) if stop - first == len(columns) else list(columns)
-    for stage in programs:
-        if not is_open.any():
+    while is_open.any():
+        stage = next(programs, None)
+        if stage is None:
             break
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
@@ -209,14 +211,14 @@ def fill_by_stages(
             if not chosen.size:
                 break
             out, states = carried_out(stage, program, len(columns), (chosen, launches.kinds[chosen] >= EVEN), most)
-            is_answered = states == ANSWERED
-            answered = chosen[is_answered]
-            if answered.size == len(found):
+            left = np.flatnonzero(states != ANSWERED)
+            out[left], is_open[chosen] = nan, False
+            if chosen.size == len(found):
                 found[:, which] = out
-                return
-            found[answered if isinstance(which, slice) else answered[:, np.newaxis], which] = out[is_answered]
-            is_open[answered] = False
-            chosen = chosen[states == OPEN]
+            else:
+                found[chosen if isinstance(which, slice) else chosen[:, np.newaxis], which] = out
+            is_open[chosen[left]] = True
+            chosen = chosen[left[states[left] == OPEN]]
 
 
 def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> Iterator[Stage]:
@@ -233,7 +235,7 @@ def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> 
     uneven = serves if source.formulas.time_integrand is None else serves & ~about_axis
     table, inputs = launches.table, source.variables
     yield Stage(uneven, swing_program, (source, plan), table, inputs, True)
-    yield Stage(serves, libration_program, (source, plan.wanted), table, inputs, True)
+    yield Stage(serves, libration_program, (source, plan.wanted, LaneRecorder), table, inputs, True)
     yield Stage(serves, exact_swing_program, (source, plan), table, inputs, True)
 
 
@@ -253,7 +255,7 @@ def moves_of(stage: Stage) -> tuple[Source, tuple[int, ...]]:
     source, *given = stage.given
     if isinstance(source, Orbits):
         return source.source, moved_variables(source.source, source.plan)
-    plan = given[-1]
+    plan = given[0]
     return source, moved_variables(source, plan) if isinstance(plan, Plan) else plan
 
 

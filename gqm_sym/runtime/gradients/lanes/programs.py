@@ -21,8 +21,8 @@ import numpy as np
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient, partials
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble, assemble_rates
-from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
-from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
+from gqm_sym.runtime.gradients.lanes.differences import Places
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, Terms, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.gradients.programs import assemble as in_double_double
@@ -45,7 +45,7 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
     """
     programs = []
     for variables in ((), wanted):
-        op = Recorder(source.inputs)
+        op = LaneRecorder(source.inputs, 1)
         half = source.half(op, op.place)
         slope, *by = gradient(op, half, [op.place, *(op.values[k] for k in variables)])
         programs.append(in_double_double(op, [-(part / slope) for part in (by if variables else [half])]))
@@ -180,14 +180,18 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     """Return the program of the time of a libration about an axis per angle, differentiated at the same angle.
 
     A place has two coordinates: the squares of the sine and of the cosine of the angle from the axis. The results are
-    the divisor of the integrand, and the derivatives. It is None if the model has no such integrand.
+    the divisor of the integrand, and the derivatives. It is None if the model has no such integrand, or if an operation
+    in it has no rule for divided differences.
     """
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
     op = LaneRecorder(orbits.inputs, 2, by_inverses=True)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
-    square, divisor = formula(op, half, *op.places, p)
+    try:
+        square, divisor = formula(op, half, *op.places, p)
+    except WithoutRuleError:
+        return None
     rate = op.sqrt(square)
     return assemble_rates(op, divisor, [rate, *changes(op, rate, (half, *p), moves)], orbits.terms(op), FROM_AXIS)
 
@@ -201,10 +205,13 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
-    op = Recorder(orbits.inputs)
+    op = LaneRecorder(orbits.inputs, 1)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     share, tilt = op.place, 1 - 2 * op.place
-    rate = op.sqrt(formula(op, half, tilt * tilt, 4 * (share * (1 - share)), p)[0])
+    try:
+        rate = op.sqrt(formula(op, half, tilt * tilt, 4 * (share * (1 - share)), p)[0])
+    except WithoutRuleError:
+        return None
     by_inputs = gradient(op, rate, [half, *p])
     rates = [rate, *(total_change(op, by_inputs, move) for move in moves)]
     return in_double_double(op, [rate, *combined(op, orbits.terms(op), rates)])

@@ -13,7 +13,7 @@ from gqm_sym.runtime.launch.ends import starting_step
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.body import LEAST_SWING, PLACE_LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
-from gqm_sym.runtime.legs.frames.fitting import Breaks, frame_near, refined, sharpened
+from gqm_sym.runtime.legs.frames.fitting import Breaks, TryLater, frame_near, refined, sharpened
 from gqm_sym.runtime.legs.frames.local_frame import PLACE, Frame, is_small
 from gqm_sym.runtime.legs.panels.breaks import clearance
 from gqm_sym.runtime.legs.variations.law_at_rest import law_at_rest
@@ -45,8 +45,9 @@ class Entry(NamedTuple):
     reach: float
 
 
-def entry_near(problem: Problem, loss: Dissipation, line: Array, lam0: Number | None) -> Entry | None:
-    """Return a body in the frame of the equilibrium next to it; None if there is none near which it stays for a while.
+def entry_near(problem: Problem, loss: Dissipation, line: Array, lam0: Number | None) -> Entry | TryLater | None:
+    """Return a body in the frame of the equilibrium next to it; `TryLater` if there may be one for a smaller motion,
+    and None if there is no equilibrium near which it stays for a while.
 
     Parameters
     ----------
@@ -66,7 +67,9 @@ def entry_near(problem: Problem, loss: Dissipation, line: Array, lam0: Number | 
     place, low, v2 = line[[BODY_PLACE, PLACE_LOW, V2]].tolist()
     reach, breaks = _surroundings(problem, place)
     frame = frame_near(loss, p, line, reach, breaks)
-    if frame is None or not (frame.is_stable or lam0):
+    if frame is None or isinstance(frame, TryLater):
+        return frame
+    if not (frame.is_stable or lam0):
         return None
     law, exact = law_at_rest(problem, has_breaks=frame.breaks.size > 0), problem.formulas.exact
     frame = frame if law is None else sharpened(frame, law)

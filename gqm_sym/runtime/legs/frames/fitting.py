@@ -32,11 +32,11 @@ from gqm_sym.runtime.legs.frames.local_frame import (
     PLACE,
     PLACE_LOW,
     RANGE,
-    RANGE_SHARE,
     ROW_SIZE,
     ROWS,
     SMALL_SHARE,
     TERMS,
+    UNKNOWN_RETRY_SHARE,
     Frame,
     force_at_rest,
     frame_functions,
@@ -91,6 +91,19 @@ class Breaks(NamedTuple):
 
     places: Array = np.empty(0)
     clearance: float = 0.0
+
+
+class TryLater(NamedTuple):
+    """What is known of a motion that is too large for the range about an equilibrium, or of a range in which the force
+    is not resolved.
+
+    Attributes
+    ----------
+    share : float
+        The share of the present motion at which another attempt makes sense.
+    """
+
+    share: float
 
 
 class _Fit(NamedTuple):
@@ -177,8 +190,9 @@ def frame_near(
     line: Array,
     reach: float,
     breaks: Breaks,
-) -> Frame | None:
-    """Return the frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
+) -> Frame | TryLater | None:
+    """Return the frame of the equilibrium next to a body; `TryLater` if there may be one for a smaller motion, and None
+    if there is none.
 
     Parameters
     ----------
@@ -201,16 +215,18 @@ def frame_near(
             break
         size, edges = _cut(breaks.places - middle, 0.5 * size)
     for _ in range(MAX_MOVES):
-        if fit is None or not abs(fit.zero()[1]) <= 0.5 * size:
-            return None
+        if fit is None:
+            return TryLater(UNKNOWN_RETRY_SHARE)
         moved = fit.zero()[1]
+        if not abs(moved) <= 0.5 * size:
+            return TryLater(0.5 * size / abs(moved)) if middle == place else None
         if abs(moved) <= ULP * abs(middle):
             break
         middle += moved
         size, edges = _cut(breaks.places - middle, size)
         fit = _fit(dissipation, p, sense, middle, edges)
     if fit is None:
-        return None
+        return TryLater(UNKNOWN_RETRY_SHARE)
     own, low = fit.zero()
     rows = _rows(middle, low, edges[1:-1], breaks.clearance)
     for k in _outwards(own, len(rows)):
@@ -229,8 +245,9 @@ def frame_near(
         return None
     # The distance from an unstable equilibrium needs more digits than places of that size have.
     of_places = max(abs(middle), float(line[LEAST_SIZE]) if frame.is_stable else 0.0)
-    if not frame.size((place - middle) + (place_low - low), v2) <= min(SMALL_SHARE * of_places, RANGE_SHARE * size):
-        return None
+    motion, largest = frame.size((place - middle) + (place_low - low), v2), min(SMALL_SHARE * of_places, frame.reach)
+    if not motion <= largest:
+        return TryLater(largest / motion if motion > largest else UNKNOWN_RETRY_SHARE)
     return frame._replace(error=fit.noise / abs(frame.slope) + ULP * abs(middle))
 
 

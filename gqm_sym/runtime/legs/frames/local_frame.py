@@ -46,6 +46,10 @@ from gqm_sym.runtime.legs.panels.polynomials import WIDE
 # four times as large if the force is a sixteenth of the estimate.
 SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 
+# A motion that is not small is examined again when it has decreased to the share that makes it so, but for a margin,
+# and always when it has decreased to the smallest share; to the third one if the range, or the force, is the reason.
+RETRY_MARGIN, LEAST_RETRY_SHARE, UNKNOWN_RETRY_SHARE = 1.02, 0.7, 0.875
+
 # The degree of C.
 DEGREE = 20
 

@@ -10,11 +10,10 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-from gqm_sym.runtime.gradients.orbit import liftoff_in_space
 from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
+from gqm_sym.runtime.legs.leg_record import END, HEADING
 from gqm_sym.runtime.legs.tabulation import TabulatedPiece
 from gqm_sym.runtime.legs.variations.chain import ARC, DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes, changes_of_turns
@@ -226,8 +225,6 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     run, (sigma, y, delay, arc) = changes.runs[k], changes.ends[k]
     if what == "rest":
         return changes.parameter_change(sigma, arc, run.laps), delay
-    if what == "liftoff" and not motion.problem.formulas.signed:
-        raise liftoff_in_space()
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
     at_end, speed = changes.at_end(k)
@@ -235,12 +232,10 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     if what == "liftoff" and _is_at_break(changes, at):
         moved = zero  # the contact force changes its sign by a jump, the place of which is fixed
     elif what == "liftoff":
-        place = np.array([at]), np.array([run.record[END_LOW]])
-        path = changes.law.path(*place)
-        curvature, load = path.curvature[:, 0], path.load[:, 0]
+        by_place, by_w, *by_parameters = changes.law.sided(at_end)
         faster = y - law.force[0, 0] * sigma
-        change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
-        moved = -change / (changes.law.parameters[0, changes.law.mass] * changes.law.loads(at_end)[0, 0])
+        change = changes.by_all(np.array(by_parameters)) + by_w * faster
+        moved = -change / (by_place + by_w * law.force[0, 0])
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
     return changes.parameter_change(moved, arc, run.laps), delay + v * law.ds[0] * (moved - sigma) / speed

@@ -7,6 +7,7 @@ where forces may jump.
 
 import numpy as np
 
+from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
@@ -22,6 +23,7 @@ from gqm_sym.runtime.legs.variations.programs import (
     chart_law_program,
     chart_load_program,
     chart_path_program,
+    chart_sided_program,
 )
 
 # The number of places whose coordinates are found together.
@@ -55,7 +57,7 @@ class ChartLaw(Law):
         )
         self._forces = ChartForces(formulas.exact, self.count, self.mass, varied, dimension)
         self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
-        self._launch = problem.launch.lam0
+        self._launch, self._chart = problem.launch.lam0, chart
 
     @property
     def launch_changes(self) -> Array:
@@ -95,6 +97,24 @@ class ChartLaw(Law):
         """See `Law`."""
         found: Array = self.values(chart_load_program(self._forces), states, parts=1)[:, 0]
         return found
+
+    def sided(self, state: Array) -> Array:
+        """See `Law`. The upward direction of riders also changes by the roll angle and the arc length at a point."""
+        chart, arc = self._chart, float(state[0, 0])
+        roll, roll_slope, banked = 0.0, 0.0, False
+        if isinstance(chart, SpaceChart) and chart.banked:
+            banked = True
+            roll, roll_slope = (float(chart.derivatives([arc], order)[3, 0]) for order in (0, 1))
+        found = self.values(chart_sided_program(self._forces), state, parts=1, more=(roll, arc))[:, 0, 0]
+        by_roll, by_arc = found[-2:]
+        rows: Array = found[:-2].copy()
+        rows[0] += by_roll * roll_slope + by_arc
+        if self._forces.shaping:
+            place, shaped = self._shape.places(state[0], state[1]), [2 + k for k in self._forces.shaping]
+            rows[shaped] += by_arc * self._shape.arc_length_changes(place)[:, 0]
+            if banked:
+                rows[shaped] += by_roll * self._shape.roll_changes(place)
+        return rows
 
     def path(self, high: Array, low: Array) -> PathRows:
         """See `Law`."""

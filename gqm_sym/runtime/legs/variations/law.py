@@ -28,6 +28,7 @@ from gqm_sym.runtime.legs.variations.programs import (
     law_program,
     load_program,
     rates_program,
+    sided_program,
 )
 from gqm_sym.runtime.motion.locking import computed_once
 
@@ -162,6 +163,12 @@ class Law(ABC):
         """
 
     @abstractmethod
+    def sided(self, state: Array) -> Array:
+        """Return the derivatives of the force per mass whose sign shows on which side of the track a body is, in one
+        state, with respect to the place, W and the parameters.
+        """
+
+    @abstractmethod
     def path(self, high: Array, low: Array) -> PathRows:
         """Return the path at places of two doubles each, with derivatives at points with fixed labels."""
 
@@ -169,12 +176,23 @@ class Law(ABC):
     def coordinates(self, states: Array) -> Array:
         """Return the coordinates that programs take, as two doubles each except for the last one, which is V**2."""
 
-    def values(self, program: Program, states: Array, errors: Array | None = None, *, parts: int = 3) -> Array:
-        """Return the results of a program in states (`evaluation.values`), given bounds on the errors of parameters."""
+    def values(
+        self,
+        program: Program,
+        states: Array,
+        errors: Array | None = None,
+        *,
+        parts: int = 3,
+        more: tuple[float, ...] = (),
+    ) -> Array:
+        """Return the results of a program in states (`evaluation.values`), given bounds on the errors of parameters and
+        the inputs between the parameters and the signs.
+        """
         found = np.empty((program.outputs.size, parts, states.shape[1]))
         w = np.maximum(states[2], LEAST_V2)  # laws may contain its square root
         places = np.concatenate([self.coordinates(states), w[None], np.zeros((1, w.size))])
-        inputs = np.concatenate([self.parameters, np.zeros((3, 2))], axis=1)
+        inputs = np.concatenate([self.parameters, np.zeros((3, len(more) + 2))], axis=1)
+        inputs[0, self.count : -2] = more
         if errors is not None:
             inputs[2, : self.count] = errors
         fill_signed_values(program.operands, program.work, inputs, places, states, found)
@@ -266,6 +284,11 @@ class FormulaLaw(Law):
     def loads(self, states: Array) -> Array:
         """See `Law`."""
         found: Array = self.values(load_program(self._exact, self.count), states, parts=1)[:, 0]
+        return found
+
+    def sided(self, state: Array) -> Array:
+        """See `Law`."""
+        found: Array = self.values(sided_program(self._exact, self.count), state, parts=1)[:, 0, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber, scalar_product
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
@@ -13,8 +14,10 @@ from gqm_sym.runtime.gradients.programs import (
     ContactForms,
     Program,
     assemble,
+    component_of_contact,
     contact_forms,
     length_of_contact,
+    sided_force,
     with_derivatives,
 )
 from gqm_sym.runtime.interface import ExactChartLaw, ExactLaw
@@ -72,6 +75,19 @@ def load_program(law: ExactLaw, parameters: int) -> Program:
     return with_derivatives(op, [load_slope], [lam, w])
 
 
+@lru_cache(maxsize=64)
+def sided_program(law: ExactLaw, parameters: int) -> Program:
+    """Return the program of the derivatives of the force whose sign shows on which side of the track a body is, with
+    respect to the place, W and the parameters.
+
+    The inputs are those of `law_program`.
+    """
+    op = Recorder(parameters + 2, coordinates=2)
+    lam, w = op.places
+    force = sided_force(op, law, (lam, w), op.values[parameters])
+    return assemble(op, gradient(op, force, [lam, w, *op.values[:parameters]]))
+
+
 def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
     """Return a tape with ds/dlam and dW/dlam."""
     op = Recorder(parameters + 2, coordinates=2)
@@ -121,14 +137,14 @@ LEAST_SQUARE = 1e-300
 class _ChartPoint:
     """A tape with a point of a chart, as `ShapedPieces.path` gives it with `ORDERS`, and V**2 there.
 
-    The inputs are the run-time parameters, sgn(ds/dt) and sgn(N).
+    The inputs are the run-time parameters, perhaps ``more``, sgn(ds/dt) and sgn(N).
     """
 
-    def __init__(self, forces: ChartForces) -> None:
+    def __init__(self, forces: ChartForces, more: int = 0) -> None:
         d = forces.dimension
-        op = Recorder(forces.parameters + 2, d * (ORDERS + CURVED * len(forces.shaping)) + 1)
+        op = Recorder(forces.parameters + 2 + more, d * (ORDERS + CURVED * len(forces.shaping)) + 1)
         self.op, self._forces, self.w = op, forces, op.places[-1]
-        self.p, signs = op.values[: forces.parameters], op.values[forces.parameters :]
+        self.p, signs = op.values[: forces.parameters], op.values[-2:]
         place, rates, bends = (op.places[k * d : k * d + d] for k in range(CURVED))
         square = scalar_product(rates, rates)
         self._speed = op.sqrt(square)
@@ -140,7 +156,7 @@ class _ChartPoint:
             curved = [(bend - share * rate) / square for bend, rate in zip(bends, rates, strict=True)]
             self.curvature = op.sqrt(scalar_product(curved, curved) + LEAST_SQUARE)
         point = (*place, *(rate / self._speed for rate in rates), *curved)
-        self.place = place
+        self.place, self._point = place, point
         law, product, aside = forces.law, None, None
         if law.load_along_curvature is not None:
             product = op.number(law.load_along_curvature(op, *point, self.p))
@@ -163,6 +179,19 @@ class _ChartPoint:
     def contact(self) -> TapeNumber:
         """N/m, or |N|/m in space."""
         found: TapeNumber = length_of_contact(self.op, self.forms, self.w, self._direction)
+        return found
+
+    def sided_force(self, roll: TapeNumber, arc: TapeNumber) -> TapeNumber:
+        """Return the force per unit mass whose sign shows on which side of the track a body is, given the roll angle
+        and the arc length.
+        """
+        op, law = self.op, self._forces.law
+        if law.load_along_curvature is None:
+            return self.contact
+        if law.upright_force is None:
+            raise SolutionError("gradients: no formula of this track shows on which side of it a body is")
+        parts = law.upright_force(op, *self._point, roll, arc, self.p)
+        found: TapeNumber = component_of_contact(op, parts, self.w, self._direction)
         return found
 
     def partials(self, quantity: TapeNumber) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
@@ -212,6 +241,20 @@ def chart_load_program(forces: ChartForces) -> Program:
     along, by_w, _ = chart_point.partials(chart_point.contact)
     load_slope = along + by_w * chart_point.slope
     return assemble(chart_point.op, [load_slope, *chart_point.partials(load_slope)[:2]])
+
+
+@lru_cache(maxsize=64)
+def chart_sided_program(forces: ChartForces) -> Program:
+    """Return the program of the derivatives of `_ChartPoint.sided_force` with respect to the place, W and the
+    parameters for a given roll angle and arc length, and with respect to these two.
+
+    The roll angle and the arc length are inputs behind the run-time parameters.
+    """
+    chart_point = _ChartPoint(forces, more=2)
+    op, (roll, arc) = chart_point.op, chart_point.op.values[forces.parameters : -2]
+    force = chart_point.sided_force(roll, arc)
+    along, by_w, by_parameters = chart_point.partials(force)
+    return assemble(op, [along, by_w, *by_parameters, *gradient(op, force, [roll, arc])])
 
 
 @lru_cache(maxsize=64)

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import read_number
-from gqm_sym.runtime.compiled.emitted import RunByPython
+from gqm_sym.runtime.compiled.emitted import Emitted, RunByPython
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import scalar_product
 from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.interface import (
     PATH_ROWS,
+    RIDER_ROWS,
     SPEED_EQUATION,
     SQUARED_CONTACT,
     STATIC_BALANCE,
@@ -32,8 +32,12 @@ from gqm_sym.runtime.interface import (
 )
 from gqm_sym.runtime.launch.formulas import ParameterValues
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY
 from gqm_sym.runtime.legs.dissipative import dissipate
 from gqm_sym.runtime.motion.motion import Motion
+
+# V**2 in m2/s2 at which the factor of V**2 in a load is told from the load at rest; a power of 2.
+FAST = 1024.0
 
 # A number that keeps the square of a force that vanishes from being zero.
 LEAST_SQUARE = 1e-300
@@ -52,19 +56,17 @@ def followed_in_legs(problem: Problem, t_end: float) -> Motion:
     Raises
     ------
     SolutionError
-        If the curve is known in doubles only; in space also if the frame rotates or the body can leave the track.
+        If the curve is known in doubles only.
     """
     formulas = problem.formulas
     if not isinstance(formulas.exact, ExactPotential) or formulas.rolling_radius or problem.true_pieces is None:
         raise without_formulas()
-    if formulas.directed or (not formulas.signed and problem.launch.contact != "bilateral"):
-        raise SolutionError(
-            "gradients: there are none of motions without losses that do not repeat, along tracks in space in a "
-            "rotating frame or with contact on one side; there are if QuadraticDrag(b=0) is added to the forces"
-        )
     mass = list(formulas.parameters).index("m")
-    exact = _chart_law(formulas.exact, formulas.inertia, in_space=formulas.path_in_space is not None)
-    functions = _without_losses(formulas.functions, mass, is_signed=formulas.signed)
+    in_space = formulas.path_in_space is not None
+    exact = _chart_law(formulas.exact, formulas.inertia, in_space=in_space)
+    can_leave = not formulas.signed and problem.launch.contact != "bilateral"
+    rider = formulas.rider_loads if can_leave else None
+    functions = _without_losses(formulas.functions, mass, formulas.signed, formulas.directed, rider)
     lossless = replace(formulas, dissipation=functions, exact=exact)
     p = ParameterValues(problem.p)
     p.values, p.conditions = problem.p.values, {}
@@ -76,11 +78,23 @@ def followed_in_legs(problem: Problem, t_end: float) -> Motion:
 
 
 @lru_cache(maxsize=16)
-def _without_losses(functions: CompiledFunctions, mass: int, *, is_signed: bool) -> DissipativeFunctions:
+def _without_losses(
+    functions: CompiledFunctions, mass: int, is_signed: bool, is_directed: bool, rider: Emitted | None
+) -> DissipativeFunctions:
     """Return the functions of motions with losses (`interface`) from those of a conservative module.
 
-    ``mass`` is the index of the mass among the run-time parameters.
+    Parameters
+    ----------
+    functions : CompiledFunctions
+        The functions of the module.
+    mass : int
+        The index of the mass among the run-time parameters.
+    is_signed, is_directed : bool
+        As `Formulas` has them.
+    rider : Emitted or None
+        The loads on riders, if the body can leave the track to the side to which their vertical load is negative.
     """
+    is_linear = rider is None or not is_directed
 
     def path(n: int, places: int, speeds: Array, p: int) -> Array:
         rows = np.empty((PATH_ROWS, n))
@@ -94,8 +108,21 @@ def _without_losses(functions: CompiledFunctions, mass: int, *, is_signed: bool)
         slope: Array = rows[1]
         return slope
 
-    def speed_equation(n: int, places: int, _speeds: int, _v: float, _nu: float, p: int, out: int) -> None:
+    def upright(n: int, places: int, speeds: int, v: float, p: int) -> Array:
+        assert rider is not None
+        rows = np.empty((RIDER_ROWS, n))
+        rider.call(n, places, speeds, v, 0.0, p, rows.ctypes.data)
+        force: Array = STANDARD_GRAVITY * rows[0]
+        return force
+
+    def speed_equation(n: int, places: int, speeds: int, v: float, _nu: float, p: int, out: int) -> None:
         _, _, ds, kappa, load = path(n, places, np.zeros(n), p)
+        if rider is not None and is_linear:
+            at_rest, moving = np.zeros(n), np.full(n, FAST)
+            load = upright(n, places, at_rest.ctypes.data, v, p)
+            kappa = (upright(n, places, moving.ctypes.data, v, p) - load) / FAST
+        elif rider is not None:
+            load, kappa = upright(n, places, speeds, v, p), np.zeros(n)
         _numbers(out, 5 * n).reshape(5, n)[:] = ds, -2.0 * slopes(n, places, p), np.zeros(n), load, kappa
 
     def static_balance(n: int, places: int, p: int, out: int) -> None:
@@ -115,8 +142,8 @@ def _without_losses(functions: CompiledFunctions, mass: int, *, is_signed: bool)
         RunByPython(static_balance, STATIC_BALANCE),
         friction=False,
         kinked=False,
-        linear=True,
-        squared_contact=None if is_signed else RunByPython(squared_contact, SQUARED_CONTACT),
+        linear=is_linear,
+        squared_contact=None if is_signed or is_directed else RunByPython(squared_contact, SQUARED_CONTACT),
     )
 
 
@@ -154,10 +181,27 @@ def _chart_law(exact: ExactPotential, inertia: Callable[..., Any] | None, *, in_
         across = [force - along * part for force, part in zip(pull, tangent, strict=True)]
         return heavier(op, op.sqrt(scalar_product(across, across) + LEAST_SQUARE), p)
 
+    def coriolis_across(op: Any, tangent: Any, p: Any) -> list[Any]:
+        """Return the vector that ds/dt adds to N/m for each unit of it."""
+        assert exact.coriolis is not None
+        a = [op.number(part) for part in exact.coriolis(op, *tangent, p)]
+        return [a[i] * tangent[j] - a[j] * tangent[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+
     def load_along_curvature(op: Any, *given: Any) -> Any:
         *point, p = given
-        return heavier(op, scalar_product(slopes(op, tuple(point), p), point[6:9]), p)
+        found = heavier(op, scalar_product(slopes(op, tuple(point), p), point[6:9]), p)
+        if exact.coriolis is None:
+            return found
+        aside = coriolis_across(op, point[3:6], p)
+        return found + scalar_product(aside, aside) / 2
+
+    def coriolis_loads(op: Any, *given: Any) -> Any:
+        *point, p = given
+        aside = coriolis_across(op, point[3:6], p)
+        across = scalar_product(slopes(op, tuple(point), p), aside)  # the vector has no component along the tangent
+        return heavier(op, across, p), scalar_product(point[6:9], aside)
 
     if in_space:
-        return ExactChartLaw(load_in_space, speed_slope, load_along_curvature)
+        aside = None if exact.coriolis is None else coriolis_loads
+        return ExactChartLaw(load_in_space, speed_slope, load_along_curvature, aside, exact.upright_force)
     return ExactChartLaw(load_in_plane, speed_slope)

@@ -10,9 +10,9 @@ from mpmath import mp, mpf
 from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.double_double.interpreter import BLOCK, INTERPRETER, LOW, ROW
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble
-from gqm_sym.runtime.gradients.lanes.differences import Places, WithoutRuleError
+from gqm_sym.runtime.gradients.lanes.differences import Places
 from gqm_sym.runtime.gradients.lanes.interpreter import LANES_INTERPRETER
-from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.programs import changes
 
 # Formulas of a place u between 0.3 and 2.3 and a parameter p.

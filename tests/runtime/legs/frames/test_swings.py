@@ -1,12 +1,16 @@
 """Small swings that one call of compiled code follows turn where a closed form says."""
 
+from math import log1p
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime.legs.frames import swings
+from gqm_sym.runtime.legs.frames import entering, swings
+from gqm_sym.runtime.legs.frames.fitting import frame_near
 
 # The relative tolerance of distances of turns, which are read off places. Worst of 299 turns: 1.9e-14.
 ENDS_OF_SWINGS = 4e-14
@@ -32,3 +36,30 @@ def test_many_swings_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             turn = mp.findroot(lambda q, kept=kept: (1 - q) * mp.exp(q) - kept, guess)
             truth = 2 * mp.asin(turn / (8 * mpf(0.25)))
             assert abs(abs(mpf(leg.lam_end) - 1) / truth - 1) <= ENDS_OF_SWINGS
+
+
+def test_swings_that_are_too_wide_for_a_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through points of a cycloid, swings wider than the pieces next to the bottom are followed by places, without an
+    attempt to fit the force there after each of them; they turn as on the cycloid, but for the error of the spline.
+    """
+    attempts = []
+
+    def counted(*arguments: Any) -> Any:
+        attempts.append(frame_near(*arguments))
+        return attempts[-1]
+
+    monkeypatch.setattr(entering, "frame_near", counted)
+    t = np.linspace(-2.5, 2.5, 201)
+    model = gqm.derive(
+        gqm.Curve.sampled(np.column_stack([t + np.sin(t), -np.cos(t)])), gqm.Gravity() + gqm.QuadraticDrag(b="c")
+    )
+    module = gqm.build(model, name="cycloid_points", folder=tmp_path)
+    bottom, drag = 4.0 * np.sin(1.25), 0.1
+    legs = module.solve(bottom + 1.0, c=drag, t_max=600.0).legs
+    assert len(legs) > 150
+    assert len(attempts) < 0.2 * len(legs)
+    for leg in legs[:-1]:
+        # See the test above; s is the arc length from the bottom.
+        before, turn = (2.0 * drag * abs(place - bottom) for place in (leg.lam_start, leg.lam_end))
+        lost = (log1p(before) - before) - (log1p(-turn) + turn)
+        assert abs(lost) <= 1e-8 * before**2

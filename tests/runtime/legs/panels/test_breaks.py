@@ -102,7 +102,8 @@ def test_sweeps_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
     """
     module, points = track
     high = sum(math.dist(a, b) for a, b in pairwise(points))
-    lam0 = np.random.default_rng(3).uniform(0.0, high, 4 * LAUNCHES)
+    # The number of legs of a launch is inverse to mu; each value of mu has as many legs.
+    lam0 = np.random.default_rng(3).uniform(0.0, high, round(20 * mu * LAUNCHES))
     times, places = (module.sweep(what, lam0, 0.0, mu=mu, b=0).values for what in ("t_end", "rest_position"))
     for start, time, place in zip(lam0.tolist(), times, places, strict=True):
         rows, end = slide(points, start, 0.0, 1, mu)
