@@ -1,14 +1,15 @@
 """Times on the gaps next to a turn, by the rows kept of them.
 
-With the mean M of exp(q) P from the start of a gap up to the share y of its width h, ``W (1 + E) = v2 + h y M``. Up to
-a turn at y = z this is ``h (z - y)`` times ``-(M(z) + y (M(z) - M(y))/(z - y))``, in which nothing is subtracted: the
-quotient is a polynomial that follows from the series of M. So V**2 has all its digits next to the turn, and the time
-is an integral over the root of the distance from there, as in `runs.arrival`. After a turn the same holds with the
-other sign.
+Over the distance d from a turn, ``W (1 + E)`` is the mean of exp(q) P between the turn and there, up to its sign. The
+means are those of the force on the part of the gap next to the turn. They are not derived from the means from the start
+of the gap that are kept: the difference of these, divided by the distance, has 7 times their rounding errors where the
+turn is in the middle of the gap, and 70 times or more where it is at the end. So V**2 has all its digits next to the
+turn, and the time is an integral over the root of the distance from there, as in `runs.arrival`. Where friction almost
+balances the weight, the rows kept of the gap do not give the force to enough digits, and no time is returned.
 
-On the gap before that with the turn, or after it, time is not resolved by a polynomial in y, because the turn is near,
-but by one in the root of the distance from there. From its end W is ``W(1) (1 + E(1)) - e (M(1) + y (M(1) - M(y))/(1 -
-y))`` over 1 + E, at the distance e from the end.
+On the gap before that with the turn, or after it, time is not resolved by a polynomial of the place, because the turn
+is near, but by one in the root of the distance from there. There ``W (1 + E)`` is its value at the end of the gap that
+is next to the turn, and the distance e from that end times the mean of exp(q) P on it.
 """
 
 from math import nan, sqrt
@@ -18,13 +19,14 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack, over_rows
-from gqm_sym.runtime.legs.gaps.data import read_friction_rows, read_gained, shorten, solve_on_rows
+from gqm_sym.runtime.legs.gaps.data import NOISE_OF_FORCE, read_friction_rows, read_gained, shorten, solve_on_rows
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
     FORCE,
     GRADED,
     MEAN,
+    N0,
     NODES,
     OFFSET,
     Q_RATE,
@@ -48,62 +50,43 @@ from gqm_sym.runtime.legs.panels.polynomials import (
     series_at,
     size_of,
     to_coefficients,
+    to_means,
 )
 from gqm_sym.runtime.legs.panels.resolution import examine
 
-# From the values at the nodes, which are as far from the end as others are from the start.
-to_time_after, to_time_before = multiply(arrival_weights(COUNT)), multiply(arrival_weights(COUNT)[::-1])
+to_time = multiply(arrival_weights(COUNT))
 
 # The largest number of gaps before that with a turn, and the room for the series of M, E and ds on a gap.
 GAPS_BEFORE, ROOM_FOR_SERIES = 3, 3 * WIDE
 series_store = on_stack(GAPS_BEFORE * ROOM_FOR_SERIES)
 
-beside_turn_row = over_rows(lambda quotient, y, expm1, mean, twice: (mean + twice * y * quotient) / (1.0 + expm1), WIDE)
+beside_turn_row = over_rows(lambda mean, expm1, sign: sign * mean / (1.0 + expm1), WIDE)
 rate_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 distance_row = over_rows(lambda y, first, rise: (rise * y) * (2.0 * first + rise * y), WIDE)
-ahead_row = over_rows(lambda e, mean, expm1, v2: (v2 + e * mean) / (1.0 + expm1), WIDE)
-behind_row = over_rows(lambda e, graded, expm1, v2, mean: (v2 - e * (mean + graded)) / (1.0 + expm1), WIDE)
+from_end_row = over_rows(lambda e, mean, expm1, v2, sign: (v2 + sign * e * mean) / (1.0 + expm1), WIDE)
 root_rate_row = over_rows(lambda ds, root, w: 2.0 * root * ds / np.sqrt(w), WIDE)
 
 
 @Inner
-def divide_series(c, x):  # type: ignore[no-untyped-def]
-    """Return a Chebyshev series at x, and replace it by the quotient of its difference from there by that of the
-    places.
+def fill_beside_turn(turn, step, work):  # type: ignore[no-untyped-def]
+    """Fill the rows Q_RATE and W_FACTOR with ds and with W over the distance from a turn, on the part of a gap from the
+    share ``turn`` of it to the share ``turn + step``, at the nodes from the turn on; return the mean force on it.
     """
-    value, after = 0.0, 0.0
-    for k in range(COUNT - 1, 0, -1):  # Clenshaw's recurrence, whose sums are the terms of the quotient
-        value, after = c[k] + (2.0 * x * value - after), value
-        c[k] = 2.0 * value
-    total = c[0] + (x * value - after)
-    for k in range(COUNT - 1):
-        c[k] = c[k + 1]
-    c[0], c[COUNT - 1] = 0.5 * c[0], 0.0
-    return total
-
-
-@Inner
-def fill_beside_turn(begin, share, turn, sign, work):  # type: ignore[no-untyped-def]
-    """Fill the rows Q_RATE and W_FACTOR with ds and with W over the distance from a turn, on the part of a gap that
-    begins at the share ``begin`` of it; ``turn`` is the share at which the turn is, and the sign that of the force.
-    Return M at the turn.
-    """
-    linear_row(work, GRADED, NODES, 4.0 * begin - 2.0, 4.0 * share)
-    linear_row(work, P, NODES, begin, share)
-    for row, to in ((DS, Q_RATE), (EXPM1_Q, TIME_RATE)):
+    linear_row(work, GRADED, NODES, 4.0 * turn - 2.0, 4.0 * step)
+    for row, to in ((FORCE, SPEED), (DS, Q_RATE), (EXPM1_Q, TIME_RATE)):
         to_coefficients(work, row, work, SERIES)
         series_at(work, to, GRADED, SERIES)
-    to_coefficients(work, MEAN, work, SERIES)
-    mean = divide_series(work[SERIES : SERIES + COUNT], 2.0 * turn - 1.0)
-    series_at(work, SPEED, GRADED, SERIES)
-    beside_turn_row(work, W_FACTOR, SPEED, P, TIME_RATE, sign * mean, sign * 2.0)
-    return mean
+    to_means(work, SPEED, work, P)
+    beside_turn_row(work, W_FACTOR, P, TIME_RATE, 1.0 if step > 0.0 else -1.0)
+    return work[P + COUNT]
 
 
 @Inner
 def are_rates_resolved(h, work):  # type: ignore[no-untyped-def]
-    """Fill the row TIME_RATE on a part next to a turn that is ``h`` long, and return whether it is resolved."""
-    if not extent(work, W_FACTOR)[0] > 0.0:
+    """Fill the row TIME_RATE on a part next to a turn that is ``h`` long, and return whether it is resolved, and the
+    force much larger than its rounding error.
+    """
+    if not extent(work, W_FACTOR)[0] > NOISE_OF_FORCE * size_of(work, N0):
         return False
     rate_row(work, TIME_RATE, Q_RATE, W_FACTOR, h)
     return examine(work, TIME_RATE, size_of(work, TIME_RATE))[2]
@@ -112,23 +95,37 @@ def are_rates_resolved(h, work):  # type: ignore[no-untyped-def]
 @Inner
 def time_to_turn(width, share, work):  # type: ignore[no-untyped-def]
     """Return the time from the start of a gap to a turn at a share of its width, and V**2 at the start, given the rows
-    DS, EXPM1_Q and MEAN; the time is NaN if it is not resolved.
+    DS, EXPM1_Q, FORCE and N0; the time is NaN if it is not resolved.
     """
-    v2 = -width * share * fill_beside_turn(0.0, share, share, -1.0, work)
+    v2 = -width * share * fill_beside_turn(share, -share, work)
     if not are_rates_resolved(width * share, work):
         return nan, v2
-    to_time_before(work, TIME_RATE, work, TAILS)
+    to_time(work, TIME_RATE, work, TAILS)
     return work[TAILS], v2
 
 
 @Inner
-def keep_series(store, k, work):  # type: ignore[no-untyped-def]
-    """Keep the series of M, E and ds on a gap, with E at its end, as number k."""
-    at, last = k * ROOM_FOR_SERIES, work[EXPM1_Q + COUNT]
-    for j, row in enumerate((MEAN, EXPM1_Q, DS)):
+def reverse(work, out, row):  # type: ignore[no-untyped-def]
+    """Fill a row with the values at the nodes of another one in the opposite order."""
+    for j in range(COUNT):
+        work[out + j] = work[row + COUNT - 1 - j]
+
+
+@Inner
+def keep_series(store, k, is_ahead, work):  # type: ignore[no-untyped-def]
+    """Keep the series of E and ds on a gap, and that of the mean of exp(q) P from its start, or else from its end, as
+    number k, with E at its end and the mean over it.
+    """
+    at, last, mean, means = k * ROOM_FOR_SERIES, work[EXPM1_Q + COUNT], work[MEAN + COUNT], MEAN
+    if not is_ahead:
+        reverse(work, P, FORCE)
+        to_means(work, P, work, Q_RATE)
+        reverse(work, P, Q_RATE)
+        means = P
+    for j, row in enumerate((means, EXPM1_Q, DS)):
         to_coefficients(work, row, work, SERIES)
         copy(store, at + j * WIDE, work, SERIES)
-    store[at + COUNT] = last
+    store[at + COUNT], store[at + WIDE + COUNT] = last, mean
 
 
 @Inner
@@ -149,18 +146,10 @@ def time_near_turn(far, width, v2, is_ahead, store, k, work):  # type: ignore[no
     linear_row(work, GRADED, FORCE, -2.0 if is_ahead else 2.0, step if is_ahead else -step)
     lay_series(store, at + WIDE, TIME_RATE, work)
     lay_series(store, at + 2 * WIDE, Q_RATE, work)
-    start = v2
-    if is_ahead:
-        lay_series(store, at, SPEED, work)
-        ahead_row(work, W_FACTOR, FORCE, SPEED, TIME_RATE, v2)
-    else:
-        copy(work, SERIES, store, at)
-        mean, at_end = divide_series(work[SERIES : SERIES + COUNT], 1.0), v2 * (1.0 + store[at + COUNT])
-        series_at(work, SPEED, GRADED, SERIES)
-        linear_row(work, P, FORCE, 2.0, -2.0 / width)
-        product(work, SPEED, SPEED, P)
-        behind_row(work, W_FACTOR, FORCE, SPEED, TIME_RATE, at_end, mean)
-        start = at_end - width * mean  # E is 0 there
+    lay_series(store, at, SPEED, work)
+    end = v2 if is_ahead else v2 * (1.0 + store[at + COUNT])  # E is 0 at the start
+    from_end_row(work, W_FACTOR, FORCE, SPEED, TIME_RATE, end, 1.0 if is_ahead else -1.0)
+    start = v2 if is_ahead else end - width * store[at + WIDE + COUNT]
     if not extent(work, W_FACTOR)[0] > 0.0:
         return nan, start
     linear_row(work, FORCE, NODES, first, rise)
@@ -177,7 +166,7 @@ def leave_turn(forces, to, width, gaps, at, work):  # type: ignore[no-untyped-de
     share, begin = to / width, (width - to) / width
     if forces.linear:
         read_gained(width, gaps, at, work)
-        fill_beside_turn(begin, share, begin, 1.0, work)
+        fill_beside_turn(begin, share, work)
     else:
         read_friction_rows(gaps, at, work)
         shorten(begin, share, work)
@@ -189,5 +178,5 @@ def leave_turn(forces, to, width, gaps, at, work):  # type: ignore[no-untyped-de
     product(work, W, W_FACTOR, OFFSET)
     if not are_rates_resolved(to, work):
         return nan, nan
-    to_time_after(work, TIME_RATE, work, TAILS)
+    to_time(work, TIME_RATE, work, TAILS)
     return work[TAILS], work[W + COUNT]

@@ -88,7 +88,7 @@ LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
 BOUNDS_OF_SQUARE, WITH_FEW, FACTORS = 11, 17, 24
 LOWER_BOUNDS = (LEAST_DAMPING, LEAST_N0, LEAST_KAPPA, *range(BOUNDS_OF_SQUARE, WITH_FEW, 2))
 FIRST_ROW = FACTORS + COEFFICIENTS
-GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, MEAN, DS, N0, KAPPA), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
+GAP_ROWS, FRICTION_ROWS = (EXPM1_Q, MEAN, DS, N0, KAPPA, FORCE), (PLAIN_P, PLAIN_Q, DS, N0, KAPPA)
 SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
 FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
 FIRST_OF_FEW = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
@@ -140,8 +140,12 @@ def range_of(work, row):  # type: ignore[no-untyped-def]
 @Inner
 def keep_rows(forces, gaps, at, work):  # type: ignore[no-untyped-def]
     """Keep the rows of a gap."""
-    for k, row in enumerate(GAP_ROWS if forces.linear else FRICTION_ROWS):
-        copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
+    if forces.linear:
+        for k, row in enumerate(GAP_ROWS):
+            copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
+    else:
+        for k, row in enumerate(FRICTION_ROWS):
+            copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
     for k, row in enumerate(SQUARE_ROWS):
         copy(gaps, at + FIRST_SQUARE + k * WIDE, work, row)
 

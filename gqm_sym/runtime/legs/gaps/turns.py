@@ -23,6 +23,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     LEAST_N0,
     MOST_KAPPA,
     MOST_N0,
+    NOISE_OF_FORCE,
     Bounds,
     fill_load,
     lengths_on,
@@ -148,13 +149,16 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
         start = 0.0
         if time >= 0.0 and far == inf and k < GAPS_BEFORE:
             widths[k] = width
-            keep_series(store, k, work)
+            keep_series(store, k, False, work)
         elif time >= 0.0 and 0.0 < far < inf:
             time, start = time_to_turn(part, far / part, work)
         fill_load(work)
         load, _, no_load = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * extent(work, MEAN)[1])
         # Behind the turn V**2 is negative, and N may be anything.
         if not (touch > 1.0 and min(load, no_load) > min(turn, 1.0) and far > 0.0):
+            break
+        # Where friction almost balances the weight, the kept rows do not give the force to enough digits.
+        if far < inf and v2 <= NOISE_OF_FORCE * size_of(work, N0) * far:
             break
         if far < inf:
             time += time_before(far, start, k, store, widths, work)
@@ -216,7 +220,7 @@ def pass_after_turn(forces, v2, far, width, gaps, at, work):  # type: ignore[no-
     elif not solve_on_gap(forces, v2, width, gaps, at, work):
         return nan, v2
     store, end = series_store(), work[W + COUNT]
-    keep_series(store, 0, work)
+    keep_series(store, 0, True, work)
     return (time_near_turn(far, width, v2, True, store, 0, work)[0] if end > 0.0 else nan), end
 
 

@@ -81,7 +81,7 @@ from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 # The width of the first panel, as a share of a leg of known width.
 FIRST_PANEL_OF_LEG = 0.25
 
-# A leg is tried as one polynomial only if the next break is at least at this share of its expected width.
+# A leg is tried as one polynomial only if the second break ahead is at least at this share of its width.
 MAX_SHARE_TO_BREAK = 0.75
 
 # The reasons for which a leg was not followed back.
@@ -269,12 +269,16 @@ def passes_kinks(start):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def passes_break(start, route):  # type: ignore[no-untyped-def]
-    """Return whether a leg is expected to pass a break of the curve, so that it is not one polynomial."""
+def passes_breaks(start, width, route):  # type: ignore[no-untyped-def]
+    """Return whether a leg of a width passes two breaks of the curve, so that it is not one polynomial."""
+    count = 0
     for place in route.breaks:
         d = offset(place, (start.place, start.place_low), start.direction)
-        if d > 0.0:
-            return d < MAX_SHARE_TO_BREAK * start.width
+        if d >= MAX_SHARE_TO_BREAK * width:
+            return False
+        count += 1 if d > 0.0 else 0
+        if count == 2:
+            return True
     return False
 
 
@@ -292,7 +296,14 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
             end, blocks, branch = run_to_target(forces, start, branch, route, off, record)
             if end.what == END_PAUSE:
                 return end, blocks, branch
-        if not (passes_kinks(start) or passes_break(start, route)):
+        if passes_breaks(start, start.width, route):
+            end = run_to_end(forces, start, route, off, record)
+            width = fabs((end.place[0] - start.place) + (end.place[1] - start.place_low))
+            # A leg may be shorter than expected. Where friction almost balances the weight, one polynomial has fewer
+            # rounding errors than parts.
+            if end.what != END_TURN or passes_breaks(start, width, route):
+                return end, 0, branch
+        if not passes_kinks(start):
             end, blocks, branch = run_whole(forces, start, branch, route, off, record)
             if end.what == END_TURN:
                 return end, blocks, branch

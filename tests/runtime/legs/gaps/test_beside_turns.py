@@ -8,7 +8,7 @@ import pytest
 from mpmath import mp, mpf
 
 from gqm_sym.runtime.legs.gaps.beside_turns import keep_series, time_near_turn, time_to_turn
-from gqm_sym.runtime.legs.panels.equation import DS, EXPM1_Q, MEAN, NODES
+from gqm_sym.runtime.legs.panels.equation import DS, EXPM1_Q, FORCE, MEAN, N0, NODES
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, ENDS_BY_NODE
 
 WIDTH = 0.75
@@ -33,6 +33,7 @@ def rows(damped: Callable[[Any], Any]) -> Any:
         y = mpf(share)
         work[MEAN + j] = (damped(y) - damped(mpf(0))) / (WIDTH * y)
         work[EXPM1_Q + j], work[DS + j] = loss(y), ds(y)
+        work[FORCE + j] = mp.diff(damped, y) / WIDTH
     return work
 
 
@@ -72,11 +73,19 @@ def test_the_time_on_the_gap_beside_that_with_a_turn(far: str) -> None:
     def after(y: Any) -> Any:
         return WIDTH * (share + y) * (4 + y + y * y / 4)
 
-    keep_series(store, 1, rows(before))
+    keep_series(store, 1, False, rows(before))
     at_end = float(before(mpf(1)) / (1 + loss(mpf(1))))
     got, v2 = time_near_turn(float(far), WIDTH, at_end, False, store, 1, rows(before))
     assert got == pytest.approx(time(before, 1 + share, mpf(0), mpf(1)), rel=2e-15)
     assert v2 == pytest.approx(float(before(mpf(0))), rel=2e-15)
-    keep_series(store, 0, rows(after))
+    keep_series(store, 0, True, rows(after))
     got, _ = time_near_turn(float(far), WIDTH, float(after(mpf(0))), True, store, 0, rows(after))
     assert got == pytest.approx(time(after, -share, mpf(0), mpf(1)), rel=2e-15)
+
+
+def test_no_time_from_rows_in_which_the_force_is_rounding() -> None:
+    """Where friction almost balances the weight, the rows kept of a gap do not give the force to enough digits."""
+    work = rows(lambda y: WIDTH * (1 - y) * (4 + y))
+    assert time_to_turn(WIDTH, 1.0, work)[0] > 0.0
+    work[N0 : N0 + COUNT] = 1e3
+    assert np.isnan(time_to_turn(WIDTH, 1.0, work)[0])
