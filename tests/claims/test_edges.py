@@ -167,6 +167,77 @@ def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
             assert motion.half_period
 
 
+@pytest.mark.parametrize("loss", [None, gqm.QuadraticDrag(b="1/100")], ids=["free", "drag"])
+def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
+    """Motions to it are refused with a remedy (there was a ZeroDivisionError, or times were wrong by 1e-9); what
+    happens before it is answered.
+    """
+    law = gqm.Gravity() if loss is None else gqm.Gravity() + loss
+    for name, height, domain, lam0, v0 in (
+        ("root", "sqrt(x)", None, 0.9, 0.0),
+        ("root_in_a_domain", "sqrt(x)", (0, None), 0.9, 0.0),
+        ("semicircle", "-sqrt(1 - x**2)", None, 0.3, 6.0),
+    ):
+        curve = gqm.Curve.graph(height, **({} if domain is None else {"domain": domain}))
+        module = built(f"{name}_{'free' if loss is None else 'drag'}", curve, law)
+        with pytest.raises(SolutionError, match=r"next to which ds/dx has no bound.*declare the curve by another"):
+            assert module.solve(lam0, v0, -1).t_end
+        motion = module.solve(lam0, v0, -1, t_max=0.1)
+        assert motion.t_end == 0.1
+        assert motion.kind == ("transit" if loss is None else "dissipative")
+    if loss is None:
+        with pytest.raises(SolutionError, match=r"comes to x = 1\.0, next to which ds/dx has no bound"):
+            module.solve(1, 0, -1)
+
+
+@pytest.mark.parametrize(
+    ("height", "domain", "lam0", "t"),
+    [("log(x)", None, 0.9, 2.0), ("-1/x", None, 0.9, 2.0), ("x**(9/10)", (0, None), 1.0, None)],
+)
+def test_a_fall_beside_a_vertical_line(height: str, domain: Any, lam0: float, t: float | None, built: Build) -> None:
+    """The integral of ds/V up to the place of a time is that time, also at the end of the domain."""
+    curve = gqm.Curve.graph(height, **({} if domain is None else {"domain": domain}))
+    motion = built(f"beside_{len(height)}", curve, gqm.Gravity()).solve(lam0, 0, -1, t_max=t)
+    with mp.workdps(20):
+        z = {
+            "log(x)": (mp.log, lambda x: 1 / x),
+            "-1/x": (lambda x: -1 / x, lambda x: 1 / x**2),
+            "x**(9/10)": (lambda x: x ** mpf("0.9"), lambda x: mpf("0.9") * x ** mpf("-0.1")),
+        }[height]
+        begin, end = mpf(lam0), mpf(0) if t is None else mpf(float(motion.lam(t)))
+        width = begin - end
+
+        def rate(y: Any) -> Any:  # x = begin - width*y**2, so that the rate is finite at the turn
+            x = begin - width * y * y
+            return 2 * width * y * mp.sqrt((1 + z[1](x) ** 2) / (2 * mpf("9.81") * (z[0](begin) - z[0](x))))
+
+        steps = [0, 0.5, 0.75, *(1 - mpf(4) ** -k for k in range(2, 14)), 1]
+        time = mp.quad(rate, steps, method="gauss-legendre")
+    if t is None:
+        assert [event.kind for event in motion.events] == ["contact-sign", "domain-end"]
+    assert motion.t_end == pytest.approx(float(time), rel=1e-13)
+
+
+def test_a_climb_beside_a_pole(built: Build) -> None:
+    """The turn of a body that climbs z = 1/x is where its energy says (V**2 was searched beyond the pole)."""
+    motion = built("hyperbola", gqm.Curve.graph("1/x"), gqm.Gravity()).solve("0.3", 6, -1, t_max=2)
+    turn = next(event for event in motion.events if event.kind == "turn")
+    assert turn.lam == pytest.approx(1 / (1 / 0.3 + 18 / 9.81), rel=4e-16)
+
+
+def test_speeds_at_a_pole_are_infinite(built: Build) -> None:
+    """The largest speed and contact force were those at the last double before the pole."""
+    bowl = gqm.Curve.graph("x**2")
+    motion = built("bowl_with_a_centre", bowl, gqm.CentralForce(centre=(0, 0), k=4)).solve("0.9")
+    assert (motion.kind, motion.v_max.value, motion.v_min.value) == ("transit", math.inf, 0.0)
+    assert motion.normal_force_max.value == math.inf
+    assert motion.v_max.t == motion.t_end
+    assert math.isfinite(motion.normal_force_min.value)
+    line, law = gqm.Curve.graph("0*x"), gqm.Potential("k*log(x**2 + z**2)", parameters={"k": 1})
+    motion = built("log_on_a_line", line, law).solve("0.9")
+    assert (motion.v_max.value, motion.normal_force_max.value) == (math.inf, 0.0)
+
+
 ACROSS = np.linspace(-3.0, 3.0, 30)
 
 

@@ -57,6 +57,11 @@ DOMAIN_END_V2_SHARE, GAIN_SAMPLES = 1e-12, 5
 # share of the first step.
 NEAR_CUSP = 1e-3
 
+# ds has no bound next to a place if it grows by more than the first factor while the distance decreases by the second
+# one, to the third as a share of the parameter. It grows by less next to the pole of a logarithm, and next to that of a
+# power above -1/8.
+STEEP_GROWTH, STEEP_RATIO, STEEP_DISTANCE = 2.0, 256.0, 2.0**-28
+
 # The largest number of places with nearly vanishing V**2 that a search passes.
 MAX_BARRIERS = 100
 
@@ -269,6 +274,11 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     what, near, far = found
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
+    place = lam0 + (near if what == zeros.STEPS_SPENT else far)
+    if is_steep(problem, direction, place):
+        if abs(place - lam0) <= STEEP_DISTANCE * abs(lam0):
+            raise too_steep(problem, place)
+        return EndOfMotion("open", place)
     if what == zeros.LIMIT:
         return EndOfMotion("closed", lam0 + direction * period) if period else _end_of_curve(problem, direction)
     if what == zeros.CUSP:
@@ -293,7 +303,7 @@ def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
     places = np.array([lam0, end.place])
     v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, problem.w0, places[1:], places[1:] - lam0)[0]
     slopes = potential_at(f.addresses, f.p, lam0 + offset * np.linspace(0.0, 1.0, GAIN_SAMPLES))[1]
-    size = problem.w0 + 2.0 * abs(offset) * float(np.abs(slopes).max())
+    size = problem.w0 + 2.0 * abs(offset) * float(np.abs(slopes[np.isfinite(slopes)]).max(initial=0.0))
     if v2 > DOMAIN_END_V2_SHARE * size:
         return end
     if exact is None or problem.formulas.domain_of is None:
@@ -329,6 +339,27 @@ def domain_end(problem: Problem, direction: int) -> EndOfMotion:
     if ds[1] <= CUSP_SHARE * ds[0]:
         return EndOfMotion("cusp", place)
     return EndOfMotion(cast(EndKind, problem.domain.ends[1 if upper else 0]), place)
+
+
+def is_steep(problem: Problem, direction: int, place: float) -> bool:
+    """Return whether ds/dlam has no bound next to a place ahead, as where the graph of a root is vertical."""
+    f, size = problem.functions, max(abs(problem.lam0), abs(place))
+    places = place - direction * STEEP_DISTANCE * size * np.array([1.0, STEEP_RATIO])
+    near, far = path_and_force_at(f.addresses, f.p, places, np.zeros(2))[2]
+    return bool(near > STEEP_GROWTH * far)
+
+
+def too_steep(problem: Problem, place: float) -> SolutionError:
+    """Return the error for a motion that comes to such a place.
+
+    Since the place is rounded, the time and the length of the rest of the way would be known to a few digits only.
+    """
+    name = problem.formulas.parameter
+    return SolutionError(
+        f"the motion comes to {name} = {place!r}, next to which ds/d{name} has no bound, so that it cannot be followed "
+        f"by {name}; declare the curve by another parameter (x = u**2, z = u for z = sqrt(x)), or give a shorter "
+        "t_max, or a domain that ends before that place"
+    )
 
 
 def is_cusp(problem: Problem, place: float, share: float = 1e-10) -> bool:

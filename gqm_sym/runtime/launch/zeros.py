@@ -241,25 +241,20 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
         v2_far, terms = speed_squared(fns, p, lam0, w0, direction * far, arrays)
         far_ds = arrays.rows[1, 0]
         widest_ds = max(widest_ds, far_ds)
-        if not isfinite(v2_far):
-            if v2_near > OVERFLOW_V2:
+        if not (isfinite(v2_far) and isfinite(upper - lower)):  # there may be a pole on the step
+            if not isfinite(v2_far) and v2_near > OVERFLOW_V2:
                 return FoundEnd(STEPS_SPENT, direction * near, direction * near)
-            if narrow:
+            if not narrow:
+                step = 0.5 * width
+                continue
+            if not isfinite(v2_far) or is_pole(fns, p, lam0, w0, direction * near, direction * far, arrays):
                 return FoundEnd(NOT_FINITE, direction * near, direction * far)
-            step = 0.5 * width
-            continue
         size = max(size, terms)
         positive = 1
         if not lower >= 0.0:
             if upper <= 0.0 and v2_far <= 0.0:
                 return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, (size, passed), arrays)
             positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, size)
-            if (
-                narrow
-                and not isfinite(upper - lower)
-                and is_pole(fns, p, lam0, w0, direction * near, direction * far, arrays)
-            ):
-                return FoundEnd(NOT_FINITE, direction * near, direction * far)
         if positive < 0:
             return FoundEnd(CRITICAL, direction * near, direction * far)
         if positive:

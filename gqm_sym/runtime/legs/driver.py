@@ -53,7 +53,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
-from gqm_sym.runtime.legs.endings import cusp_ahead, end_name, failure, force_cancels
+from gqm_sym.runtime.legs.endings import check_steepness, cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, Entry, entry_near
 from gqm_sym.runtime.legs.frames.fitting import TryLater
 from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, RETRY_MARGIN, Frame
@@ -275,6 +275,8 @@ class Driver:
         self._decide_at_equilibrium(what, float(record[START]), float(record[END]))
         if what == END_OUT_OF_DOMAIN:
             raise leaving_at_once(problem, heading, "end of the domain")
+        if frame is None and self.elapsed <= self._horizon:
+            check_steepness(problem, what, record)
         name = "" if at_limit else end_name(problem, what, record)
         if name == "cusp" and what == END_TOO_NARROW:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = cusp_ahead(problem, record), 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, starting_step
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, is_steep, starting_step, too_steep
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
@@ -38,6 +38,13 @@ def end_name(problem: Problem, what: int, record: Array) -> str:
     return END_NAMES.get(what, "")
 
 
+def check_steepness(problem: Problem, what: int, record: Array) -> None:
+    """Refuse a run to a place where ds/dlam has no bound."""
+    place = float(record[END])
+    if what in (END_LIMIT, END_TOO_NARROW) and is_steep(problem, int(record[HEADING]), place):
+        raise too_steep(problem, place)
+
+
 def cusp_ahead(problem: Problem, record: Array) -> float:
     """Return the place of a cusp close ahead of the end of a run, which takes less than a rounding of the time."""
     f, place, heading = problem.functions, float(record[END]), int(record[HEADING])
@@ -65,6 +72,8 @@ def failure(problem: Problem, record: Array, *, cancels: bool) -> SolutionError:
             f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
             "equilibrium, or faster"
         )
+    if is_steep(problem, int(record[HEADING]), float(record[END])):
+        return too_steep(problem, float(record[END]))
     if cancels:
         return SolutionError(
             f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "

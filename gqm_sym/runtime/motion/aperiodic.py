@@ -17,7 +17,7 @@ from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import STATE_ROWS, Sensitivity
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch import zeros
-from gqm_sym.runtime.launch.ends import first_zero_from, search_beyond_barriers
+from gqm_sym.runtime.launch.ends import first_zero_from, is_steep, search_beyond_barriers, too_steep
 from gqm_sym.runtime.launch.kinds import PERIODIC_QUANTITIES, MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
@@ -317,6 +317,8 @@ class AperiodicMotion(Motion):
         f, lam0, name = problem.functions, problem.lam0, problem.formulas.parameter
         target = end.target
         if abs(target - end.place) <= MIN_STEP_SHARE * max(abs(end.place), abs(lam0)):
+            if is_steep(problem, end.direction, end.place):
+                raise too_steep(problem, end.limit)
             self._end_here()
             return
         if abs(target) > MAX_PARAMETER * max(1.0, abs(lam0)):

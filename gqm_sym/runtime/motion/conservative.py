@@ -1,6 +1,6 @@
 """The motion of a conservative model that begins with a launch: its ends, its kind, and its segments."""
 
-from math import isfinite, ulp
+from math import inf, isfinite, ulp
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from gqm_sym.runtime.launch.ends import (
     is_cusp,
     leaving_at_once,
     starting_step,
+    too_steep,
 )
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.functions import BoundFunctions
@@ -207,15 +208,17 @@ def _beyond_hilltop(problem: Problem, direction: int) -> float:
 
 def _check_place(problem: Problem) -> None:
     """Refuse a launch at a place where the curve has no point, because a coordinate is the root of a negative
-    number.
+    number, or where ds/dlam is infinite.
     """
     f, lam0 = problem.functions, problem.lam0
-    x, z = (float(row[0]) for row in path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:2])
+    x, z, ds = (float(row[0]) for row in path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:3])
     if not (isfinite(x) and isfinite(z)):
         raise LaunchError(
             f"lam0: the curve has no point at {problem.formulas.parameter} = {lam0!r} with these parameters: "
             f"x = {x!r}, z = {z!r}"
         )
+    if ds == inf:
+        raise too_steep(problem, lam0)
 
 
 def _from_cusp(problem: Problem) -> Motion:

@@ -12,6 +12,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.motion.events import contact_force_on
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -43,6 +44,11 @@ BESIDE_JOINT = 64.0 * ULP
 # Where the contact force at a cusp is this many times its largest value before, it grows without bound there. The place
 # of a cusp is rounded, and the force there is a large number, unless that place is 0.
 UNBOUNDED_GROWTH = 1e6
+
+# The potential has a pole at the end of a motion if it falls by no less than the first share of what it fell before,
+# when the distance decreases by the second factor, twice; that begins at the third share of the way from the launch.
+# There the speed is infinite, and so is the contact force if it grows by the last factor on the last segment.
+POLE_GAIN, POLE_RATIO, POLE_BEGIN, POLE_GROWTH = 0.8, 2.0**-8, 2.0**-8, 1.2
 
 # Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
@@ -153,6 +159,11 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
     trajectory, end = whole_trajectory(motion)
+    last = trajectory.segments[-1]
+    if last.end == "singular-point" and last.t_stop[0] <= end and _falls_into_pole(motion.problem, last):
+        first, value = sign * quantity.at(last, np.array([last.phi_start, last.phi_stop]))
+        if value > 0.0 and (quantity is SPEED or value > POLE_GROWTH * abs(first)):
+            return _extreme_at(last, trajectory, last.phi_stop, sign * np.inf)
     best: Extreme | None = None
     for timed in trajectory.segments:
         if timed.t_start[0] >= end and best is not None:
@@ -227,6 +238,16 @@ def _on_segment(
         value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))
     return size, sorted(found, key=lambda peak: peak.t)
+
+
+def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:
+    """Return whether the potential has a pole where a timed segment of a motion without losses ends."""
+    if problem.formulas.dissipation is not None:
+        return False
+    f, place = timed.segment.functions, float(timed.segment.places(np.array([timed.phi_stop]))[0])
+    places = place + (problem.lam0 - place) * POLE_BEGIN * POLE_RATIO ** np.arange(3)
+    fallen = -np.diff(potential_at(f.addresses, f.p, places)[0])
+    return bool(fallen[1] >= POLE_GAIN * fallen[0] > 0.0)
 
 
 def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:
