@@ -251,9 +251,8 @@ def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, buil
     else:
         points = np.column_stack([ACROSS, *([slope * ACROSS] if slope else []), 0.0 * ACROSS])
         curve, scale = gqm.Curve.sampled(points), np.sqrt(1.0 + slope**2)
-    module = built("points_to_a_centre" if slope is not None else "rail_to_a_centre", curve, gqm.CentralForce(k=1))
-    if slope:
-        module = built("points_in_space_to_a_centre", curve, gqm.CentralForce(k=1))
+    name = "rail" if slope is None else "points_in_space" if slope else "points"
+    module = built(f"{name}_to_a_centre", curve, gqm.CentralForce(k=1))
     motion = module.solve(4.0 * scale)
     assert (motion.kind, [event.kind for event in motion.events]) == ("transit", ["singular-point"])
     assert motion.t_end == pytest.approx(np.pi * np.sqrt(scale**3 / 8.0), rel=1e-15)

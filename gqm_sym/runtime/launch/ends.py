@@ -274,13 +274,15 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     what, near, far = found
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
+    if what == zeros.LIMIT and period:
+        return EndOfMotion("closed", lam0 + direction * period)
     place = lam0 + (near if what == zeros.STEPS_SPENT else far)
     if is_steep(problem, direction, place):
         if abs(place - lam0) <= STEEP_DISTANCE * abs(lam0):
             raise too_steep(problem, place)
         return EndOfMotion("open", place)
     if what == zeros.LIMIT:
-        return EndOfMotion("closed", lam0 + direction * period) if period else _end_of_curve(problem, direction)
+        return _end_of_curve(problem, direction)
     if what == zeros.CUSP:
         return EndOfMotion("cusp", lam0 + far)
     if what == zeros.STEPS_SPENT:
