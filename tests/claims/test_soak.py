@@ -137,10 +137,10 @@ def families(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
 
 
 def test_random_librations_keep_to_their_bounds(families: dict[str, ModuleType]) -> None:
-    """A thousand places of random librations lie within their bounds, and no bound is uselessly large."""
-    tally, failed = soak_bounds.soak(85, 19, families)
+    """Hundreds of places of random librations lie within their bounds, and no bound is uselessly large."""
+    tally, failed = soak_bounds.soak(50, 19, families)
     assert failed == []
-    assert tally["checks"] >= 900
+    assert tally["checks"] >= 500
 
 
 # Each of these launches, with its parameters, was outside its bound by a factor of 10 to 10,000.
@@ -284,9 +284,9 @@ def test_small_swings_across_the_seam_of_a_ring(seed: int, kinds: dict[str, Modu
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     """On slopes, springs, circles, rims and coils, closed forms, sweeps and threads agree; differences are reported."""
     modules = kinds
-    tally, failed, _ = soak_kinds.soak(110, 20, modules)
+    tally, failed, _ = soak_kinds.soak(70, 20, modules)
     assert failed == []
-    assert tally["checks"] >= 550
+    assert tally["checks"] >= 350
     assert {kind.__name__ for kind in soak_kinds.KINDS} <= tally.keys()
     # With slightly stronger gravity the closed forms are those of another law.
     monkeypatch.setattr(soak_kinds, "G", "9.8100000001")

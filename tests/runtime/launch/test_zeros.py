@@ -131,7 +131,7 @@ NUMBERS = st.floats(-1.0, 1.0)
 
 
 @pytest.mark.parametrize("name", ["waves", "quintic"])
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(
     abcdf=st.tuples(*[NUMBERS] * 5),
     start=st.floats(-2.0, 2.0),

@@ -102,7 +102,7 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
     module = build(f"{name}_extremes", curve, force)
     given = {"a": 0.4, "Omega": 0.7} if name == "turned_wire" else {}
     for v0 in (0.0, 0.8):
-        places = np.random.default_rng(3).uniform(low, high, 12)
+        places = np.random.default_rng(3).uniform(low, high, 6)
         for quantity in ("normal_force_min", "normal_force_max"):
             sweep = module.sweep(quantity, places, v0, **given)
             assert (sweep.route < 2).all()
