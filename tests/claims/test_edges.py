@@ -218,6 +218,12 @@ def test_a_fall_beside_a_vertical_line(height: str, domain: Any, lam0: float, t:
     assert motion.t_end == pytest.approx(float(time), rel=1e-13)
 
 
+def test_the_end_of_a_long_domain_is_not_vertical(built: Build) -> None:
+    """On the last millionth of the domain a wave becomes steeper by a factor of 2, and is regular all the same."""
+    wave = built("long_wave", gqm.Curve.graph("3*sin(x)", domain=(0, 1000000)), gqm.Gravity())
+    assert wave.solve(999990, 30).events[-1].kind == "domain-end"
+
+
 def test_a_climb_beside_a_pole(built: Build) -> None:
     """The turn of a body that climbs z = 1/x is where its energy says (V**2 was searched beyond the pole)."""
     motion = built("hyperbola", gqm.Curve.graph("1/x"), gqm.Gravity()).solve("0.3", 6, -1, t_max=2)

@@ -57,10 +57,10 @@ DOMAIN_END_V2_SHARE, GAIN_SAMPLES = 1e-12, 5
 # share of the first step.
 NEAR_CUSP = 1e-3
 
-# ds has no bound next to a place if it grows by more than the first factor while the distance decreases by the second
-# one, to the third as a share of the parameter. It grows by less next to the pole of a logarithm, and next to that of a
-# power above -1/8.
-STEEP_GROWTH, STEEP_RATIO, STEEP_DISTANCE = 2.0, 256.0, 2.0**-28
+# ds has no bound next to a place if it grows by more than the first factor each time that the distance decreases by the
+# second one, twice, to the third as a share of the parameter. It grows by less next to the pole of a logarithm, and
+# next to that of a power above -1/8.
+STEEP_GROWTH, STEEP_RATIO, STEEP_DISTANCE = 2.0**0.5, 16.0, 2.0**-28
 
 # The largest number of places with nearly vanishing V**2 that a search passes.
 MAX_BARRIERS = 100
@@ -346,9 +346,9 @@ def domain_end(problem: Problem, direction: int) -> EndOfMotion:
 def is_steep(problem: Problem, direction: int, place: float) -> bool:
     """Return whether ds/dlam has no bound next to a place ahead, as where the graph of a root is vertical."""
     f, size = problem.functions, max(abs(problem.lam0), abs(place))
-    places = place - direction * STEEP_DISTANCE * size * np.array([1.0, STEEP_RATIO])
-    near, far = path_and_force_at(f.addresses, f.p, places, np.zeros(2))[2]
-    return bool(near > STEEP_GROWTH * far)
+    places = place - direction * STEEP_DISTANCE * size * STEEP_RATIO ** np.arange(3)
+    near, middle, far = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+    return bool(near > STEEP_GROWTH * middle and middle > STEEP_GROWTH * far)
 
 
 def too_steep(problem: Problem, place: float) -> SolutionError:
