@@ -13,6 +13,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import potential_at
+from gqm_sym.runtime.launch.zeros import POLE_GAIN, POLE_RATIO
 from gqm_sym.runtime.motion.events import contact_force_on
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -45,10 +46,10 @@ BESIDE_JOINT = 64.0 * ULP
 # of a cusp is rounded, and the force there is a large number, unless that place is 0.
 UNBOUNDED_GROWTH = 1e6
 
-# The potential has a pole at the end of a motion if it falls by no less than the first share of what it fell before,
-# when the distance decreases by the second factor, twice; that begins at the third share of the way from the launch.
-# There the speed is infinite, and so is the contact force if it grows by the last factor on the last segment.
-POLE_GAIN, POLE_RATIO, POLE_BEGIN, POLE_GROWTH = 0.8, 2.0**-8, 2.0**-8, 1.2
+# The potential has a pole at the end of a motion if V**2 gains there as `launch.zeros` says, beginning at the first
+# share of the way from the launch. There the speed is infinite, and so is the contact force if it grows by the second
+# factor on the last segment.
+POLE_BEGIN, POLE_GROWTH = 2.0**-8, 1.2
 
 # Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
@@ -245,7 +246,7 @@ def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:
     if problem.formulas.dissipation is not None:
         return False
     f, place = timed.segment.functions, float(timed.segment.places(np.array([timed.phi_stop]))[0])
-    places = place + (problem.lam0 - place) * POLE_BEGIN * POLE_RATIO ** np.arange(3)
+    places = place + (problem.lam0 - place) * POLE_BEGIN / POLE_RATIO ** np.arange(3)
     fallen = -np.diff(potential_at(f.addresses, f.p, places)[0])
     return bool(fallen[1] >= POLE_GAIN * fallen[0] > 0.0)
 

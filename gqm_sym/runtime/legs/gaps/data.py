@@ -301,6 +301,14 @@ class Bounds(NamedTuple):
 
 
 @Inner
+def loads_on(gaps, at, low, high):  # type: ignore[no-untyped-def]
+    """Return bounds of V**2 and of the contact force on a gap where V**2 lies between two values."""
+    flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
+    least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
+    return Bounds(low, high, least + min(flat * low, flat * high), most + max(steep * low, steep * high))
+
+
+@Inner
 def lengths_on(gaps, at, low, high):  # type: ignore[no-untyped-def]
     """Return bounds of V**2 and of the length of the contact force on a gap where V**2 lies between two values."""
     to = at + BOUNDS_OF_SQUARE

@@ -42,6 +42,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     fill_length_on_gap,
     fill_load,
     lengths_on,
+    loads_on,
     range_of,
     read_rows,
     solve_on_gap,
@@ -96,6 +97,15 @@ FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
 
 
 @Inner
+def is_load_far(contact_sign, bounds, gaps, at):  # type: ignore[no-untyped-def]
+    """Return whether N has this sign, and is far from zero, on a gap with these bounds."""
+    of_n0 = max(fabs(gaps[at + LEAST_N0]), fabs(gaps[at + MOST_N0]))
+    of_kappa = max(fabs(gaps[at + LEAST_KAPPA]), fabs(gaps[at + MOST_KAPPA]))
+    load = bounds.least_load if contact_sign > 0 else -bounds.most_load
+    return load > FAR_SHARE * (of_n0 + of_kappa * bounds.most_v2)
+
+
+@Inner
 def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
     """Return the time over a gap or a block at whose start V**2 is ``v2``, V**2 at its end, and bounds on it.
 
@@ -103,12 +113,8 @@ def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
     """
     u, h = v2 + gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST]
     low, high = (u - h) * gaps[at + LEAST_DAMPING], (u + h) * gaps[at + MOST_DAMPING]
-    flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
-    least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
-    size = max(fabs(least), fabs(most)) + max(fabs(flat), fabs(steep)) * high
-    bounds = Bounds(low, high, least + min(flat * low, flat * high), most + max(steep * low, steep * high))
-    load = bounds.least_load if contact_sign > 0 else -bounds.most_load
-    if gaps[at] != FILLED or not h <= MAX_SHARE * u or not load > FAR_SHARE * size:
+    bounds = loads_on(gaps, at, low, high)
+    if gaps[at] != FILLED or not h <= MAX_SHARE * u or not is_load_far(contact_sign, bounds, gaps, at):
         return nan, nan, bounds
     # The terms of even and of odd degree are summed side by side.
     t, even, odd = 2.0 / MAX_SHARE * (h / u) - 1.0, 0.0, 0.0

@@ -3,7 +3,7 @@
 On the gaps before a turn, and after one, neither is the curve evaluated nor are panels laid (`beside_turns`).
 """
 
-from math import fabs, inf, nan
+from math import inf, nan
 from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.jit import Inner
@@ -19,20 +19,17 @@ from gqm_sym.runtime.legs.gaps.beside_turns import (
 from gqm_sym.runtime.legs.gaps.blocks import ends_of_gap, gap_behind, kept_gap
 from gqm_sym.runtime.legs.gaps.data import (
     FILLED,
-    LEAST_KAPPA,
-    LEAST_N0,
-    MOST_KAPPA,
-    MOST_N0,
     NOISE_OF_FORCE,
     Bounds,
     fill_load,
     lengths_on,
+    loads_on,
     range_of,
     read_rows,
     solve_on_gap,
     solve_towards_turn,
 )
-from gqm_sym.runtime.legs.gaps.passing import FAR_SHARE, RunState, is_read_inside, may_be_peak
+from gqm_sym.runtime.legs.gaps.passing import RunState, is_load_far, is_read_inside, may_be_peak
 from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     NO_VALUES,
@@ -183,29 +180,12 @@ def time_before(far, v2, count, store, widths, work):  # type: ignore[no-untyped
 
 
 @Inner
-def is_load_far(forces, contact_sign, v2, gaps, at):  # type: ignore[no-untyped-def]
-    """Return whether N is far from zero on a gap where V**2 is at most ``v2``; with friction in space this is tested
-    where V**2 is found.
-    """
-    if not forces.linear:
-        return True
-    flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
-    least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
-    size = max(fabs(least), fabs(most)) + max(fabs(flat), fabs(steep)) * v2
-    load = least + min(flat * v2, 0.0) if contact_sign > 0 else -most - max(steep * v2, 0.0)
-    return load > FAR_SHARE * size
-
-
-@Inner
 def may_be_peak_up_to(forces, reading, v2, gaps, at):  # type: ignore[no-untyped-def]
     """Return whether the extreme to be found may be on a gap where V**2 is at most ``v2``."""
     if reading.what != PEAKS:
         return False
-    if forces.squared_contact != 0:
-        return may_be_peak(reading, lengths_on(gaps, at, 0.0, v2))
-    least = gaps[at + LEAST_N0] + min(gaps[at + LEAST_KAPPA] * v2, 0.0)
-    most = gaps[at + MOST_N0] + max(gaps[at + MOST_KAPPA] * v2, 0.0)
-    return may_be_peak(reading, Bounds(0.0, v2, least, most))
+    bounds = lengths_on(gaps, at, 0.0, v2) if forces.squared_contact != 0 else loads_on(gaps, at, 0.0, v2)
+    return may_be_peak(reading, bounds)
 
 
 @Inner
@@ -248,7 +228,9 @@ def begin_on_gaps(forces, march, route, contact_sign, before, record, work):  # 
             time, end = pass_after_turn(forces, v2, passed, length, route.gaps, at, work)
             upcoming += 1
         places, high = (march.origin[0] + v * passed, breaks[upcoming]), range_of(work, W)[1]
-        if not (time > 0.0 and is_load_far(forces, contact_sign, high, route.gaps, at)):
+        # With friction in space N was examined where V**2 was found.
+        is_far = not forces.linear or is_load_far(contact_sign, loads_on(route.gaps, at, 0.0, high), route.gaps, at)
+        if not (time > 0.0 and is_far):
             break
         if is_read_inside(route, places, (total, total + time)) or may_be_peak_up_to(
             forces, route.reading, high, route.gaps, at
