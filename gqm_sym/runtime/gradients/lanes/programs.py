@@ -52,6 +52,21 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
     return programs[0], programs[1]
 
 
+@lru_cache(maxsize=64)
+def turn_program(source: Source, wanted: tuple[int, ...]) -> Program:
+    """Return the program of the Newton step from a place to the turning point next to it, and of the turning point's
+    derivatives with respect to the ``wanted`` variables.
+
+    The place is the turning point as a double, so that one step suffices, and so do slopes to first order in the step.
+    """
+    op = LaneRecorder(source.inputs, 1)
+    half = source.half(op, op.place)
+    by_inputs = gradient(op, half, [op.place, *(op.values[k] for k in wanted)])
+    step = -(half / by_inputs[0])
+    slope, *by = [part + step * gradient(op, part, [op.place])[0] for part in by_inputs]
+    return in_double_double(op, [step, *(-(part / slope) for part in by)])
+
+
 class Swing(NamedTuple):
     """The inputs of the program of a libration on its tape.
 
