@@ -37,8 +37,9 @@ MAX_CONDITION = 4.0
 # needs it.
 MAX_DIFFERENCE = 3e-9
 
-# The nodes at which the variances of rounding errors are found: one end, the middle, and the other end.
-NOISE_NODES = (0, MIN_INTERVALS // 2, MIN_INTERVALS)
+# The nodes at which the variances of rounding errors are found. A program of them with more than so many operations is
+# carried out at every other one only, where it may find variances up to a half too large.
+NOISE_NODES, MAX_NOISE_OPERATIONS = tuple(MIN_INTERVALS * k // 4 for k in range(5)), 512
 
 # The states of an orbit.
 OPEN, ANSWERED, LEFT = range(3)
@@ -206,14 +207,17 @@ def fill_weights(state, edge, share, lanes):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_variances(program, is_mirrored, work, lanes, state, found):  # type: ignore[no-untyped-def]
-    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES.
+    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES, which include
+    the places where they are largest: the ends, and the middle if there is a hilltop.
 
     Both nodes of a pair have the same errors, so that these average out half as well.
     """
     positions, mirrored = program[6], state[MIRRORED]
+    step = 1 if program[3].shape[0] <= MAX_NOISE_OPERATIONS else 2
     found[:, :] = 0.0
-    for number in range(2 if is_mirrored else 3):
-        single, paired = (0.25, 0.5, 0.25)[number], (1.0, 1.0, 0.0)[number]
+    for number in range(0, 3 if is_mirrored else 5, step):
+        single = (0.125 if number % 4 == 0 else 0.25) * step
+        paired = (4.0 if number < 2 else 2.0 if number == 2 else 0.0) * single
         carry_out(program, program[0][2], program[3], NOISE_NODES[number], work, lanes)
         for k in range(positions.size):
             values, total = rows_of(work, positions[k])[0], found[k]
