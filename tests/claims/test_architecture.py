@@ -139,6 +139,7 @@ TESTED_THROUGH = {
     "launch/formulas.py": "emission/test_render.py",
     "launch/functions.py": "runtime/inversion/test_table.py",
     "launch/kinds.py": "runtime/motion/test_aperiodic.py",
+    "launch/poles.py": "claims/test_edges.py",
     "launch/problem.py": "runtime/launch/test_zeros.py",
     "launch/rider.py": "claims/test_riders.py",
     "launch/survey.py": "runtime/compiled/test_calls.py",
