@@ -135,38 +135,12 @@ def take_step(work, position, is_last, lanes, places, found):  # type: ignore[no
 
 
 @Inner
-def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: ignore[no-untyped-def]
-    """Fill the inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
-
-    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by
-    some steps of Newton's method.
-    """
-    places = np.empty((3, BLOCK))
-    for program, work in ((ends[0], works[0]), (ends[1], works[1])):
-        fill_inputs(work, program[3], launches, lanes)
-        call_interpreter(program[0], program[1], 0, program[2], work, lanes)
-    (step, moves), sides = ends, launches[0].shape[0] - first
-    wanted = moves[4].size
-    for end in range(sides):
-        fill_column(places[0], launches, first + end, lanes)
-        places[1:, :] = 0.0
-        found = rows_of(target, (first + end) * ROW)
-        for number in range(steps):
-            fill_place(step, works[0], places, lanes)
-            take_step(works[0], step[4][0], number > 0, lanes, places, found)
-        for i in range(lanes):  # the slope at a turning point of a small swing is small, and changes much
-            places[2, i] = found[2][i]
-        fill_place(moves, works[1], places, lanes)
-        for j in range(wanted):
-            source, to = moves[4][j], (first + sides + end * wanted + j) * ROW
-            target[to : to + ROW] = works[1][source : source + ROW]
-
-
-@Inner
 def fill_turns(turn, work, launches, lanes, first, target):  # type: ignore[no-untyped-def]
-    """Do what `fill_ends` does, by one program (`programs.turn_program`), which suffices for double precision.
+    """Fill inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
 
-    If it has no results, the orbits' program does not depend on the turning points.
+    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by a
+    step of Newton's method (`programs.turn_program`). If that program has no results, that of the orbits does not need
+    them.
     """
     outputs, sides = turn[4], launches[0].shape[0] - first
     if outputs.size == 0:

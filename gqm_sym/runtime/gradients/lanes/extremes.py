@@ -24,14 +24,13 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     LANE_PROGRAM,
     WIDTH,
     fill_column,
-    fill_ends,
     fill_inputs,
     fill_place,
     rows_of,
 )
 from gqm_sym.runtime.gradients.lanes.launches import Launches
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.lanes.pairs import NEWTON_STEPS
+from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
 from gqm_sym.runtime.gradients.lanes.periods import MIN_LAUNCHES_PER_THREAD, end_program, programs_for
 from gqm_sym.runtime.gradients.programs import Source, extreme_program, extreme_quantity
 from gqm_sym.runtime.launch.formulas import Formulas
@@ -204,7 +203,7 @@ def fill_extreme_gradients(ends, works, programs, spaces, rule, launches, found)
         fill_column(state[LOW_END], some, first, lanes)
         fill_column(state[HIGH_END], some, first + 1, lanes)
         if has_ends:
-            fill_ends(ends, works, some, NEWTON_STEPS, lanes, first, target)
+            fill_ends(ends, works, some, lanes, first, target)
         search_grid(grid, grid_work, shares, sign, lanes, state)
         set_at_ends(target, first, has_ends, last, lanes, state)
         evaluate_at_places(program, work, places, lanes, state)
