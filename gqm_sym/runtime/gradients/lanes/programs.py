@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.double_double.interpreter import DIVIDE, MULTIPLY, SQUARE_ROOT
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient, partials
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble, assemble_rates
@@ -50,6 +51,21 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
         slope, *by = gradient(op, half, [op.place, *(op.values[k] for k in variables)])
         programs.append(in_double_double(op, [-(part / slope) for part in (by if variables else [half])]))
     return programs[0], programs[1]
+
+
+@lru_cache(maxsize=64)
+def turn_program(source: Source, wanted: tuple[int, ...]) -> Program:
+    """Return the program of the Newton step from a place to the turning point next to it, and of the turning point's
+    derivatives with respect to the ``wanted`` variables.
+
+    The place is the turning point as a double, so that one step suffices, and so do slopes to first order in the step.
+    """
+    op = LaneRecorder(source.inputs, 1)
+    half = source.half(op, op.place)
+    by_inputs = gradient(op, half, [op.place, *(op.values[k] for k in wanted)])
+    step = -(half / by_inputs[0])
+    slope, *by = [part + step * gradient(op, part, [op.place])[0] for part in by_inputs]
+    return in_double_double(op, [step, *(-(part / slope) for part in by)])
 
 
 class Swing(NamedTuple):
@@ -112,8 +128,8 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
     except WithoutRuleError:
         return None
-    rate = ds / op.sqrt(2 * factor)
-    rates = [rate, *changes(op, rate, (a, b, *p), moves)]
+    rate, adjoints = quotient_with_root(op, ds, 2 * factor)
+    rates = [rate, *changes(op, adjoints, (a, b, *p), moves)]
     return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch), ALONG)
 
 
@@ -192,8 +208,9 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
         square, divisor = formula(op, half, *op.places, p)
     except WithoutRuleError:
         return None
-    rate = op.sqrt(square)
-    return assemble_rates(op, divisor, [rate, *changes(op, rate, (half, *p), moves)], orbits.terms(op), FROM_AXIS)
+    rate, adjoints = root_of_quotient(op, *_quotient(op, op.number(square)))
+    rates = [rate, *changes(op, adjoints, (half, *p), moves)]
+    return assemble_rates(op, divisor, rates, orbits.terms(op), FROM_AXIS)
 
 
 @lru_cache(maxsize=64)
@@ -274,8 +291,41 @@ def _mean_in_doubles(op: LaneRecorder, a: TapeNumber, b: TapeNumber) -> tuple[Ta
     return difference / mean, rest, lost / (first_mean - lost)
 
 
+Adjoints = list[tuple[TapeNumber, TapeNumber]]
+"""Numbers on which a formula depends, each with the formula's derivative with respect to it."""
+
+
+def root_of_quotient(op: LaneRecorder, above: TapeNumber, below: TapeNumber) -> tuple[TapeNumber, Adjoints]:
+    """Record sqrt(above/below) with its derivatives, which take no division of their own."""
+    half = Fraction(1, 2)
+    rate, inverse = op.root_of_quotient(above, below)
+    return rate, [(above, half * inverse), (below, -half * (rate * (rate * inverse)))]
+
+
+def quotient_with_root(op: LaneRecorder, above: TapeNumber, below: TapeNumber) -> tuple[TapeNumber, Adjoints]:
+    """Record above/sqrt(below) in the same way; ``above`` may be a root."""
+    code, *operands = op.entries[above.register] if above.known is None else (None,)
+    if code == SQUARE_ROOT:
+        return root_of_quotient(op, op.at(operands[0]), below)
+    _, inverse = op.root_of_quotient(op.number(1), below)
+    rate = above * inverse
+    return rate, [(above, inverse), (below, Fraction(-1, 2) * (rate * (inverse * inverse)))]
+
+
+def _quotient(op: LaneRecorder, number: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+    """Return numerator and denominator of what was recorded as a quotient by a number that depends on the place; other
+    numbers have the denominator 1.
+    """
+    code, *operands = op.entries[number.register] if number.known is None else (None,)
+    for one, inverse in (operands, operands[::-1]) if code == MULTIPLY else ():
+        kind, *parts = op.entries[inverse]
+        if kind == DIVIDE and op.at(parts[0]).known == 1 and op.depends(parts[1]):
+            return op.at(one), op.at(parts[1])
+    return number, op.number(1)
+
+
 def changes(
-    op: LaneRecorder, formula: TapeNumber, inputs: Sequence[TapeNumber], moves: Sequence[Sequence[TapeNumber]]
+    op: LaneRecorder, given: Adjoints, inputs: Sequence[TapeNumber], moves: Sequence[Sequence[TapeNumber]]
 ) -> list[TapeNumber]:
     """Return the changes of a formula at fixed coordinates of the place.
 
@@ -283,15 +333,15 @@ def changes(
     ----------
     op : LaneRecorder
         The tape, to which the changes are added.
-    formula : TapeNumber
-        The formula.
+    given : Adjoints
+        Numbers that the formula consists of, with its derivatives.
     inputs : sequence of TapeNumber
         The inputs on which it depends.
     moves : sequence of sequences
         For each change wanted, that of each input.
     """
     found = [op.number(0)] * len(moves)
-    for leaf, adjoint in leaf_adjoints(op, formula).items():
+    for leaf, adjoint in leaf_adjoints(op, given).items():
         by_inputs = gradient(op, leaf, inputs)
         for j, move in enumerate(moves):
             change = total_change(op, by_inputs, move)
@@ -301,14 +351,17 @@ def changes(
     return found
 
 
-def leaf_adjoints(op: LaneRecorder, formula: TapeNumber) -> dict[TapeNumber, TapeNumber]:
+def leaf_adjoints(op: LaneRecorder, given: Adjoints) -> dict[TapeNumber, TapeNumber]:
     """Return the derivatives of a formula with respect to what does not depend on the place.
 
-    Its own changes are computed in double-double arithmetic, because parts of them may cancel.
+    The changes of these numbers are computed in double-double arithmetic, because parts of them may cancel.
     """
-    adjoints = {formula.register: op.number(1)}
+    adjoints: dict[int, TapeNumber] = {}
+    for number, adjoint in given:
+        if number.known is None:
+            adjoints[number.register] = adjoints.get(number.register, op.number(0)) + adjoint
     leaves: dict[TapeNumber, TapeNumber] = {}
-    for k in range(formula.register, -1, -1):
+    for k in range(max(adjoints, default=-1), -1, -1):
         if k not in adjoints:
             continue
         if not op.depends(k):
