@@ -67,6 +67,7 @@ WELLS: dict[str, Callable[[Any], Any]] = {
     "sin(Y)/4 + Y**2": lambda y: mp.sin(y) / 4 + y**2,
     "Y**2 + Y**3/5": lambda y: y**2 + y**3 / 5,
     "Y**2/2 + tanh(Y)/3 + x/7": lambda y: y**2 / 2 + mp.tanh(y) / 3 + y / 7,
+    "cosh(3*Y) + x/5": lambda y: mp.cosh(3 * y) + y / 5,  # wider than closed forms of second differences allow
 }
 
 
