@@ -46,10 +46,10 @@ from gqm_sym.runtime.gradients.lanes.arrivals.weights import (
     ROWS,
     WHOLE,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_input, fill_inputs, rows_of
+from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
 from gqm_sym.runtime.gradients.lanes.launches import EVEN, Launches
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.lanes.pairs import NEWTON_STEPS
+from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
 from gqm_sym.runtime.gradients.lanes.periods import MIN_LAUNCHES_PER_THREAD, end_program, programs_for
 from gqm_sym.runtime.gradients.programs import Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
@@ -160,7 +160,7 @@ def fill_swing_arrivals(ends, works, programs, spaces, rule, launches, asked, fo
     rule : ((4, n) array, (2, k) array, (int, int))
         The table of shares (`nodes.trapezoidal_nodes`); for each derivative the kind of the variable and its number
         among those of the programs; and the numbers of nodes of a pass (`weights.PASSES`).
-    launches : (m, n + 2) array
+    launches : (n + 2, m) array
         The variables of each launch, and both turning points to the accuracy of doubles.
     asked : (m, 4) array
         The launch place, the direction of the launch, the place asked for, and 1 if the orbit is a mirror image of
@@ -169,20 +169,22 @@ def fill_swing_arrivals(ends, works, programs, spaces, rule, launches, asked, fo
         Filled.
     """
     (orbit, at_place), (work, place_work), (nodes, which, limits), v0 = programs, spaces, rule, np.empty(BLOCK)
-    functions, variables = orbit[4].size, launches.shape[1] - 2
+    functions, variables = orbit[4].size, launches.shape[0] - 2
     state, integrals = np.zeros((ROWS, BLOCK)), np.empty((functions, INTEGRALS, BLOCK))
     ample, both = work_space(functions), np.empty((2, at_place[4].size, 2, BLOCK))
     here, there, filled = both[0], both[1], orbit[3] * ROW
-    for start in range(0, launches.shape[0], BLOCK):
-        size = min(BLOCK, launches.shape[0] - start)
-        lanes, some, wanted = -(-size // WIDTH) * WIDTH, launches[start : start + size], asked[start : start + size]
-        fill_inputs(ends, works, some, variables, NEWTON_STEPS, lanes, work)
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        lanes, some, wanted = -(-size // WIDTH) * WIDTH, (launches, start, size), asked[start : start + size]
+        fill_inputs(work, variables, some, lanes)
+        fill_ends(ends, works, some, lanes, variables, work)
         place_work[:filled] = work[:filled]
         call_interpreter(at_place[0], at_place[1], 0, at_place[2], place_work, lanes)
         evaluate_at(at_place, place_work, wanted, 0, lanes, here)
         evaluate_at(at_place, place_work, wanted, 2, lanes, there)
         for i in range(lanes):
-            v0[i], ample[4][i] = some[min(i, size - 1), variables - 2], wanted[min(i, size - 1), 3]
+            at = min(i, size - 1)
+            v0[i], ample[4][i] = launches[variables - 2, start + at], wanted[at, 3]
         fill_phases(wanted, v0, here, there, lanes, state)
         integrate(orbit, work, (LIBRATION, nodes, limits), lanes, state, ample, integrals)
         for i in range(size):
@@ -209,7 +211,7 @@ def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ign
     rule : ((4, n) array, int, (int, int))
         The table of shares; the number of the derivative with respect to the launch place, or -1 if there is none; and
         the numbers of nodes of a pass.
-    launches : (m, n) array
+    launches : (n, m) array
         The inputs of the program.
     asked : (m, 2) array
         The distance of the place asked for from the launch, in laps, and the length of a lap in lam with its sign.
@@ -219,13 +221,12 @@ def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ign
     (nodes, launch_row, limits), functions = rule, program[4].size
     state, integrals = np.zeros((ROWS, BLOCK)), np.empty((functions, INTEGRALS, BLOCK))
     ample, rates, begin = work_space(functions), np.empty((functions, 2, BLOCK)), np.zeros((1, 1))
-    for start in range(0, launches.shape[0], BLOCK):
-        size = min(BLOCK, launches.shape[0] - start)
-        lanes, some, wanted = -(-size // WIDTH) * WIDTH, launches[start : start + size], asked[start : start + size]
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        lanes, some, wanted = -(-size // WIDTH) * WIDTH, (launches, start, size), asked[start : start + size]
         for i in range(lanes):
             state[PLACE, i] = wanted[min(i, size - 1), 0]
-        for k in range(launches.shape[1]):
-            fill_input(work, k, some, k, lanes)
+        fill_inputs(work, launches.shape[0], some, lanes)
         integrate(program, work, (CIRCULATION, nodes, limits), lanes, state, ample, integrals)
         evaluate_at(program, work, begin, 0, lanes, rates)
         for i in range(size):
@@ -306,12 +307,12 @@ def _fill_swings(
     ways, out = np.empty((found.shape[0], 4)), np.empty((chosen.size, len(rows)))
     ways[:, 0], ways[:, 1], ways[:, 2] = launches.lines[-2], launches.directions, places
     ways[:, 3] = launches.kinds >= EVEN
-    table, ways, rule = launches.table[chosen], ways[chosen], (trapezoidal_nodes(LIBRATION), which, limits)
+    table, ways, rule = launches.table[:, chosen], ways[chosen], (trapezoidal_nodes(LIBRATION), which, limits)
 
     def work(part: slice) -> None:
         *spaces, place_space, space = (one.work.copy() for one in programs)
         given = (low, high), tuple(spaces), (orbit, place), (space, place_space)
-        fill_swing_arrivals(*given, rule, table[part], ways[part], out[part])
+        fill_swing_arrivals(*given, rule, np.ascontiguousarray(table[:, part]), ways[part], out[part])
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
     found[chosen] = out
@@ -336,16 +337,17 @@ def _fill_laps(
         The direction of the launches, the variables of differentiation, and the numbers of nodes of a pass.
     """
     (places, lap), (chosen, found), n, (direction, rows, limits) = asked, filled, source.parameters, given
-    table = launches.table[chosen]
-    begins, variables = table[:, n : n + 1], table[:, : source.variables]  # a lap begins at lam0
-    ahead = np.broadcast_to(places, lap.shape)[chosen] - begins[:, 0]
-    ways, laps = np.stack([ahead / lap[chosen], lap[chosen]], axis=1), np.hstack([variables, begins])
+    table = launches.table[:, chosen]
+    ahead = np.broadcast_to(places, lap.shape)[chosen] - table[n]  # a lap begins at lam0
+    ways, laps = np.stack([ahead / lap[chosen], lap[chosen]], axis=1), np.vstack([table[: source.variables], table[n]])
     programs, in_code = programs_for([(circulation_program, source, direction, rows)], chosen.size)
     operands, out = in_code[0].operands, np.empty((chosen.size, len(rows)))
     rule = trapezoidal_nodes(CIRCULATION), rows.index(n) if n in rows else -1, limits
 
     def work(part: slice) -> None:
-        fill_lap_arrivals(operands, programs[0].work.copy(), rule, laps[part], ways[part], out[part])
+        fill_lap_arrivals(
+            operands, programs[0].work.copy(), rule, np.ascontiguousarray(laps[:, part]), ways[part], out[part]
+        )
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
     found[chosen] = out
