@@ -25,6 +25,7 @@ LAYERS = (
     {"emission"},
     {"derivation"},
     {"derivation.pipeline"},
+    {"derivation.origin"},
     {"derivation.model"},
     {"derivation.wells", "derivation.forces", "derivation.defaults"},
     {"derivation.geometry", "derivation.reality", "derivation.corners"},

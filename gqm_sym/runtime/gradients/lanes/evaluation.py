@@ -136,7 +136,8 @@ def take_step(work, position, is_last, lanes, places, found):  # type: ignore[no
 
 @Inner
 def fill_turns(turn, work, launches, lanes, first, target):  # type: ignore[no-untyped-def]
-    """Fill inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
+    """Fill inputs of the orbits' program from register ``first`` on: the turning points, their derivatives, and the
+    slope of the potential at the launch place.
 
     The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by a
     step of Newton's method (`programs.turn_program`). If that program has no results, that of the orbits does not need
@@ -145,17 +146,19 @@ def fill_turns(turn, work, launches, lanes, first, target):  # type: ignore[no-u
     outputs, sides = turn[4], launches[0].shape[0] - first
     if outputs.size == 0:
         return
-    places, wanted = np.empty((3, BLOCK)), outputs.size - 1
+    places, wanted = np.empty((3, BLOCK)), outputs.size - 2
     fill_inputs(work, turn[3], launches, lanes)
     call_interpreter(turn[0], turn[1], 0, turn[2], work, lanes)
     for end in range(sides):
         fill_column(places[0], launches, first + end, lanes)
         places[1:, :] = 0.0
         fill_place(turn, work, places, lanes)
-        take_step(work, outputs[0], False, lanes, places, rows_of(target, (first + end) * ROW))
+        take_step(work, outputs[1], False, lanes, places, rows_of(target, (first + end) * ROW))
         for j in range(wanted):
-            source, to = outputs[1 + j], (first + sides + end * wanted + j) * ROW
+            source, to = outputs[2 + j], (first + sides + end * wanted + j) * ROW
             target[to : to + ROW] = work[source : source + ROW]
+    to = (first + sides * (1 + wanted)) * ROW
+    target[to : to + ROW] = work[outputs[0] : outputs[0] + ROW]
 
 
 @Inner

@@ -55,8 +55,8 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
 
 @lru_cache(maxsize=64)
 def turn_program(source: Source, wanted: tuple[int, ...]) -> Program:
-    """Return the program of the Newton step from a place to the turning point next to it, and of the turning point's
-    derivatives with respect to the ``wanted`` variables.
+    """Return the program of the slope of the potential at the launch place, of the Newton step from a place to the
+    turning point next to it, and of the turning point's derivatives with respect to the ``wanted`` variables.
 
     The place is the turning point as a double, so that one step suffices, and so do slopes to first order in the step.
     """
@@ -65,7 +65,8 @@ def turn_program(source: Source, wanted: tuple[int, ...]) -> Program:
     by_inputs = gradient(op, half, [op.place, *(op.values[k] for k in wanted)])
     step = -(half / by_inputs[0])
     slope, *by = [part + step * gradient(op, part, [op.place])[0] for part in by_inputs]
-    return in_double_double(op, [step, *(-(part / slope) for part in by)])
+    at_launch = gradient(op, half, [op.values[source.parameters]])[0]
+    return in_double_double(op, [at_launch, step, *(-(part / slope) for part in by)])
 
 
 class Swing(NamedTuple):
@@ -117,11 +118,11 @@ def moved_variables(source: Source, plan: Plan) -> tuple[int, ...]:
 def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     """Return the program of the time per phase angle of a libration, differentiated at the same phase angle.
 
-    Its inputs are those of `swing_of`. A place has two coordinates: the squares of the sine and of the cosine of half
-    the phase angle. The results are Q and the derivatives of the time per phase angle. It is None if the potential
-    contains an operation without a rule for divided differences.
+    Its inputs are those of `swing_of`, and the slope of the potential at the launch place. A place has two coordinates:
+    the squares of the sine and of the cosine of half the phase angle. The results are Q and the derivatives of the time
+    per phase angle. It is None if the potential contains an operation without a rule for divided differences.
     """
-    op = LaneRecorder(swing_inputs(source, plan), 2, by_inverses=True)
+    op = LaneRecorder(swing_inputs(source, plan) + 1, 2, by_inverses=True)
     p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
@@ -130,7 +131,7 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
         return None
     rate, adjoints = quotient_with_root(op, ds, 2 * factor)
     rates = [rate, *changes(op, adjoints, (a, b, *p), moves)]
-    return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch), ALONG)
+    return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch, op.values[-1]), ALONG)
 
 
 class Orbits(NamedTuple):
@@ -145,7 +146,8 @@ class Orbits(NamedTuple):
     at_rest : bool
         Whether the launches are from rest. The inputs are then the run-time parameters, the launch place, the number of
         the axis, and the sign of the place's distance from it; otherwise the variables of the source, the number of the
-        axis, the upper turning point, and its derivatives.
+        axis, the upper turning point, its derivatives, and in double precision the slope of the potential at the launch
+        place.
     plan : Plan
         How derivatives are found.
     """
@@ -157,7 +159,7 @@ class Orbits(NamedTuple):
 
     @property
     def inputs(self) -> int:
-        """The number of inputs."""
+        """The number of inputs in double-double arithmetic."""
         variables = self.source.variables
         return variables if self.at_rest else variables + 2 + len(moved_variables(self.source, self.plan))
 
@@ -170,7 +172,7 @@ class Orbits(NamedTuple):
             end, number, sign = op.values[n:]
             changes = [op.number(int(k == n)) for k in moved]
         else:
-            number, end, *changes = op.values[variables:]
+            number, end, *changes = op.values[variables : self.inputs]
             sign = op.number(1)
         place, step = self.axes(op, p)
         axis = op.number(place) if step is None else place + number * step
@@ -183,7 +185,8 @@ class Orbits(NamedTuple):
         """Record the derivatives that are wanted as sums (`scaling.terms_of`)."""
         n = self.source.parameters
         launch = op.values[n], op.number(0) if self.at_rest else op.values[n + 1]
-        return terms_of(op, self.source, self.plan, launch)
+        slope = op.values[self.inputs] if len(op.values) > self.inputs else None
+        return terms_of(op, self.source, self.plan, launch, slope)
 
 
 def total_change(op: Recorder, by_inputs: Sequence[TapeNumber], move: Sequence[TapeNumber]) -> TapeNumber:
@@ -202,7 +205,7 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 2, by_inverses=True)
+    op = LaneRecorder(orbits.inputs if orbits.at_rest else orbits.inputs + 1, 2, by_inverses=True)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     try:
         square, divisor = formula(op, half, *op.places, p)
@@ -247,7 +250,7 @@ def mean_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.agm_arguments
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 1)
+    op = LaneRecorder(orbits.inputs if orbits.at_rest else orbits.inputs + 1, 1)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     squares = [op.number(square) for square in formula(op, half, p)]
     a, b = (op.sqrt(square) for square in squares)
