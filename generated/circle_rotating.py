@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 16, input a74aedd594f9, body 1f8b7ec6b9da
+# interface 17, input a74aedd594f9, body bce80d0ee7d2
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=16)
+compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -305,9 +305,9 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (4, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
         middle, rest = middles[i], rests[i]
         out[0, i] = sin_of_sum(0, 2, middle, rest, 0)

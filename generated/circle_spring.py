@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 16, input bcc7b1afa151, body 444242ed6a29
+# interface 17, input bcc7b1afa151, body 334c6cd5db3e
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=16)
+compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -336,11 +336,11 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (5, n)), carray(out, (8, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (5, n)), carray(out, (8, n))
     for i in range(n):
-        a, b, middle, rest = lows[i], highs[i], middles[i], rests[i]
+        middle, rest, a, b = middles[i], rests[i], lows[i], highs[i]
         _t0 = -a + b
         _t1 = a/2 - b/2
         out[0, i] = sin(b)

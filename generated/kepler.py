@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 16, input a0162e77d64e, body 7973b34819ff
+# interface 17, input a0162e77d64e, body 424ef9cbe56f
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=16)
+compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -407,11 +407,11 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (15, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (15, n))
     for i in range(n):
-        a, ecc, _a, b, middle, rest = p[0, i], p[1, i], lows[i], highs[i], middles[i], rests[i]
+        a, ecc, middle, rest, _a, b = p[0, i], p[1, i], middles[i], rests[i], lows[i], highs[i]
         _t0 = -_a + b
         _t1 = _a/2 - b/2
         _t2 = cos(_a)

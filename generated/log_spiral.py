@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 16, input 8cb1e254c2ba, body cf02d1ad775a
+# interface 17, input 8cb1e254c2ba, body 1a91ea1536a1
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=16)
+compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
@@ -323,11 +323,11 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
-def orbit_invariants_batch(n, lows, highs, middles, rests, p, out):
+def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(p, (4, n)), carray(out, (6, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (6, n))
     for i in range(n):
-        b, a, _b, middle, rest = p[1, i], lows[i], highs[i], middles[i], rests[i]
+        b, middle, rest, a, _b = p[1, i], middles[i], rests[i], lows[i], highs[i]
         _t0 = exp(b*middle)
         out[0, i] = sin(a)
         out[1, i] = exp(_b*b)

@@ -201,7 +201,8 @@ def main() -> int:
             laws, force, loses = drawn_force(draw)
             places = np.array([draw.uniform(low, high) for _ in range(LAUNCHES)])
             speeds = np.array([abs(draw.gauss(0.0, 1.0)) * (draw.random() < 0.4) for _ in range(LAUNCHES)])
-            given = {"t_max": HORIZON if loses else None, "contact": draw.choice(("bilateral", "bilateral", "above"))}
+            horizon = HORIZON if draw.random() < (0.7 if loses else 0.3) else None
+            given = {"t_max": horizon, "contact": draw.choice(("bilateral", "bilateral", "above"))}
             try:
                 model = gqm.derive(curve, force)
             except GQMError:  # a body with a radius does not roll over a cusp, or along a curve in space

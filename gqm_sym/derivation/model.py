@@ -124,6 +124,9 @@ class Model:
         The loads on a rider of a banked space curve; None for other curves.
     common_factor
         A factor of dx/dλ, dy/dλ and dz/dλ, whose zeros are the cusps.
+    origin
+        A number or run-time parameter c if the forms contain λ only as λ - c, apart from linear terms and the arguments
+        of sines and cosines; otherwise 0.
     """
 
     curve: Curve
@@ -175,6 +178,7 @@ class Model:
     upright: tuple[sp.Expr, ...] = ()
     rider: Rider | None = None
     common_factor: sp.Expr = sp.S.One
+    origin: sp.Expr = sp.S.Zero
 
     if not TYPE_CHECKING:
         __getattr__ = renamed(

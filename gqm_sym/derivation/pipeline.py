@@ -36,12 +36,13 @@ from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vert
 from gqm_sym.derivation.geometry.level_set import level_set
 from gqm_sym.derivation.geometry.offset_curve import offset_curve
 from gqm_sym.derivation.model import Model, units_of
+from gqm_sym.derivation.origin import measured_from, measured_from_zero, origin_of
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric_orbits
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.errors import ArgumentError, DeclarationError, DerivationError
 from gqm_sym.kernels.base import DIRECTION, KAPPA, MASS, Kernel, X, Y, Z
-from gqm_sym.parameters import Given, check_measured, is_positive
+from gqm_sym.parameters import Given, Value, check_measured, is_positive
 
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
@@ -127,6 +128,28 @@ def derive(
         check_corners(curve, values, with_radius=bool(kernel.radius))
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
         curve = replace(curve, **{name: without_known_absolute_values(form, signs) for name, form in curve.coordinates})
+    origin = origin_of(curve, kernel)
+    about = measured_from(curve, origin)
+    model = _closed_forms(about, kernel, title=called, defaults=defaults, may_be_positive=may_be_positive)
+    model = measured_from_zero(model, curve, origin, (lam, LAM0, LAM1, LAM2))
+    for label, form in model.closed_forms():
+        check_real(form, where=label)
+    if not curve.charted:
+        forms = (*curve.named(model.x, model.y, model.z), (f"ds/d{lam.name}", model.ds), ("potential", model.potential))
+        check_somewhere_real(forms, lam, curve.domain, values)
+    return model
+
+
+def _closed_forms(
+    curve: Curve,
+    kernel: Kernel,
+    *,
+    title: str,
+    defaults: tuple[tuple[str, Value | None], ...],
+    may_be_positive: tuple[str, ...],
+) -> Model:
+    """Return the closed forms of a motion along a curve whose declaration is checked."""
+    lam, values = curve.parameter, dict(defaults)
     # A rotating frame pushes a body out of every vertical plane.
     heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
@@ -157,7 +180,7 @@ def derive(
     model = Model(
         curve=curve,
         force=kernel,
-        title=called,
+        title=title,
         parameter=lam,
         lam0=LAM0,
         v0=V0,
@@ -209,11 +232,6 @@ def derive(
     )
     if law.loads:
         model = replace(model, normal_force=model.normal_force_at(speed.in_other_forms))
-    for label, form in model.closed_forms():
-        check_real(form, where=label)
-    if not curve.charted:
-        tried = (*curve.named(x, y, z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
-        check_somewhere_real(tried, lam, curve.domain, values)
     return model
 
 

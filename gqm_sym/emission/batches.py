@@ -175,20 +175,21 @@ def _at_middle(value: Expr, ends: tuple[Symbol, Symbol], middle: Symbol, rest: S
 
 def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
     """Return the function for first divided differences of the effective potential, ds and the potential's slopes."""
-    model, names, place = lowering.model, lowering.names, lowering.place
+    model, names, place = lowering.model, lowering.names, lowering.measured
     a, d = names.symbol("a"), names.symbol("d")
     starts, places, offsets = (names(name) for name in ("starts", "places", "offsets"))
-    potential = in_single_waves(model.effective_potential, place)
+    potential = in_single_waves(lowering.from_origin(model.effective_potential), place)
     differences = Differences(place, (a, place), {(0, 1): d})
+    here, offset = (place, at(places)), (d, at(offsets))
     return lowering.function(
         "potential_divdiff1_batch",
         (starts, places, offsets),
-        f"U[a, {place}], ds/d{place} and dU/d{place}.",
-        inside=[(a, at(starts)), (place, at(places)), (d, at(offsets))],
+        f"U[a, {place}], ds/d{place} and dU/d{place}{lowering.meaning}.",
+        inside=[(a, at(starts) - model.origin), *([offset, (place, a + d)] if model.origin else [here, offset])],
         outputs=(
             _from_start(differences.first(potential, 0, 1), a, d),
-            _term_by_term(model.ds),
-            model.effective_potential_slope,
+            _term_by_term(lowering.from_origin(model.ds)),
+            lowering.from_origin(model.effective_potential_slope),
         ),
         batch=True,
     )
@@ -198,16 +199,19 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     """Return the functions for second divided differences of the effective potential and ds, and for the terms that are
     constant along an orbit.
     """
-    model, names, place = lowering.model, lowering.names, lowering.place
+    model, names, place = lowering.model, lowering.names, lowering.measured
     a, b, da, db = (names.symbol(s) for s in ("a", "b", "da", "db"))
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
-    potential = in_single_waves(model.effective_potential, place)
-    forms = _with_constant_factors((differences.second(potential), _term_by_term(model.ds)), place, (a, b), (da, db))
+    potential = in_single_waves(lowering.from_origin(model.effective_potential), place)
+    ds = _term_by_term(lowering.from_origin(model.ds))
+    forms = _with_constant_factors((differences.second(potential), ds), place, (a, b), (da, db))
     outputs, held = hoist(forms, {place, da, db})
+    middle, rest, half = (names.symbol(name) for name in ("middle", "rest", "half"))
+    middles, rests, halves = (names(name) for name in ("middles", "rests", "halves"))
     ends = [(a, at(lows)), (b, at(highs))]
-    middle, rest = names.symbol("middle"), names.symbol("rest")
-    middles, rests = names("middles"), names("rests")
+    if model.origin:  # of ends far from zero, only their mean and distance are exact
+        ends = [(half, at(halves)), (a, middle - half + rest), (b, middle + half + rest)]
     outputs = [
         form.replace(
             lambda t: isinstance(t, (sin, cos)) and t.has(place),
@@ -221,14 +225,16 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     ]
     held = [(symbol, _at_middle(value, (a, b), middle, rest)) for symbol, value in held]
     held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]
+    held += [(symbol, symbol) for symbol in (a, b) if model.origin]
     behind = len(lowering.order)
     second = lowering.function(
         "potential_divdiff2_batch",
         (lows, highs, left, right),
-        f"U[a, {place}, b] and ds/d{place}; NaN where the points lie too far apart for the closed form.",
+        f"U[a, {place}, b] and ds/d{place}; NaN where the points lie too far apart for the closed form"
+        f"{lowering.meaning}.",
         inside=[
             *((symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)),
-            *ends,
+            *([] if model.origin else ends),
             *((symbol, at(array)) for symbol, array in ((da, left), (db, right))),
             (place, Function("place_from_ends")(a, b, da, db)),
         ],
@@ -240,9 +246,10 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
         return (second,)
     orbit = lowering.function(
         "orbit_invariants_batch",
-        (lows, highs, middles, rests),
-        "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters.",
-        inside=[*ends, (middle, at(middles)), (rest, at(rests))],
+        (lows, highs, middles, rests, halves),
+        "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters"
+        f"{lowering.meaning}.",
+        inside=[(middle, at(middles) - model.origin), (rest, at(rests)), *ends],
         outputs=tuple(value for _, value in held),
         batch=True,
     )

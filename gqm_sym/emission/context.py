@@ -60,6 +60,26 @@ class Lowering:
         outermost = [call for call in fixed if not any(call != other and other.has(call) for other in fixed)]
         return {call: Symbol(f"_p{count}", real=True) for count, call in enumerate(outermost)}
 
+    @cached_property
+    def measured(self) -> Symbol:
+        """The symbol of a place measured from the model's origin, in functions for divided differences."""
+        return self.names.symbol("y") if self.model.origin else self.place
+
+    @cached_property
+    def meaning(self) -> str:
+        """What `measured` is, as the end of a sentence; empty if it is the place itself."""
+        origin = self.model.origin
+        return f"; {self.measured} and the ends are measured from {self.place} = {origin}" if origin else ""
+
+    def from_origin(self, form: Expr) -> Expr:
+        """Return a form of the model in terms of `measured`.
+
+        The difference of a launch place from the origin is exact next to the origin, and its sum with an offset is
+        rounded as a number of its own size, not of the size of the origin.
+        """
+        origin = self.model.origin
+        return form.xreplace({self.place: self.measured + origin}) if origin else form
+
     @property
     def coordinates(self) -> tuple[Symbol, ...]:
         """The symbols of x and z, or of x, y and z in space, in formulas by coordinates."""

@@ -182,26 +182,37 @@ class _ModelLowering(Lowering):
 
     def potential_divdiff1(self) -> FunctionIR:
         """Return the function for the first divided difference of the effective potential from one place."""
-        a, d = self.names.symbol("a"), self.names.symbol("d")
+        model, lam, y = self.model, self.place, self.measured
+        a, d, start = (self.names.symbol(s) for s in ("a", "d", "start"))
         places, offsets = self.names("places"), self.names("offsets")
-        differences = Differences(self.place, (a, self.place), {(0, 1): d})
-        lam = self.place
+        low, offset = a, (d, at(offsets))
+        inside = [(y, at(places)), offset]
+        if model.origin:
+            low, inside = start, [offset, (start, a - model.origin), (y, start + d)]
+        differences = Differences(y, (low, y), {(0, 1): d})
         return self.function(
             "potential_divdiff1",
             (a, places, offsets),
             f"U[a, {lam}] = (U({lam}) - U(a))/({lam} - a) without cancellation, and ds/d{lam} (MATHS, s. 3).",
-            inside=[(self.place, at(places)), (d, at(offsets))],
-            outputs=(differences.first(self.model.effective_potential, 0, 1), self.model.ds),
+            inside=inside,
+            outputs=(
+                differences.first(self.from_origin(model.effective_potential), 0, 1),
+                self.from_origin(model.ds),
+            ),
         )
 
     def potential_divdiff2(self) -> FunctionIR:
         """Return the function for the second divided difference of the effective potential over two ends and a place
         between them.
         """
+        model, lam, y = self.model, self.place, self.measured
         a, b, da, db = (self.names.symbol(s) for s in ("a", "b", "da", "db"))
         left, right = self.names("left"), self.names("right")
-        differences = Differences(self.place, (a, self.place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
-        lam = self.place
+        low, high, moved = a, b, []
+        if model.origin:
+            low, high = self.names.symbol("low"), self.names.symbol("high")
+            moved = [(low, a - model.origin), (high, b - model.origin)]
+        differences = Differences(y, (low, y, high), {(0, 1): da, (1, 2): db, (0, 2): b - a})
         return self.function(
             "potential_divdiff2",
             (a, b, left, right),
@@ -209,9 +220,13 @@ class _ModelLowering(Lowering):
             inside=[
                 (da, at(left)),
                 (db, at(right)),
-                (self.place, Function("place_from_ends")(a, b, da, db)),
+                *moved,
+                (y, Function("place_from_ends")(low, high, da, db)),
             ],
-            outputs=(differences.second(self.model.effective_potential), self.model.ds),
+            outputs=(
+                differences.second(self.from_origin(model.effective_potential)),
+                self.from_origin(model.ds),
+            ),
         )
 
     def exact(self) -> tuple[ExactIR, ...]:

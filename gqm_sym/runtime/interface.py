@@ -70,7 +70,7 @@ potential_divdiff1_batch   n, a, lam, d, p, out     U[a, lam], ds/dlam, dU/dlam
 potential_divdiff2_batch   n, a, b, da, db, p, out  U[a, lam, b], ds/dlam; NaN where the points lie too far apart for
                                                     the closed form
 orbit_invariants_batch     n, a, b, middle, rest,   terms that are constant along an orbit, which
-                           p, out                   potential_divdiff2_batch reads behind the parameters
+                           half, p, out             potential_divdiff2_batch reads behind the parameters
 bounds_batch               n, lo, hi, p, out        lower and upper bound of dU/dlam, then of ds/dlam
 time_integrand_batch       n, sine2, cosine2, p,    (dt/du)**2 [s2], and its divisor: where that is small, digits are
                            out                      lost
@@ -97,7 +97,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 16
+INTERFACE = 17
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -118,7 +118,7 @@ SEPARATED_TERMS = POTENTIAL_DIVDIFF1
 POTENTIAL_DIVDIFF1_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF2_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
 BOUNDS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY)
-ORBIT_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY)
+ORBIT_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY, MANY, MANY, MANY, MANY)
 TIME_INTEGRAND_BATCH = types.void(COUNT, REAL, REAL, MANY, MANY)
 INTEGRAND_INVARIANTS_BATCH = types.void(COUNT, MANY, MANY, MANY)
 AGM_ARGUMENTS_BATCH = types.void(COUNT, MANY, MANY, MANY)

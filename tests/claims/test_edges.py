@@ -287,6 +287,27 @@ def test_the_contact_force_before_a_pole(built: Build) -> None:
     assert module.solve(2, 3, contact="above").events[-1].kind == "singular-point"
 
 
+def test_a_fall_into_a_centre_with_drag(built: Build) -> None:
+    """It is followed to the end where the distance from the centre is a coordinate; where it is a difference of rounded
+    ones, the motion is had up to a time that the error names (it was said to end 4e-10 s before, or that terms cancel).
+    """
+    force = gqm.Gravity() + gqm.CentralForce(k=5, centre=("c", "c**2/4")) + gqm.QuadraticDrag(b="1/20")
+    module = built("dragged_to_a_centre", gqm.Curve.graph("x**2/4", parameter="x"), force)
+    motion = module.solve(2, "1/2", c=0)
+    assert motion.t_end < 1.0
+    assert motion.events[-1].kind == "singular-point"
+    assert motion.v_max.value == motion.normal_force_max.value == np.inf
+    assert motion.lam(motion.t_end) == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(SolutionError, match=r"a centre of force at x = 1\.0.*give t_max=0\.4997.* or less") as told:
+        _ = module.solve(2, "1/2", c=1).t_end
+    t_max = float(str(told.value).partition("t_max=")[2].split()[0])
+    assert module.solve(2, "1/2", c=1, t_max=t_max).v_max.value > 50.0
+    x = np.linspace(-3.0, 3.0, 25)
+    points = built("points_dragged_to_a_centre", gqm.Curve.sampled(np.column_stack([x, x * x / 4])), force)
+    with pytest.raises(SolutionError, match=r"falls into a centre of force at s = 3\.898926"):
+        _ = points.solve(6, "1/2", c=0).t_end
+
+
 def test_a_force_without_a_bound_that_is_no_pole(built: Build) -> None:
     """Where a logarithm has its pole the motion ends, after sqrt(pi/2) d/sqrt(a); a body that passes by a centre at a
     small distance turns on the other side.

@@ -176,6 +176,12 @@ def test_the_rounding_of_an_end_near_a_hilltop_is_charged(families: dict[str, Mo
     assert soak_bounds.faults(module, family, NEAR_HILLTOP) == ([], len(soak_bounds.SHARES))
 
 
+def test_forces_that_cancel_along_a_track_but_not_across_it(families: dict[str, ModuleType]) -> None:
+    """A rounding of the points across the track moves a turning point by eleven times as much (seed 144)."""
+    call = {"lam0": 2.467701708628926, "v0": 0.0, "direction": -1, "k": 4.345879535611289, "g": 9.81}
+    assert soak_bounds.faults(families["track"], soak_bounds.FAMILIES["track"], call) == ([], len(soak_bounds.SHARES))
+
+
 @pytest.mark.parametrize("c2", [-25.952397021578278, -60.0, -8.0])
 def test_a_sharp_bottom_of_the_valley_is_resolved(c2: float, families: dict[str, ModuleType]) -> None:
     """Within a thousandth of the swing ds/dx changes; on a coarse scale this was taken for noise of 1e-10."""

@@ -1,8 +1,9 @@
-"""Gradients of periods, turning points and extremes of many launches, by compiled loops in threads."""
+"""Gradients of periods, turning points, extremes and times at places of many launches, by compiled loops in threads."""
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.lanes.arrivals.times import arrival_gradients
 from gqm_sym.runtime.gradients.lanes.extremes import extreme_gradients
 from gqm_sym.runtime.gradients.lanes.launches import Launches
 from gqm_sym.runtime.gradients.lanes.periods import period_gradients, turn_gradients
@@ -11,11 +12,11 @@ from gqm_sym.runtime.launch.kinds import EXTREMES
 
 # Quantities whose gradients compiled code computes: periods, each with its number of half periods, and others.
 PERIODS = {"half_period": 1.0, "period": 2.0}
-COMPILED = (*PERIODS, "turning_points", *EXTREMES)
+COMPILED = (*PERIODS, "turning_points", "time_at", *EXTREMES)
 
 
 def launch_gradients(
-    formulas: Formulas, quantity: str, launches: Launches, values: Array, rows: tuple[int, ...]
+    formulas: Formulas, quantity: str, launches: Launches, values: Array, rows: tuple[int, ...], places: Array
 ) -> Array:
     """Return the derivatives of a quantity: a row for each launch, NaN where double-double arithmetic does not suffice.
 
@@ -31,6 +32,8 @@ def launch_gradients(
         The quantity of each launch.
     rows : tuple of int
         The variables of differentiation.
+    places : array
+        The places for "time_at": a vector, or one number that all launches have in common.
 
     Returns
     -------
@@ -44,4 +47,6 @@ def launch_gradients(
         return slopes
     if quantity == "turning_points":
         return turn_gradients(formulas, launches, rows)
+    if quantity == "time_at":
+        return arrival_gradients(formulas, launches, places, rows)
     return extreme_gradients(formulas, quantity, launches, values, rows)

@@ -30,6 +30,8 @@ class BoundFunctions(NamedTuple):
         The data of a dissipative model for compiled code; None for a conservative one.
     chart, joints : arrays
         The chart, and the places at which its pieces meet, within one period; empty for a curve with formulas.
+    mass : float
+        The mass of the body in kg.
     """
 
     addresses: Addresses
@@ -42,6 +44,7 @@ class BoundFunctions(NamedTuple):
     dissipation: Dissipation | None = None
     chart: Array = NOWHERE
     joints: Array = NOWHERE
+    mass: float = 1.0
 
     def liftoff_corners(self, only_sign: int) -> Array:
         """Return the corners at which a moving body leaves a track that can push with one sign of N only (0: with

@@ -31,12 +31,14 @@ def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     if p.functions is None:
         addresses, losses = formulas.functions.addresses(), formulas.dissipation
         dissipation = None if losses is None else losses.addresses()
-        p.functions = BoundFunctions(addresses, p.values, dissipation=dissipation)
+        mass = float(p.values[list(formulas.parameters).index("m")])
+        p.functions = BoundFunctions(addresses, p.values, dissipation=dissipation, mass=mass)
         if formulas.chart is not None:
             chart = formulas.charted(p)
             block = np.concatenate([p.values, chart.block])
             shape = (chart.breaks, chart.corners, chart.period, chart.bends)
-            p.functions = BoundFunctions(addresses, block, None, *shape, dissipation, chart.block, chart.inner_edges)
+            pieces = chart.block, chart.inner_edges
+            p.functions = BoundFunctions(addresses, block, None, *shape, dissipation, *pieces, mass)
     bound: BoundFunctions = p.functions
     return bound
 

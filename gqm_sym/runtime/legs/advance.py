@@ -33,7 +33,7 @@ from gqm_sym.runtime.legs.body import (
     LEG_BEFORE,
     LEG_TIME,
     LOW,
-    MAY_REST,
+    MAY_END,
     NO_TURN_UNTIL,
     ONLY_SIGN,
     PAUSES,
@@ -111,6 +111,9 @@ CREEPING_SHARE = 1e-6
 
 # The number of pauses that a pause of a creeping body counts for, because such a body does not move on and on.
 CREEPING_PAUSES = 5.0
+
+# The number of places between two turns at which the contact force on a body at rest is looked at.
+SUPPORT_SAMPLES = 33
 
 # A leg is not tried as one polynomial if it is longer than this share of one for which that failed.
 MAX_WHOLE_SHARE = 0.9
@@ -238,7 +241,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     lam0, period = body[LAM0], body[PERIOD]
     step = first_step(DomainNumbers(body[LOW], body[HIGH], period, 0.0, 0.0))
     preferred = int(body[PREFERRED])
-    body[PLACE], body[MAY_REST], body[FIRST_STEP], body[STEP] = lam0, 1.0, step, FIRST_PANEL_SHARE * step
+    body[PLACE], body[MAY_END], body[FIRST_STEP], body[STEP] = lam0, 1.0, step, FIRST_PANEL_SHARE * step
     body[REACH] = period if period > 0.0 else step
     body[FROM_REST], body[DIRECTION] = 1.0 if body[V2] == 0.0 else 0.0, preferred
     if body[V2] == 0.0:
@@ -346,6 +349,26 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
 
 
 @Inner
+def may_end(dissipation, p, body, record):  # type: ignore[no-untyped-def]
+    """Return whether a body that turns, and cannot rest, may still come to an end of its motion, of the curve or of
+    contact.
+
+    Between two turns it is confined to the way between them. There it loses contact only where the track would have to
+    pull a body at rest; that is looked for at `SUPPORT_SAMPLES` places.
+    """
+    if record[START_V2] != 0.0:
+        return body[TURNS] < 2.0 or body[ONLY_SIGN] != 0.0
+    if body[ONLY_SIGN] == 0.0:
+        return False
+    point, forces = point_buffer(), forces_on(dissipation, p, int(record[HEADING]))
+    for k in range(SUPPORT_SAMPLES):
+        place = record[START] + k / (SUPPORT_SAMPLES - 1.0) * (record[END] - record[START])
+        if body[ONLY_SIGN] * sign_of_load(forces, place, 0.0, point) < 0.0:
+            return True
+    return False
+
+
+@Inner
 def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-untyped-def]
     """Return whether a body rests where V**2 has vanished; if it turns, store the data of the turn."""
     place, low = record[END], record[END_LOW]
@@ -358,7 +381,8 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
         note_blocks(body, body[LAST_WIDTH], found.blocks)
     body[BRANCH], body[BRANCH_HEIGHT] = found.branch
     body[TURNS] += 1.0
-    body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
+    body[PAUSES], body[NO_TURN_UNTIL] = 0.0, 0.0
+    body[MAY_END] = 1.0 if found.could_stay or may_end(dissipation, p, body, record) else 0.0
     return rests
 
 

@@ -37,7 +37,7 @@ from gqm_sym.runtime.legs.body import (
     LAST_AT,
     LEAST_SIZE,
     LEAST_SWING,
-    MAY_REST,
+    MAY_END,
     ONLY_SIGN,
     PANEL_COUNT,
     PAUSES,
@@ -179,7 +179,7 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
     if question == ARRIVAL:
         # A body that has turned at two points reaches no place outside of them any more.
         return body[TURNS] < (1.0 if body[FROM_REST] else 2.0)
-    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_REST] == 0.0 or body[TURNS] > MAX_TURNS))
+    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
 
 
 @Inner

@@ -32,7 +32,8 @@ WIDTH_BEFORE          0 if there was none
 UNRESOLVED, ..._2,    that of the last leg that was not one polynomial with so many blocks (`runs.whole_tables`); 0 if
 ..._3                 the last one was
 TURNS, PAUSES         how often the body has turned, and how many runs without an end have paused since
-MAY_REST              whether the body could stay at its last turn, were the curve less steep; 1 before the first turn
+MAY_END               whether the motion may end after the last turn without a horizon (`advance.may_end`); 1 before the
+                      first turn
 FROM_REST             1 if the launch was from rest
 ENDING                the code of what has ended the motion (`advance`), or 0
 PANEL_COUNT           how many panels the records of the legs had, with one more for each (counted for `solve`)
@@ -56,7 +57,7 @@ from gqm_sym.runtime.legs.kinks.places import ROOM_FOR_KINKS
 
 LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
-ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
+ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_END = range(18, 26)
 LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
 UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, RETRY_WIDTH, KINKS = range(34, 43)
 SIZE = KINKS + ROOM_FOR_KINKS

@@ -36,7 +36,7 @@ from gqm_sym.runtime.legs.body import (
     LEAST_SWING,
     LEG_TIME,
     LOW,
-    MAY_REST,
+    MAY_END,
     NO_TURN_UNTIL,
     PANEL_COUNT,
     PAUSES,
@@ -53,7 +53,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
-from gqm_sym.runtime.legs.endings import check_steepness, cusp_ahead, end_name, failure, force_cancels
+from gqm_sym.runtime.legs.endings import check_fall, check_steepness, cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, Entry, entry_near
 from gqm_sym.runtime.legs.frames.fitting import TryLater
 from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, RETRY_MARGIN, Frame
@@ -186,7 +186,7 @@ class Driver:
         """Whether so many legs have been followed that no end of the motion is searched for any more."""
         number = self.body.item
         turns = number(TURNS)
-        return bool((turns and not number(MAY_REST)) or turns > MAX_TURNS or number(PAUSES) >= MAX_PAUSES)
+        return bool((turns and not number(MAY_END)) or turns > MAX_TURNS or number(PAUSES) >= MAX_PAUSES)
 
     def go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
@@ -277,6 +277,9 @@ class Driver:
             raise leaving_at_once(problem, heading, "end of the domain")
         if frame is None and self.elapsed <= self._horizon:
             check_steepness(problem, what, record)
+            creeps = what == END_PAUSE and self._creeps(self.number)
+            if creeps or what in (END_TOO_NARROW, END_TOO_MANY_PANELS):
+                check_fall(problem, record, self.number(V2), self.elapsed)
         name = "" if at_limit else end_name(problem, what, record)
         if name == "cusp" and what == END_TOO_NARROW:
             record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = cusp_ahead(problem, record), 0.0

@@ -1,12 +1,15 @@
 """What has ended a run of a motion with losses, by name, and why a leg could not be followed."""
 
 from contextlib import suppress
+from math import inf, sqrt
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, is_steep, starting_step, too_steep
+from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
@@ -18,6 +21,9 @@ from gqm_sym.runtime.legs.variations.law import FormulaLaw
 # Legs approach a cusp to within some 1e-8, where roundings of the place hide the decrease of ds/dlam. There ds is at
 # most this share of its value a thousandth of the first step away.
 CUSP_SHARE = 1e-2
+
+# A fall into a pole of the potential is complete if the rest takes no more than this many roundings of the time.
+FALL_ROUNDINGS = 4.0
 
 # The names of the ends of runs that the code alone determines.
 END_NAMES = {
@@ -43,6 +49,27 @@ def check_steepness(problem: Problem, what: int, record: Array) -> None:
     place = float(record[END])
     if what in (END_LIMIT, END_TOO_NARROW) and is_steep(problem, int(record[HEADING]), place):
         raise too_steep(problem, place)
+
+
+def check_fall(problem: Problem, record: Array, v2: float, elapsed: float) -> None:
+    """Refuse a run that ends before a pole of the potential by more than a rounding of the time ``elapsed``.
+
+    The distance from the pole is a difference of rounded coordinates, so that panels close to it, however narrow,
+    resolve the force to a few digits only.
+    """
+    f, place, heading = problem.functions, float(record[END]), int(record[HEADING])
+    pole = pole_ahead(problem, heading, place)
+    if pole is None:
+        return
+    ds = float(path_and_force_at(f.addresses, f.p, np.array([place]), np.zeros(1))[2, 0])
+    left = abs(pole - place) * ds / sqrt(v2) if v2 > 0.0 else inf
+    if left > FALL_ROUNDINGS * ULP * elapsed:
+        name = problem.formulas.parameter
+        raise SolutionError(
+            f"the body falls into a centre of force at {name} = {pole!r}, where its speed has no bound, and the last "
+            f"{left:.2g} s of the fall cannot be followed with losses; give t_max={0.99999 * elapsed:.6g} or less, or "
+            "put the centre beside the curve"
+        )
 
 
 def cusp_ahead(problem: Problem, record: Array) -> float:

@@ -29,7 +29,8 @@ class FollowedMotion(Motion):
     """A motion that loses energy, followed as far as required; `DissipativeMotion` answers the questions about it."""
 
     _whole: Trajectory | None = None
-    _known_beginning = 0
+    # The number of runs up to the first turn, 0 before it is known; and whether the motion is known to have no end.
+    _runs_to_turn, _has_no_end = 0, False
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "dissipative", problem.launch.direction)
@@ -159,20 +160,19 @@ class FollowedMotion(Motion):
 
     @property
     def _beginning(self) -> int:
-        """The number of runs that `_look_ahead` computes of a motion for which it finds no end; 0 as long as that is
-        not known.
+        """The number of runs up to the first turn of a motion for which `_look_ahead` finds no end; 0 as long as that
+        is not known.
         """
-        if self._known_beginning or self._horizon < inf:
-            return self._known_beginning
-        driver = self._driver
-        if not driver.ending and driver.is_endless:
-            self._known_beginning = len(self._layout.runs) + len(driver.runs)
-        return self._known_beginning
+        if not self._has_no_end and self._horizon == inf:
+            driver = self._driver
+            if not self._runs_to_turn and (driver.number(TURNS) or driver.is_endless):
+                self._runs_to_turn = len(self._layout.runs) + len(driver.runs)
+            self._has_no_end = not driver.ending and driver.is_endless
+        return self._runs_to_turn if self._has_no_end else 0
 
     def _follow_next(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        if self._horizon == inf:
-            self._known_beginning = self._beginning  # before it can change
+        _ = self._beginning  # the runs up to the first turn are counted before there are more
         self._driver.go_on()
 
     def _follow(self, reach: float) -> None:
@@ -205,8 +205,8 @@ class FollowedMotion(Motion):
             return
         for run in known:
             parts = self._driver.with_panels(run)
-            if len(self._layout.runs) + len(runs) < self._beginning:
-                self._known_beginning += len(parts) - 1
+            if len(self._layout.runs) + len(runs) < self._runs_to_turn:
+                self._runs_to_turn += len(parts) - 1
             runs += parts
         self._driver.runs.replace(runs)
 

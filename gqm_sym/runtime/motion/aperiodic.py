@@ -209,7 +209,7 @@ class AperiodicMotion(Motion):
         """
         from gqm_sym.runtime.legs.variations.without_losses import followed_in_legs
 
-        return None if self.problem.formulas.chart is None else followed_in_legs(self.problem, self.t_end)
+        return None if self.problem.formulas.chart is None else followed_in_legs(self.problem)
 
     @computed_once
     def _passage(self) -> PassageChanges:

@@ -12,8 +12,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.speed import potential_at
-from gqm_sym.runtime.launch.zeros import POLE_GAIN, POLE_RATIO
+from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_on
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -46,10 +45,9 @@ BESIDE_JOINT = 64.0 * ULP
 # of a cusp is rounded, and the force there is a large number, unless that place is 0.
 UNBOUNDED_GROWTH = 1e6
 
-# The potential has a pole at the end of a motion if V**2 gains there as `launch.zeros` says, beginning at the first
-# share of the way from the launch. There the speed is infinite, and so is the contact force if it grows by the second
-# factor on the last segment.
-POLE_BEGIN, POLE_GROWTH = 2.0**-8, 1.2
+# At a pole of the potential the speed is infinite, and so is the contact force if it grows by this factor on the last
+# segment.
+POLE_GROWTH = 1.2
 
 # Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
@@ -242,13 +240,9 @@ def _on_segment(
 
 
 def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:
-    """Return whether the potential has a pole where a timed segment of a motion without losses ends."""
-    if problem.formulas.dissipation is not None:
-        return False
-    f, place = timed.segment.functions, float(timed.segment.places(np.array([timed.phi_stop]))[0])
-    places = place + (problem.lam0 - place) * POLE_BEGIN / POLE_RATIO ** np.arange(3)
-    fallen = -np.diff(potential_at(f.addresses, f.p, places)[0])
-    return bool(fallen[1] >= POLE_GAIN * fallen[0] > 0.0)
+    """Return whether the potential has a pole where the last segment of a motion ends."""
+    first, last = timed.segment.places(np.array([timed.phi_start, timed.phi_stop])).tolist()
+    return pole_ahead(problem, 1 if last > first else -1, last) is not None
 
 
 def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:

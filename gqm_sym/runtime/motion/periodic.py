@@ -9,6 +9,7 @@ import numpy as np
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
@@ -112,6 +113,10 @@ class PeriodicMotion(PeriodicTimes):
         return dict(zip(rows, shares.tolist(), strict=True))
 
     @locked
+    def _is_turn(self, place: float) -> bool:
+        turns = self.turning_points if self.kind == "libration" else ()
+        return any(abs(place - turn) <= ULP * abs(turn) for turn in turns)
+
     def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
         return second_gradient(self._derivatives, self, quantity, wrt)
 

@@ -1,7 +1,7 @@
 """Sweeps with gradients: the values as without gradients, then the derivatives at the same launches.
 
-Compiled code computes those of periods, turning points and extremes of periodic motions along curves with formulas. For
-all other quantities, and if its digits do not suffice, each launch is solved.
+Compiled code computes those of periods, turning points, extremes and first times at places of periodic motions along
+curves with formulas. For all other quantities, and if its digits do not suffice, each launch is solved.
 """
 
 from contextlib import suppress
@@ -77,7 +77,7 @@ def sweep_with_gradient(
             _fill_missing_ends(formulas, launched, ends, solve)
             several, _ = launches_of(formulas, launched[:-2], launched[-2], ends)
         if which.size:
-            slopes = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
+            slopes = launch_gradients(formulas, quantity, several, values, tuple(rows.values()), launched[-1])
     if slopes is not None and which.size == size:
         gradient = slopes
     else:

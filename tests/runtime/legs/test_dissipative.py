@@ -142,6 +142,37 @@ def test_out_of_the_domain_at_once(build: Build) -> None:
     assert module.sweep("t_end", lam0=[1.0], v0=1.0).status_counts() == {"the launch is refused; solve says why": 1}
 
 
+def test_out_of_the_domain_after_a_turn(build: Build) -> None:
+    """Thrown up an incline, a body with drag turns after vt/a atan(v0/vt), and from there falls the distance d to the
+    lower end in vt/a acosh(exp(b d)); without a horizon it was said to swing for ever.
+    """
+    incline = build("incline", gqm.Curve.graph("x", domain=(-1, None)), gqm.QuadraticDrag(b="1/10"))
+    motion, a, b, v0 = incline.solve(0, 3), G / math.sqrt(2.0), 0.1, 3.0
+    vt = math.sqrt(a / b)
+    d = math.log1p((v0 / vt) ** 2) / (2.0 * b) + math.sqrt(2.0)
+    expected = vt / a * (math.atan(v0 / vt) + math.acosh(math.exp(b * d)))
+    assert motion.t_end == pytest.approx(expected, rel=1e-15)
+    assert [event.kind for event in motion.events] == ["turn", "domain-end"]
+    assert incline.sweep("t_end", [0.0], 3.0).values == pytest.approx([expected], rel=1e-15)
+
+
+def test_contact_that_is_lost_after_two_turns(build: Build) -> None:
+    """Inside a loop between two slopes a body swings over the top until drag has made it too slow: there N vanishes.
+    One that never comes near the top swings for ever.
+    """
+    track = gqm.Curve.parametric(x="u + 2*sin(u)", z="-2*cos(u) + 3*(u - pi)**2/20", parameter="u")
+    loop = build("loop", track, gqm.QuadraticDrag(b="1/100"))
+    motion = loop.solve(-1.9, contact="above")
+    assert [leg.end for leg in motion.legs] == ["turn", "turn", "liftoff"]
+    end = motion.state(motion.t_end)
+    assert abs(end.normal_force) <= 1e-13 * G
+    assert loop.solve(-1.9, contact="above", t_max=20).t_end == motion.t_end
+    swept = loop.sweep("t_end", [-1.9, 0.5], contact="above").values
+    assert swept[0] == pytest.approx(motion.t_end, rel=1e-15)
+    assert np.isnan(swept[1])
+    assert loop.solve(0.5, contact="above").t_end == math.inf
+
+
 @pytest.fixture(scope="module")
 def root(build: Build) -> ModuleType:
     """Return the graph of x**(3/2), whose curvature is infinite at 0, where the curve ends."""

@@ -37,8 +37,9 @@ MAX_CONDITION = 4.0
 # needs it.
 MAX_DIFFERENCE = 3e-9
 
-# The nodes at which the variances of rounding errors are found: one end, the middle, and the other end.
-NOISE_NODES = (0, MIN_INTERVALS // 2, MIN_INTERVALS)
+# The nodes at which the variances of rounding errors are found. A program of them with more than so many operations is
+# carried out at every other one only, where it may find variances up to a half too large.
+NOISE_NODES, MAX_NOISE_OPERATIONS = tuple(MIN_INTERVALS * k // 4 for k in range(5)), 512
 
 # The states of an orbit.
 OPEN, ANSWERED, LEFT = range(3)
@@ -76,21 +77,33 @@ def rows_of(work, position):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_column(row, launches, column, lanes):  # type: ignore[no-untyped-def]
-    """Fill a row with a column of the launches; the last launch is repeated."""
-    size = launches.shape[0]
+    """Fill a row with a column of some of the launches; the last of these is repeated.
+
+    Parameters
+    ----------
+    row : array
+        The row.
+    launches : ((k, m) array, int, int)
+        All launches, the first of those that are meant, and how many these are.
+    column, lanes : int
+        The column, and the number of launches with repetitions.
+    """
+    table, start, size = launches
+    values = table[column, start : start + size]
     for i in range(size):
-        row[i] = launches[i, column]
+        row[i] = values[i]
     for i in range(size, lanes):
-        row[i] = launches[size - 1, column]
+        row[i] = values[size - 1]
 
 
 @Inner
-def fill_input(work, register, launches, column, lanes):  # type: ignore[no-untyped-def]
-    """Fill a register with a column of the launches."""
-    high, low, error = rows_of(work, register * ROW)
-    fill_column(high, launches, column, lanes)
-    for i in range(lanes):
-        low[i], error[i] = 0.0, 0.0
+def fill_inputs(work, count, launches, lanes):  # type: ignore[no-untyped-def]
+    """Fill the first registers with so many columns of some of the launches (`fill_column`), which are exact."""
+    for k in range(count):
+        high, low, error = rows_of(work, k * ROW)
+        fill_column(high, launches, k, lanes)
+        for i in range(lanes):
+            low[i], error[i] = 0.0, 0.0
 
 
 @Inner
@@ -122,44 +135,30 @@ def take_step(work, position, is_last, lanes, places, found):  # type: ignore[no
 
 
 @Inner
-def fill_ends(ends, works, launches, steps, lanes, first, target):  # type: ignore[no-untyped-def]
-    """Fill the inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
+def fill_turns(turn, work, launches, lanes, first, target):  # type: ignore[no-untyped-def]
+    """Fill inputs of the orbits' program from register ``first`` on: the turning points, their derivatives, and the
+    slope of the potential at the launch place.
 
-    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by
-    some steps of Newton's method.
+    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by a
+    step of Newton's method (`programs.turn_program`). If that program has no results, that of the orbits does not need
+    them.
     """
-    places = np.empty((3, BLOCK))
-    for program, work in ((ends[0], works[0]), (ends[1], works[1])):
-        for k in range(program[3]):
-            fill_input(work, k, launches, k, lanes)
-        call_interpreter(program[0], program[1], 0, program[2], work, lanes)
-    (step, moves), sides = ends, launches.shape[1] - first
-    wanted = moves[4].size
+    outputs, sides = turn[4], launches[0].shape[0] - first
+    if outputs.size == 0:
+        return
+    places, wanted = np.empty((3, BLOCK)), outputs.size - 2
+    fill_inputs(work, turn[3], launches, lanes)
+    call_interpreter(turn[0], turn[1], 0, turn[2], work, lanes)
     for end in range(sides):
         fill_column(places[0], launches, first + end, lanes)
         places[1:, :] = 0.0
-        found = rows_of(target, (first + end) * ROW)
-        for number in range(steps):
-            fill_place(step, works[0], places, lanes)
-            take_step(works[0], step[4][0], number > 0, lanes, places, found)
-        for i in range(lanes):  # the slope at a turning point of a small swing is small, and changes much
-            places[2, i] = found[2][i]
-        fill_place(moves, works[1], places, lanes)
+        fill_place(turn, work, places, lanes)
+        take_step(work, outputs[1], False, lanes, places, rows_of(target, (first + end) * ROW))
         for j in range(wanted):
-            source, to = moves[4][j], (first + sides + end * wanted + j) * ROW
-            target[to : to + ROW] = works[1][source : source + ROW]
-
-
-@Inner
-def fill_inputs(ends, works, launches, count, steps, lanes, target):  # type: ignore[no-untyped-def]
-    """Fill the inputs of the orbits' program: so many columns of the launches, then what `fill_ends` fills.
-
-    If ``ends`` has no results, the program does not depend on the turning points.
-    """
-    for k in range(count):
-        fill_input(target, k, launches, k, lanes)
-    if ends[0][4].size > 0:
-        fill_ends(ends, works, launches, steps, lanes, count, target)
+            source, to = outputs[2 + j], (first + sides + end * wanted + j) * ROW
+            target[to : to + ROW] = work[source : source + ROW]
+    to = (first + sides * (1 + wanted)) * ROW
+    target[to : to + ROW] = work[outputs[0] : outputs[0] + ROW]
 
 
 @Inner
@@ -185,14 +184,17 @@ def fill_weights(state, edge, share, lanes):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_variances(program, is_mirrored, work, lanes, state, found):  # type: ignore[no-untyped-def]
-    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES.
+    """Fill the mean variances of rounding errors of each result, by the trapezoidal rule on NOISE_NODES, which include
+    the places where they are largest: the ends, and the middle if there is a hilltop.
 
     Both nodes of a pair have the same errors, so that these average out half as well.
     """
     positions, mirrored = program[6], state[MIRRORED]
+    step = 1 if program[3].shape[0] <= MAX_NOISE_OPERATIONS else 2
     found[:, :] = 0.0
-    for number in range(2 if is_mirrored else 3):
-        single, paired = (0.25, 0.5, 0.25)[number], (1.0, 1.0, 0.0)[number]
+    for number in range(0, 3 if is_mirrored else 5, step):
+        single = (0.125 if number % 4 == 0 else 0.25) * step
+        paired = (4.0 if number < 2 else 2.0 if number == 2 else 0.0) * single
         carry_out(program, program[0][2], program[3], NOISE_NODES[number], work, lanes)
         for k in range(positions.size):
             values, total = rows_of(work, positions[k])[0], found[k]
@@ -314,25 +316,25 @@ def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type:
 
 @entry(
     types.void(
-        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), LANE_PROGRAM, VECTOR, types.UniTuple(INTEGER, 3)),
+        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, types.UniTuple(INTEGER, 3)),
         *(MATRIX, types.boolean[::1], types.Tuple((MATRIX, types.int8[::1]))),
     ),
     nogil=True,
 )
-def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, answers):  # type: ignore[no-untyped-def]
+def fill_lane_gradients(turn, turn_work, program, work, limits, launches, mirrored, answers):  # type: ignore[no-untyped-def]
     """Fill the derivatives of half periods, as far as double precision suffices.
 
     Parameters
     ----------
-    ends, works
-        The programs of the Newton step to a turning point, and of the derivatives of a turning point
-        (`programs.end_programs`), with their work spaces; without results for launches from rest.
+    turn, turn_work
+        The program of a turning point and its derivatives (`programs.turn_program`), with its work space; without
+        results if the orbit's program does not need them.
     program, work
         The program of an orbit (`assembly.LaneProgram.operands`), with its work space.
     limits : (int, int, int)
         The number of columns of the launches that are inputs of the program, and the largest numbers of intervals in
         this call and in any call.
-    launches : (m, k) array
+    launches : (k, m) array
         The inputs of the program, and then turning points to the accuracy of doubles if the program needs them
         (`launches`).
     mirrored : (m,) array
@@ -344,14 +346,14 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
     count, inputs, state = found.shape[1], limits[0], np.empty((ROWS, BLOCK))
     shape = (count, BLOCK)
     rows = (np.empty((3, count, BLOCK)), np.empty(shape), np.empty(shape), np.empty(shape))
-    for start in range(0, launches.shape[0], BLOCK):
-        stop = min(start + BLOCK, launches.shape[0])
-        size, some = stop - start, launches[start:stop]
-        lanes, is_mirrored = -(-size // WIDTH) * WIDTH, True
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        some, lanes, is_mirrored = (launches, start, size), -(-size // WIDTH) * WIDTH, True
         for i in range(lanes):
             even = mirrored[start + min(i, size - 1)]
             state[MIRRORED, i], is_mirrored = 1.0 if even else 0.0, is_mirrored and even
-        fill_inputs(ends, works, some, inputs, 1, lanes, work)
+        fill_inputs(work, inputs, some, lanes)
+        fill_turns(turn, turn_work, some, lanes, inputs, work)
         call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
         fill_batch(program, is_mirrored, limits[1:], work, lanes, state, rows)
         values = rows[3]
@@ -363,12 +365,12 @@ def fill_lane_gradients(ends, works, program, work, limits, launches, mirrored, 
 
 @entry(
     types.void(
-        *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), LANE_PROGRAM, VECTOR, INTEGER),
+        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, INTEGER),
         *(MATRIX, types.Tuple((MATRIX, types.int8[::1]))),
     ),
     nogil=True,
 )
-def fill_mean_gradients(ends, works, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
+def fill_mean_gradients(turn, turn_work, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
     """Fill the derivatives of half periods that are pi over an arithmetic-geometric mean.
 
     The arguments are as for `fill_lane_gradients`, except that the orbit's program is `programs.mean_program`, and that
@@ -377,10 +379,11 @@ def fill_mean_gradients(ends, works, program, work, inputs, launches, answers): 
     found, states = answers
     coordinates, outputs = program[4], program[5]
     first = outputs.size - found.shape[1]
-    for start in range(0, launches.shape[0], BLOCK):
-        stop = min(start + BLOCK, launches.shape[0])
-        some, size, lanes = launches[start:stop], stop - start, -(-(stop - start) // WIDTH) * WIDTH
-        fill_inputs(ends, works, some, inputs, 1, lanes, work)
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        some, lanes = (launches, start, size), -(-size // WIDTH) * WIDTH
+        fill_inputs(work, inputs, some, lanes)
+        fill_turns(turn, turn_work, some, lanes, inputs, work)
         call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
         one = rows_of(work, coordinates[0])[0]
         one[:lanes] = 1.0

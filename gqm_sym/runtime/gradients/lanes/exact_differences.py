@@ -62,14 +62,37 @@ def exact_swing_program(source: Source, plan: Plan) -> Program | None:
     divided differences.
     """
     op = SeriesRecorder(swing_inputs(source, plan))
-    p, launch, (a, b), moves = swing_of(op, source, plan)
-    over = Places(op, (a, b), (op.place, 1 - op.place))
     try:
-        factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
-        rate = ds / op.sqrt(2 * factor)
-        by_inputs, reach = gradient(op, rate, [a, b, *p]), op.sqrt(1 - op.squares)
-        rates = [rate, *(total_change(op, by_inputs, move) for move in moves)]
-        changes = combined(op, terms_of(op, source, plan, launch), rates)
-        return assemble(op, [result * (reach / reach) for result in (rate, *changes)])
+        rate, *rates = exact_rates(op, source, plan)
+        launch = op.values[source.parameters], op.values[source.parameters + 1]
+        return assembled(op, [rate, *combined(op, terms_of(op, source, plan, launch), [rate, *rates])])
     except (WithoutRuleError, SolutionError):
         return None
+
+
+@lru_cache(maxsize=64)
+def exact_rates_program(source: Source, plan: Plan) -> Program | None:
+    """Return the program of dt/dphi and its derivatives with respect to the variables by which a plan differentiates
+    the formulas; it is None where `exact_swing_program` is.
+    """
+    op = SeriesRecorder(swing_inputs(source, plan))
+    try:
+        return assembled(op, exact_rates(op, source, plan))
+    except (WithoutRuleError, SolutionError):
+        return None
+
+
+def exact_rates(op: SeriesRecorder, source: Source, plan: Plan) -> list[TapeNumber]:
+    """Record dt/dphi and its derivatives with respect to `scaling.Plan.moves`."""
+    p, _, (a, b), moves = swing_of(op, source, plan)
+    over = Places(op, (a, b), (op.place, 1 - op.place))
+    factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
+    rate = ds / op.sqrt(2 * factor)
+    by_inputs = gradient(op, rate, [a, b, *p])
+    return [rate, *(total_change(op, by_inputs, move) for move in moves)]
+
+
+def assembled(op: SeriesRecorder, results: list[TapeNumber]) -> Program:
+    """Return the program of results, which are NaN where the series is too short."""
+    reach = op.sqrt(1 - op.squares)
+    return assemble(op, [result * (reach / reach) for result in results])

@@ -24,14 +24,13 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     LANE_PROGRAM,
     WIDTH,
     fill_column,
-    fill_ends,
-    fill_input,
+    fill_inputs,
     fill_place,
     rows_of,
 )
 from gqm_sym.runtime.gradients.lanes.launches import Launches
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.lanes.pairs import NEWTON_STEPS
+from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
 from gqm_sym.runtime.gradients.lanes.periods import MIN_LAUNCHES_PER_THREAD, end_program, programs_for
 from gqm_sym.runtime.gradients.programs import Source, extreme_program, extreme_quantity
 from gqm_sym.runtime.launch.formulas import Formulas
@@ -183,29 +182,28 @@ def fill_extreme_gradients(ends, works, programs, spaces, rule, launches, found)
         The programs of the quantity in double precision, and of an extreme, with their work spaces.
     rule : (array, int, float)
         The shares of the grid; LIBRATION or CIRCULATION; 1 for the largest value, or -1 for the smallest.
-    launches : (m, n + 2) array
+    launches : (n + 2, m) array
         The n variables of each launch, and the turning points of a libration to the accuracy of doubles, or both ends
         of a lap.
     found : (m, k + 2) array
         The extreme, the largest size on the grid, and the derivatives.
     """
     (grid, program), (grid_work, work) = programs, spaces
-    (shares, kind, sign), first, count = rule, launches.shape[1] - 2, found.shape[1] - 2
+    (shares, kind, sign), first, count = rule, launches.shape[0] - 2, found.shape[1] - 2
     has_ends, last = kind == LIBRATION, shares.size - 1
     target, state = np.zeros((first + 2 + 2 * count) * ROW), np.zeros((ROWS, BLOCK))
     places, rows = np.zeros((3, BLOCK)), np.empty((count + 2, BLOCK))
-    for start in range(0, launches.shape[0], BLOCK):
-        size = min(BLOCK, launches.shape[0] - start)
-        lanes, some = -(-size // WIDTH) * WIDTH, launches[start : start + size]
-        for k in range(first):
-            fill_input(grid_work, k, some, k, lanes)
-            fill_input(work, k, some, k, lanes)
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        lanes, some = -(-size // WIDTH) * WIDTH, (launches, start, size)
+        fill_inputs(grid_work, first, some, lanes)
+        fill_inputs(work, first, some, lanes)
         call_interpreter(grid[0][0], grid[1], 0, grid[1].shape[0], grid_work, lanes)
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
         fill_column(state[LOW_END], some, first, lanes)
         fill_column(state[HIGH_END], some, first + 1, lanes)
         if has_ends:
-            fill_ends(ends, works, some, NEWTON_STEPS, lanes, first, target)
+            fill_ends(ends, works, some, lanes, first, target)
         search_grid(grid, grid_work, shares, sign, lanes, state)
         set_at_ends(target, first, has_ends, last, lanes, state)
         evaluate_at_places(program, work, places, lanes, state)
@@ -244,15 +242,16 @@ def extreme_gradients(
     """
     of_speed, sign = quantity.startswith("v_"), 1.0 if quantity.endswith("_max") else -1.0
     source, table, circulates = source_of(formulas), launches.table, launches.circulates
-    found = np.full((len(table), len(rows) + 2), nan)
+    count = circulates.size
+    found = np.full((count, len(rows) + 2), nan)
     if circulates.any():
         assert formulas.domain_of is not None
         laps = np.broadcast_to(formulas.domain_of(ARRAYS, tuple(launches.lines))[2], circulates.shape)
         begins = np.broadcast_to(launches.lines[-2], circulates.shape)
-        table[circulates, -2:] = np.stack([begins, begins + laps], axis=1)[circulates]
+        table[-2:, circulates] = np.stack([begins, begins + laps])[:, circulates]
     ends = [(end_program, end, source, rows) for end in range(2)]
     own = [(grid_program, source, of_speed), (extreme_program, source, of_speed, 1, rows, LaneRecorder)]
-    programs, in_code = programs_for([*ends, *own], len(table))
+    programs, in_code = programs_for([*ends, *own], count)
     low, high, grid, program = (one.operands for one in in_code)
 
     def work(part: slice) -> None:
@@ -261,10 +260,10 @@ def extreme_gradients(
             some = np.flatnonzero(circulates[part] == (kind == CIRCULATION)) + part.start
             out, rule = np.empty((some.size, found.shape[1])), (SHARES[kind], kind, sign)
             given = (low, high), tuple(spaces[:2]), (grid, program), tuple(spaces[2:])
-            fill_extreme_gradients(*given, rule, table[some], out)
+            fill_extreme_gradients(*given, rule, np.ascontiguousarray(table[:, some]), out)
             found[some] = out
 
-    run_in_threads(work, len(table), MIN_LAUNCHES_PER_THREAD)
+    run_in_threads(work, count, MIN_LAUNCHES_PER_THREAD)
     extremes, sizes, slopes = found[:, 0], found[:, 1], found[:, 2:]
     is_same = np.abs(extremes - (0.5 * values**2 if of_speed else values)) <= MAX_DIFFERENCE * sizes
     if of_speed:

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.arithmetic.elementary import atan, cos, exp, sin
+from gqm_sym.runtime.arithmetic.elementary import atan, cos, exp, inverse_root, sin
 from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner
@@ -31,7 +31,7 @@ from gqm_sym.runtime.double_double.interpreter import (
     SQUARE_ROOT,
     SUBTRACT,
 )
-from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, ROUNDING, SINC, SINC_PAIR
+from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, INVERSE_ROOT, ROUNDING, SINC, SINC_PAIR
 
 # Operations of which one operand does not depend on the place: node + pair, node - pair, pair - node, node * pair,
 # pair / node, the product with a double, and the pair itself.
@@ -40,6 +40,9 @@ PLUS_PAIR, MINUS_PAIR, PAIR_MINUS, TIMES_PAIR, PAIR_OVER, SCALE, FROM_PAIR = ran
 # The power series of S(p) = sin(sqrt(p))/sqrt(p), highest power first, and the range of p in which it has all digits.
 TERMS, MIN_SQUARE, MAX_SQUARE = 18, -16.0, 16.0
 SERIES = tuple((-1.0) ** k / factorial(2 * k + 1) for k in reversed(range(TERMS)))
+
+# The smallest normal number.
+MIN_NORMAL = 2.0**-1022
 
 
 @intrinsic
@@ -129,6 +132,14 @@ def fill_square_roots(n, a, out):  # type: ignore[no-untyped-def]
     """Fill a register with square roots."""
     for i in range(n):
         out[i] = sqrt(a[i])
+
+
+@Inner
+def fill_inverse_roots(n, a, b, out):  # type: ignore[no-untyped-def]
+    """Fill a register with 1/sqrt(a) with the sign of b, and NaN where a is no normal number."""
+    for i in range(n):
+        value = choose(a[i] >= MIN_NORMAL, inverse_root(a[i]), nan)
+        out[i] = choose(b[i] < 0.0, -value, value)
 
 
 @Inner
@@ -222,6 +233,8 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
             fill_quotients(n, a, b, out)
         elif operation == SQUARE_ROOT:
             fill_square_roots(n, a, out)
+        elif operation == INVERSE_ROOT:
+            fill_inverse_roots(n, a, b, out)
         elif operation == SINE_COSINE:
             fill_waves(n, a, out, registers[at + BLOCK : at + 2 * BLOCK])
         elif operation == SINC:

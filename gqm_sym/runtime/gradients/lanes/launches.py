@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.runtime.compiled.intrinsics import nearest_whole
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.strided import number_at, pointers
+from gqm_sym.runtime.compiled.strided import fill_row, pointers
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.formulas import Formulas
 
@@ -54,14 +54,14 @@ class Launches(NamedTuple):
     axes: tuple[Array, Array]
 
     def laid_out(self, layout: int) -> Array:
-        """Return the launches with their orbits in one of the layouts, a row for each."""
-        found = np.empty((self.kinds.size, len(self.lines) + (1 if layout == FROM_AXIS else 3)))
-        fill_rows(pointers(self.lines), *self.axes, self.spans, layout, found)
+        """Return the launches with their orbits in one of the layouts, a column for each."""
+        found = np.empty((len(self.lines) + (1 if layout == FROM_AXIS else 3), self.kinds.size))
+        fill_table(pointers(self.lines), *self.axes, self.spans, layout, found)
         return found
 
     @property
     def table(self) -> Array:
-        """The arguments of compiled code: the variables of each launch, then its turning points."""
+        """The arguments of compiled code: the variables of each launch, then its turning points, a column for each."""
         return self.laid_out(BETWEEN_TURNS)
 
     @property
@@ -115,7 +115,7 @@ def fill_kinds(places, steps, spans, kinds):  # type: ignore[no-untyped-def]
 
 
 @entry(types.void(COLUMNS, VECTOR, VECTOR, SPANS, INTEGER, MATRIX), nogil=True)
-def fill_rows(columns, places, steps, spans, layout, rows):  # type: ignore[no-untyped-def]
+def fill_table(columns, places, steps, spans, layout, table):  # type: ignore[no-untyped-def]
     """Fill launches in one of the layouts.
 
     Parameters
@@ -126,26 +126,26 @@ def fill_rows(columns, places, steps, spans, layout, rows):  # type: ignore[no-u
         As for `fill_kinds`.
     layout : int
         BETWEEN_TURNS, FROM_AXIS or AROUND_AXIS.
-    rows : (m, k) array
-        Filled with a row for each launch.
+    table : (k, m) array
+        Filled with a column for each launch.
     """
-    count = columns.shape[0] - 1
-    for i in range(rows.shape[0]):
-        for k in range(count):
-            rows[i, k] = number_at(columns[k, 0] + i * columns[k, 1])
+    count, size = columns.shape[0] - 1, table.shape[1]
+    for k in range(count if layout == FROM_AXIS else count + 1):
+        fill_row(columns, k, 0, 1 if columns[k, 1] == 0 else size, table[k])
+    if layout != FROM_AXIS:
+        table[count + 1, :] = 0.0
+    if layout == BETWEEN_TURNS:
+        for i in range(size):
+            table[count + 2, i], table[count + 3, i] = spans[i, 0], spans[i, 1]
+        return
+    first = count if layout == FROM_AXIS else count + 2
+    starts, numbers, others = table[count - 1], table[first], table[first + 1]
+    for i in range(size):
         low, high = spans[i, 0], spans[i, 1]
-        if layout != FROM_AXIS:
-            rows[i, count], rows[i, count + 1] = number_at(columns[count, 0] + i * columns[count, 1]), 0.0
-        if layout == BETWEEN_TURNS:
-            rows[i, count + 2], rows[i, count + 3] = low, high
-            continue
         place, step = places[min(i, places.size - 1)], steps[min(i, steps.size - 1)]
         number = number_of_axis(place, step, 0.5 * (low + high))
-        if layout == AROUND_AXIS:
-            rows[i, count + 2], rows[i, count + 3] = number, high
-        else:
-            axis = place + step * number
-            rows[i, count], rows[i, count + 1] = number, 1.0 if rows[i, count - 1] >= axis else -1.0
+        side = 1.0 if starts[i] >= place + step * number else -1.0
+        numbers[i], others[i] = number, side if layout == FROM_AXIS else high
 
 
 def launches_of(formulas: Formulas, lines: list[Array], directions: Array, spans: Array) -> tuple[Launches, int]:

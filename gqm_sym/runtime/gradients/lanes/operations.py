@@ -15,11 +15,12 @@ from gqm_sym.runtime.gradients.adjoints import RecorderOfMore
 
 # Operations after those of the interpreter in double-double arithmetic. SINC gives S(p) and its derivative. SINC_PAIR
 # gives S(p) + S(q), the divided difference S[p, q], and the derivatives of both: S'(p), S'(q), S[p, p, q], S[p, q, q].
-SINC, SINC_PAIR = ABSOLUTE + 1, ABSOLUTE + 2
+# INVERSE_ROOT gives 1/sqrt(x) with the sign of another number.
+SINC, SINC_PAIR, INVERSE_ROOT = range(ABSOLUTE + 1, ABSOLUTE + 4)
 
 # The operation that gives the bound on the error of a number in double-double arithmetic, in units of ROUNDING: a
 # typical rounding error of a double near 1.
-ERROR_BOUND, ROUNDING = SINC_PAIR + 1, 0.3 * 2.0**-52
+ERROR_BOUND, ROUNDING = INVERSE_ROOT + 1, 0.3 * 2.0**-52
 
 # The number of results of each operation that has several; they are in consecutive registers.
 RESULTS = {SINE_COSINE: 2, SINC: 2, SINC_PAIR: 6}
@@ -36,7 +37,7 @@ class WithoutRuleError(Exception):
 
 
 class LaneRecorder(RecorderOfMore):
-    """A tape that is being recorded, with the operations SINC and SINC_PAIR.
+    """A tape that is being recorded, with the operations SINC, SINC_PAIR and INVERSE_ROOT.
 
     Attributes
     ----------
@@ -181,6 +182,19 @@ class LaneRecorder(RecorderOfMore):
         above, below = (self.divdiff1_ipow(a, b, h, n) for n in (known.numerator, known.denominator))
         return above / below
 
+    def root_of_quotient(self, above: TapeNumber, below: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record sqrt(above/below), and 1/sqrt(above*below) with the sign of both, as one of which the other follows.
+
+        If they depend on the place, this takes less time than a root and a division.
+        """
+        product = above * below
+        if not self.depends(self.register(product)):
+            rate = self.sqrt(above / below)
+            return rate, rate / above
+        one = above if self.depends(self.register(above)) else below
+        inverse = self.result(INVERSE_ROOT, product, one)
+        return above * inverse, inverse
+
     def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
         """Record sin(t)/t, or sinh(t)/t for the sign -1."""
         if not self.depends(self.register(t)):
@@ -206,14 +220,17 @@ class LaneRecorder(RecorderOfMore):
         return (operands[0], operands[1]) if code == "result" else (register, 0)
 
     def is_other(self, register: int) -> bool:
-        """Return whether a register is filled by SINC or SINC_PAIR."""
-        return self.entries[self.base(register)[0]][0] in (SINC, SINC_PAIR)
+        """Return whether a register is filled by SINC, SINC_PAIR or INVERSE_ROOT."""
+        return self.entries[self.base(register)[0]][0] in (SINC, SINC_PAIR, INVERSE_ROOT)
 
     def other_partials(self, register: int) -> Iterator[tuple[int, TapeNumber]]:
-        """Yield the operands of a result of SINC or SINC_PAIR, each with the result's partial derivative by it."""
+        """Yield the operands of a result of these operations, each with the result's partial derivative by it."""
         base, which = self.base(register)
         code, *operands = self.entries[base]
-        if code == SINC:
+        if code == INVERSE_ROOT:
+            inverse = self.at(base)
+            yield operands[0], Fraction(-1, 2) * (inverse * (inverse * inverse))
+        elif code == SINC:
             yield operands[0], self.at(base + 1)
         else:
             for operand, result in zip(operands, PAIR_PARTIALS[which], strict=True):

@@ -22,7 +22,14 @@ from gqm_sym.runtime.gradients.evaluation import (
     is_significant,
     rounding_of,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_ends, fill_inputs, rows_of
+from gqm_sym.runtime.gradients.lanes.evaluation import (
+    WIDTH,
+    fill_column,
+    fill_inputs,
+    fill_place,
+    rows_of,
+    take_step,
+)
 
 # The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
@@ -30,6 +37,34 @@ NEWTON_STEPS = 2
 # The rows of the state of an orbit: the change by the last level, and whether the rule has converged (-1 if it never
 # will, because digits are lost).
 CHANGE, DONE = range(2)
+
+
+@Inner
+def fill_ends(ends, works, launches, lanes, first, target):  # type: ignore[no-untyped-def]
+    """Fill the inputs of the orbits' program from register ``first`` on: the turning points, then their derivatives.
+
+    The turning points are the columns of the launches from ``first`` on: both, or the upper one. They are improved by
+    NEWTON_STEPS steps of Newton's method.
+    """
+    places = np.empty((3, BLOCK))
+    for program, work in ((ends[0], works[0]), (ends[1], works[1])):
+        fill_inputs(work, program[3], launches, lanes)
+        call_interpreter(program[0], program[1], 0, program[2], work, lanes)
+    (step, moves), sides = ends, launches[0].shape[0] - first
+    wanted = moves[4].size
+    for end in range(sides):
+        fill_column(places[0], launches, first + end, lanes)
+        places[1:, :] = 0.0
+        found = rows_of(target, (first + end) * ROW)
+        for number in range(NEWTON_STEPS):
+            fill_place(step, works[0], places, lanes)
+            take_step(works[0], step[4][0], number > 0, lanes, places, found)
+        for i in range(lanes):  # the slope at a turning point of a small swing is small, and changes much
+            places[2, i] = found[2][i]
+        fill_place(moves, works[1], places, lanes)
+        for j in range(wanted):
+            source, to = moves[4][j], (first + sides + end * wanted + j) * ROW
+            target[to : to + ROW] = works[1][source : source + ROW]
 
 
 @Inner
@@ -128,7 +163,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
         the table of shares (`nodes.trapezoidal_nodes`); and the largest error of a derivative as a share of it, in
         addition to the share of the mean of absolute values.
-    launches : (m, n) array
+    launches : (n, m) array
         The inputs of the program, and then turning points to the accuracy of doubles if the program needs them.
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
@@ -138,19 +173,21 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
     count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK)
     # The time itself is never zero, so that its rounding shows where all digits of derivatives are lost.
     sums, means, states = np.empty((1 + count, MEAN, BLOCK)), np.empty((1 + count, 3, BLOCK)), np.empty((2, BLOCK))
-    for start in range(0, launches.shape[0], BLOCK):
-        stop = min(start + BLOCK, launches.shape[0])
-        some, lanes = launches[start:stop], -(-(stop - start) // WIDTH) * WIDTH
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        some, lanes = (launches, start, size), -(-size // WIDTH) * WIDTH
         for i in range(lanes):
-            even[i] = 1.0 if mirrored[start + min(i, stop - start - 1)] else 0.0
-        fill_inputs(ends, works, some, inputs, NEWTON_STEPS, lanes, work)
+            even[i] = 1.0 if mirrored[start + min(i, size - 1)] else 0.0
+        fill_inputs(work, inputs, some, lanes)
+        if ends[0][4].size > 0:
+            fill_ends(ends, works, some, lanes, inputs, work)
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
         means[:, :, :], states[CHANGE, :], states[DONE, :] = 0.0, inf, 0.0
         for level in range(1, len(LEVELS) - 1):
             add_nodes(program, work, nodes, LEVELS[level], even, lanes, sums)
             if judge_means(level, lanes, sums, means, states, most):
                 break
-        for i in range(stop - start):
+        for i in range(size):
             for j in range(count):
                 high, low, error = means[1 + j, 0, i], means[1 + j, 1, i], means[1 + j, 2, i]
                 is_known = states[DONE, i] == 1.0 and not error > most * fabs(high)
@@ -165,17 +202,17 @@ def fill_turn_gradients(ends, works, launches, found):  # type: ignore[no-untype
     ----------
     ends, works
         As for `fill_pair_gradients`.
-    launches : (m, n + 2) array
+    launches : (n + 2, m) array
         The n variables of each launch, and its turning points to the accuracy of doubles.
     found : (m, 2*k) array
         Filled with the derivatives.
     """
-    first = launches.shape[1] - 2
+    first = launches.shape[0] - 2
     target = np.zeros((first + 2 + found.shape[1]) * ROW)
-    for start in range(0, launches.shape[0], BLOCK):
-        size = min(BLOCK, launches.shape[0] - start)
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
         lanes = -(-size // WIDTH) * WIDTH
-        fill_ends(ends, works, launches[start : start + size], NEWTON_STEPS, lanes, first, target)
+        fill_ends(ends, works, (launches, start, size), lanes, first, target)
         for j in range(found.shape[1]):
             values = rows_of(target, (first + 2 + j) * ROW)[0]
             for i in range(size):

@@ -42,6 +42,7 @@ from gqm_sym.runtime.gradients.lanes.programs import (
     mean_program,
     moved_variables,
     swing_program,
+    turn_program,
 )
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
@@ -62,8 +63,9 @@ PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.
 # its turning points move much farther than its half period changes.
 MAX_SHARE = 2.0**-54
 
-# A program without results.
+# A program without results, and its work space.
 NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))
+NO_WORK: Array = np.empty(0)
 
 
 class Stage(NamedTuple):
@@ -75,7 +77,7 @@ class Stage(NamedTuple):
         Whether it may answer each launch.
     make, given
         The function that returns the program (None if there is none), and its arguments.
-    launched : (m, k) array
+    launched : (k, m) array
         The launches as compiled code takes them for this program.
     inputs : int
         The number of columns that are inputs of the program.
@@ -242,7 +244,7 @@ def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> 
 def lap_stages(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
     """Yield the programs for the times of laps."""
     n, table = source.parameters, launches.table
-    laps = np.hstack([table[:, : source.variables], table[:, n : n + 1]])  # a lap begins at lam0
+    laps = np.vstack([table[: source.variables], table[n]])  # a lap begins at lam0
     for direction in (1, -1):
         chosen = launches.circulates & (launches.directions == direction)
         yield Stage(
@@ -285,14 +287,16 @@ def turn_gradients(formulas: Formulas, launches: Launches, rows: tuple[int, ...]
         The variables of differentiation.
     """
     source, table = source_of(formulas), launches.table
-    found = np.empty((len(table), 2, len(rows)))
-    programs, in_code = programs_for([(end_program, end, source, rows) for end in range(2)], len(table))
-    ends, out = tuple(one.operands for one in in_code), found.reshape(len(table), -1)
+    count = table.shape[1]
+    found = np.empty((count, 2, len(rows)))
+    programs, in_code = programs_for([(end_program, end, source, rows) for end in range(2)], count)
+    ends, out = tuple(one.operands for one in in_code), found.reshape(count, -1)
 
     def work(part: slice) -> None:
-        fill_turn_gradients(ends, tuple(one.work.copy() for one in programs), table[part], out[part])
+        some = np.ascontiguousarray(table[:, part])
+        fill_turn_gradients(ends, tuple(one.work.copy() for one in programs), some, out[part])
 
-    run_in_threads(work, len(table), MIN_LAUNCHES_PER_THREAD)
+    run_in_threads(work, count, MIN_LAUNCHES_PER_THREAD)
     if not np.isfinite(found.sum()):
         found[~np.isfinite(found)] = nan
     return found
@@ -317,24 +321,28 @@ def carried_out(
         The largest number of intervals of the trapezoidal rule, for a program in double precision.
     """
     (chosen, mirrored), (source, moved) = which, moves_of(stage)
-    launched = stage.launched if chosen.size == len(stage.launched) else stage.launched[chosen]
+    launched = stage.launched if chosen.size == stage.launched.shape[1] else stage.launched[:, chosen]
     out, states = np.empty((chosen.size, count)), np.full(chosen.size, ANSWERED, dtype=np.int8)
-    turns = [(end_program, end, source, moved) for end in range(2)] if stage.has_turns else []
+    turns: list[tuple[Any, ...]] = []
+    if stage.has_turns and isinstance(program, LaneProgram):
+        turns = [(turn_program, source, moved)]
+    elif stage.has_turns:
+        turns = [(end_program, end, source, moved) for end in range(2)]
     programs, in_code = programs_for([*turns, (stage.make, *stage.given)], chosen.size)
-    addressed = [one.operands for one in in_code]
-    ends = tuple(addressed[:-1]) or (NO_PROGRAM, NO_PROGRAM)
+    *ends, addressed = [one.operands for one in in_code] if turns else [NO_PROGRAM, NO_PROGRAM, in_code[0].operands]
 
     def work(part: slice) -> None:
-        *spaces, own = (one.work.copy() for one in programs)
-        given = ends, tuple(spaces) or (np.empty(0), np.empty(0)), addressed[-1], own
-        some, answers = launched[part], (out[part], states[part])
+        *spaces, own = [one.work.copy() for one in programs] if turns else [NO_WORK, NO_WORK, programs[0].work.copy()]
+        some, answers = np.ascontiguousarray(launched[:, part]), (out[part], states[part])
         if stage.make is mean_program:
-            fill_mean_gradients(*given, stage.inputs, some, answers)
+            fill_mean_gradients(ends[0], spaces[0], addressed, own, stage.inputs, some, answers)
         elif isinstance(program, LaneProgram):
-            fill_lane_gradients(*given, (stage.inputs, most, PASSES[-1]), some, mirrored[part], answers)
+            limits = stage.inputs, most, PASSES[-1]
+            fill_lane_gradients(ends[0], spaces[0], addressed, own, limits, some, mirrored[part], answers)
         else:
             max_error = MAX_SHARE if stage.make is exact_swing_program else inf
             rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind), max_error
+            given = tuple(ends), tuple(spaces), addressed, own
             fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.double_double.interpreter import DIVIDE, MULTIPLY, SQUARE_ROOT
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient, partials
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble, assemble_rates
@@ -50,6 +51,22 @@ def end_programs(source: Source, wanted: tuple[int, ...]) -> tuple[Program, Prog
         slope, *by = gradient(op, half, [op.place, *(op.values[k] for k in variables)])
         programs.append(in_double_double(op, [-(part / slope) for part in (by if variables else [half])]))
     return programs[0], programs[1]
+
+
+@lru_cache(maxsize=64)
+def turn_program(source: Source, wanted: tuple[int, ...]) -> Program:
+    """Return the program of the slope of the potential at the launch place, of the Newton step from a place to the
+    turning point next to it, and of the turning point's derivatives with respect to the ``wanted`` variables.
+
+    The place is the turning point as a double, so that one step suffices, and so do slopes to first order in the step.
+    """
+    op = LaneRecorder(source.inputs, 1)
+    half = source.half(op, op.place)
+    by_inputs = gradient(op, half, [op.place, *(op.values[k] for k in wanted)])
+    step = -(half / by_inputs[0])
+    slope, *by = [part + step * gradient(op, part, [op.place])[0] for part in by_inputs]
+    at_launch = gradient(op, half, [op.values[source.parameters]])[0]
+    return in_double_double(op, [at_launch, step, *(-(part / slope) for part in by)])
 
 
 class Swing(NamedTuple):
@@ -101,20 +118,20 @@ def moved_variables(source: Source, plan: Plan) -> tuple[int, ...]:
 def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     """Return the program of the time per phase angle of a libration, differentiated at the same phase angle.
 
-    Its inputs are those of `swing_of`. A place has two coordinates: the squares of the sine and of the cosine of half
-    the phase angle. The results are Q and the derivatives of the time per phase angle. It is None if the potential
-    contains an operation without a rule for divided differences.
+    Its inputs are those of `swing_of`, and the slope of the potential at the launch place. A place has two coordinates:
+    the squares of the sine and of the cosine of half the phase angle. The results are Q and the derivatives of the time
+    per phase angle. It is None if the potential contains an operation without a rule for divided differences.
     """
-    op = LaneRecorder(swing_inputs(source, plan), 2, by_inverses=True)
+    op = LaneRecorder(swing_inputs(source, plan) + 1, 2, by_inverses=True)
     p, launch, (a, b), moves = swing_of(op, source, plan)
     over = Places(op, (a, b), (op.places[0], op.places[1]))
     try:
         factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
     except WithoutRuleError:
         return None
-    rate = ds / op.sqrt(2 * factor)
-    rates = [rate, *changes(op, rate, (a, b, *p), moves)]
-    return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch), ALONG)
+    rate, adjoints = quotient_with_root(op, ds, 2 * factor)
+    rates = [rate, *changes(op, adjoints, (a, b, *p), moves)]
+    return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch, op.values[-1]), ALONG)
 
 
 class Orbits(NamedTuple):
@@ -129,7 +146,8 @@ class Orbits(NamedTuple):
     at_rest : bool
         Whether the launches are from rest. The inputs are then the run-time parameters, the launch place, the number of
         the axis, and the sign of the place's distance from it; otherwise the variables of the source, the number of the
-        axis, the upper turning point, and its derivatives.
+        axis, the upper turning point, its derivatives, and in double precision the slope of the potential at the launch
+        place.
     plan : Plan
         How derivatives are found.
     """
@@ -141,7 +159,7 @@ class Orbits(NamedTuple):
 
     @property
     def inputs(self) -> int:
-        """The number of inputs."""
+        """The number of inputs in double-double arithmetic."""
         variables = self.source.variables
         return variables if self.at_rest else variables + 2 + len(moved_variables(self.source, self.plan))
 
@@ -154,7 +172,7 @@ class Orbits(NamedTuple):
             end, number, sign = op.values[n:]
             changes = [op.number(int(k == n)) for k in moved]
         else:
-            number, end, *changes = op.values[variables:]
+            number, end, *changes = op.values[variables : self.inputs]
             sign = op.number(1)
         place, step = self.axes(op, p)
         axis = op.number(place) if step is None else place + number * step
@@ -167,7 +185,8 @@ class Orbits(NamedTuple):
         """Record the derivatives that are wanted as sums (`scaling.terms_of`)."""
         n = self.source.parameters
         launch = op.values[n], op.number(0) if self.at_rest else op.values[n + 1]
-        return terms_of(op, self.source, self.plan, launch)
+        slope = op.values[self.inputs] if len(op.values) > self.inputs else None
+        return terms_of(op, self.source, self.plan, launch, slope)
 
 
 def total_change(op: Recorder, by_inputs: Sequence[TapeNumber], move: Sequence[TapeNumber]) -> TapeNumber:
@@ -186,14 +205,15 @@ def axis_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.time_integrand
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 2, by_inverses=True)
+    op = LaneRecorder(orbits.inputs if orbits.at_rest else orbits.inputs + 1, 2, by_inverses=True)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     try:
         square, divisor = formula(op, half, *op.places, p)
     except WithoutRuleError:
         return None
-    rate = op.sqrt(square)
-    return assemble_rates(op, divisor, [rate, *changes(op, rate, (half, *p), moves)], orbits.terms(op), FROM_AXIS)
+    rate, adjoints = root_of_quotient(op, *_quotient(op, op.number(square)))
+    rates = [rate, *changes(op, adjoints, (half, *p), moves)]
+    return assemble_rates(op, divisor, rates, orbits.terms(op), FROM_AXIS)
 
 
 @lru_cache(maxsize=64)
@@ -230,7 +250,7 @@ def mean_program(orbits: Orbits) -> LaneProgram | None:
     formula = orbits.source.formulas.agm_arguments
     if formula is None:
         return None
-    op = LaneRecorder(orbits.inputs, 1)
+    op = LaneRecorder(orbits.inputs if orbits.at_rest else orbits.inputs + 1, 1)
     p, (half, moves) = op.values[: orbits.source.parameters], orbits.widths(op)
     squares = [op.number(square) for square in formula(op, half, p)]
     a, b = (op.sqrt(square) for square in squares)
@@ -274,8 +294,41 @@ def _mean_in_doubles(op: LaneRecorder, a: TapeNumber, b: TapeNumber) -> tuple[Ta
     return difference / mean, rest, lost / (first_mean - lost)
 
 
+Adjoints = list[tuple[TapeNumber, TapeNumber]]
+"""Numbers on which a formula depends, each with the formula's derivative with respect to it."""
+
+
+def root_of_quotient(op: LaneRecorder, above: TapeNumber, below: TapeNumber) -> tuple[TapeNumber, Adjoints]:
+    """Record sqrt(above/below) with its derivatives, which take no division of their own."""
+    half = Fraction(1, 2)
+    rate, inverse = op.root_of_quotient(above, below)
+    return rate, [(above, half * inverse), (below, -half * (rate * (rate * inverse)))]
+
+
+def quotient_with_root(op: LaneRecorder, above: TapeNumber, below: TapeNumber) -> tuple[TapeNumber, Adjoints]:
+    """Record above/sqrt(below) in the same way; ``above`` may be a root."""
+    code, *operands = op.entries[above.register] if above.known is None else (None,)
+    if code == SQUARE_ROOT:
+        return root_of_quotient(op, op.at(operands[0]), below)
+    _, inverse = op.root_of_quotient(op.number(1), below)
+    rate = above * inverse
+    return rate, [(above, inverse), (below, Fraction(-1, 2) * (rate * (inverse * inverse)))]
+
+
+def _quotient(op: LaneRecorder, number: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+    """Return numerator and denominator of what was recorded as a quotient by a number that depends on the place; other
+    numbers have the denominator 1.
+    """
+    code, *operands = op.entries[number.register] if number.known is None else (None,)
+    for one, inverse in (operands, operands[::-1]) if code == MULTIPLY else ():
+        kind, *parts = op.entries[inverse]
+        if kind == DIVIDE and op.at(parts[0]).known == 1 and op.depends(parts[1]):
+            return op.at(one), op.at(parts[1])
+    return number, op.number(1)
+
+
 def changes(
-    op: LaneRecorder, formula: TapeNumber, inputs: Sequence[TapeNumber], moves: Sequence[Sequence[TapeNumber]]
+    op: LaneRecorder, given: Adjoints, inputs: Sequence[TapeNumber], moves: Sequence[Sequence[TapeNumber]]
 ) -> list[TapeNumber]:
     """Return the changes of a formula at fixed coordinates of the place.
 
@@ -283,15 +336,15 @@ def changes(
     ----------
     op : LaneRecorder
         The tape, to which the changes are added.
-    formula : TapeNumber
-        The formula.
+    given : Adjoints
+        Numbers that the formula consists of, with its derivatives.
     inputs : sequence of TapeNumber
         The inputs on which it depends.
     moves : sequence of sequences
         For each change wanted, that of each input.
     """
     found = [op.number(0)] * len(moves)
-    for leaf, adjoint in leaf_adjoints(op, formula).items():
+    for leaf, adjoint in leaf_adjoints(op, given).items():
         by_inputs = gradient(op, leaf, inputs)
         for j, move in enumerate(moves):
             change = total_change(op, by_inputs, move)
@@ -301,14 +354,17 @@ def changes(
     return found
 
 
-def leaf_adjoints(op: LaneRecorder, formula: TapeNumber) -> dict[TapeNumber, TapeNumber]:
+def leaf_adjoints(op: LaneRecorder, given: Adjoints) -> dict[TapeNumber, TapeNumber]:
     """Return the derivatives of a formula with respect to what does not depend on the place.
 
-    Its own changes are computed in double-double arithmetic, because parts of them may cancel.
+    The changes of these numbers are computed in double-double arithmetic, because parts of them may cancel.
     """
-    adjoints = {formula.register: op.number(1)}
+    adjoints: dict[int, TapeNumber] = {}
+    for number, adjoint in given:
+        if number.known is None:
+            adjoints[number.register] = adjoints.get(number.register, op.number(0)) + adjoint
     leaves: dict[TapeNumber, TapeNumber] = {}
-    for k in range(formula.register, -1, -1):
+    for k in range(max(adjoints, default=-1), -1, -1):
         if k not in adjoints:
             continue
         if not op.depends(k):

@@ -13,7 +13,7 @@ from fractions import Fraction
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import partials
-from gqm_sym.runtime.gradients.lanes.operations import SINC, SINC_PAIR, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.operations import INVERSE_ROOT, SINC, SINC_PAIR, LaneRecorder
 from gqm_sym.runtime.gradients.lanes.scaling import Terms, combined
 
 # The second derivative of S(p) at 0, and the derivatives of S[p, p, q], by the operations and the numbers of the
@@ -32,6 +32,7 @@ MULTIPLES: dict[int, tuple[Fraction, ...]] = {
     interpreter.MULTIPLY: (Fraction(1), Fraction(1)),
     interpreter.DIVIDE: (Fraction(1), Fraction(-1)),
     interpreter.SQUARE_ROOT: (Fraction(1, 2),),
+    INVERSE_ROOT: (Fraction(-1, 2),),
     interpreter.ABSOLUTE: (Fraction(1),),
 }
 

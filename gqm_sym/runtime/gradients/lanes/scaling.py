@@ -143,7 +143,13 @@ Terms = list[tuple[TapeNumber, int]]
 it is of."""
 
 
-def terms_of(op: Recorder, source: Source, plan: Plan, launch: tuple[TapeNumber, TapeNumber]) -> list[Terms]:
+def terms_of(
+    op: Recorder,
+    source: Source,
+    plan: Plan,
+    launch: tuple[TapeNumber, TapeNumber],
+    slope: TapeNumber | None = None,
+) -> list[Terms]:
     """Return the derivatives that a plan wants as sums.
 
     The rates are the half period, or the time per phase angle, and then its derivatives with respect to the launch and
@@ -160,14 +166,17 @@ def terms_of(op: Recorder, source: Source, plan: Plan, launch: tuple[TapeNumber,
     launch : pair of TapeNumber
         The launch place and the launch speed; the latter is the number 0 for launches from rest whose first derivative
         is that with respect to the place, instead of the energy.
+    slope : TapeNumber, optional
+        The slope of the potential at the launch place, if it is on the tape.
     """
     n, p, (lam0, v0) = source.parameters, op.values, launch
     position = {k: 1 + j for j, k in enumerate(plan.moves(n))}
     factor = {k: op.number(1) for k in position}
     if plan.has_launch and v0.known is None:
-        potential = source.formulas.effective_potential(op, lam0, p[:n])
+        if slope is None:
+            slope = gradient(op, source.formulas.effective_potential(op, lam0, p[:n]), [lam0])[0]
         position[n + 1] = position[n]
-        factor[n], factor[n + 1] = gradient(op, potential, [lam0])[0], v0
+        factor[n], factor[n + 1] = slope, v0
     found = []
     for k, scaling in zip(plan.wanted, plan.scalings, strict=True):
         if scaling is None:

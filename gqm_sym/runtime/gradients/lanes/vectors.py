@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable, Sequence
 
 from llvmlite import ir
 
+from gqm_sym.runtime.arithmetic.elementary import ROOT_BITS
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.gradients.lanes import interpreter as in_lanes
-from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, RESULTS, ROUNDING, SINC, SINC_PAIR
+from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, INVERSE_ROOT, RESULTS, ROUNDING, SINC, SINC_PAIR
 
 # The number of orbits in a vector, which every number of orbits that a program is called with is a multiple of.
 WIDTH = 8
@@ -166,7 +167,7 @@ PAIR_OPERATIONS: dict[int, Callable[[PairBody, PAIR, PAIR], PAIR]] = {
 # The operations in doubles that are written as code. An interpreter carries out all others.
 DOUBLE_OPERATIONS = {
     *(interpreter.ADD, interpreter.SUBTRACT, interpreter.MULTIPLY, interpreter.DIVIDE, interpreter.SQUARE_ROOT),
-    *(SINC, SINC_PAIR, *range(ERROR_BOUND, in_lanes.FROM_PAIR + 1)),
+    *(SINC, SINC_PAIR, INVERSE_ROOT, *range(ERROR_BOUND, in_lanes.FROM_PAIR + 1)),
 }
 
 
@@ -225,6 +226,8 @@ class DoubleBody(Body):
         if code == in_lanes.FROM_PAIR:
             return builder.fadd(self.load(right), self.load(right + LOW))
         a = self._number(left)
+        if code == INVERSE_ROOT:
+            return self._inverse_root(a, self._number(right))
         if code > ERROR_BOUND:
             high, low = self.load(right), self.load(right + LOW)
             if code == in_lanes.TIMES_PAIR:
@@ -244,6 +247,25 @@ class DoubleBody(Body):
             interpreter.DIVIDE: builder.fdiv,
         }
         return simple[code](a, self._number(right)) if code in simple else self.called("sqrt", a)
+
+    def _inverse_root(self, x: ir.Value, other: ir.Value) -> ir.Value:
+        """Return what `interpreter.fill_inverse_roots` does."""
+        builder, half, one = self.builder, self.constant(0.5), self.constant(1.0)
+        wholes = ir.VectorType(WHOLE, WIDTH)
+        shift, bits = (ir.Constant(wholes, [ir.Constant(WHOLE, n)] * WIDTH) for n in (1, ROOT_BITS))
+        y = builder.bitcast(builder.sub(bits, builder.ashr(builder.bitcast(x, wholes), shift)), VECTOR)
+
+        def rest(y: ir.Value) -> ir.Value:
+            return self.called("fma", builder.fneg(builder.fmul(x, y)), y, one)
+
+        for _ in range(2):
+            left = rest(y)
+            step = self.called("fma", self.constant(0.375), left, half)
+            y = self.called("fma", builder.fmul(y, left), step, y)
+        y = self.called("fma", builder.fmul(half, y), rest(y), y)
+        is_normal = builder.fcmp_ordered(">=", x, self.constant(in_lanes.MIN_NORMAL))
+        y = builder.select(is_normal, y, self.constant(float("nan")))
+        return builder.select(builder.fcmp_ordered("<", other, self.constant(0.0)), builder.fneg(y), y)
 
     def _several(self, code: int, a: ir.Value, right: int) -> Sequence[ir.Value]:
         """Return the results of an operation that has several."""

@@ -9,12 +9,10 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from math import inf
 from typing import Any
 
 import numpy as np
 
-from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.emitted import Emitted, RunByPython
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import scalar_product
@@ -43,15 +41,13 @@ FAST = 1024.0
 LEAST_SQUARE = 1e-300
 
 
-def followed_in_legs(problem: Problem, t_end: float) -> Motion:
+def followed_in_legs(problem: Problem) -> Motion:
     """Return the motion of a conservative module along a chart as one with losses that vanish.
 
     Parameters
     ----------
     problem : Problem
         The launch.
-    t_end : float
-        The time at which the motion ends; infinite if it does not.
 
     Raises
     ------
@@ -70,11 +66,7 @@ def followed_in_legs(problem: Problem, t_end: float) -> Motion:
     lossless = replace(formulas, dissipation=functions, exact=exact)
     p = ParameterValues(problem.p)
     p.values, p.conditions = problem.p.values, {}
-    launch = problem.launch
-    ends_by_itself = 0.0 < t_end < inf and (launch.t_max is None or t_end < launch.t_max.value)
-    if ends_by_itself:  # without a horizon, nothing beyond the first turn would be searched for the end
-        launch = launch._replace(t_max=read_number(2.0 * t_end, where="t_max"))
-    return dissipate(lossless, p, launch)
+    return dissipate(lossless, p, problem.launch)
 
 
 @lru_cache(maxsize=16)

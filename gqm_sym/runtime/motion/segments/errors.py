@@ -25,6 +25,9 @@ CHART_ROUNDINGS, CENTRE_ROUNDINGS, SLOPE_SAMPLES = 8.0, 4.0, 16
 # The error of a place due to the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
 
+# The share of a segment by which places lie aside of its ends, where its tangents are taken.
+TANGENT_SHARE = 1e-3
+
 # The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
 MAX_SLOPES = (0.5, 2.0, 1.0)
 
@@ -80,7 +83,7 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
         return error, 0.0
     # Q at the ends, up to a factor.
     ends = np.array([segment.a, segment.b])
-    steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
+    steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), np.zeros(2)
     least, steepness = float(steepness.min()), steepness.tolist()
     errors = [error * (least / steep if steep > 0.0 else 1.0) for steep in steepness]
     if f.exact is None:
@@ -99,12 +102,35 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
         # 1/ds.
         x, z, ds = path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:3]
         size, shortest = float(np.hypot(x, z).max()), min(1.0, float(np.abs(ds).min()))
-        of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size) / shortest
+        of_chart += ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size) / shortest
+        of_chart += _errors_of_coordinates(segment, steepness)
     at_a, at_b = (
-        of_chart if known is not None or _is_launch_from_rest(segment, place) else own + of_chart
-        for place, known, own in zip((segment.a, segment.b), segment.ends, errors, strict=True)
+        of_end if known is not None or _is_launch_from_rest(segment, place) else own + of_end
+        for place, known, own, of_end in zip(ends, segment.ends, errors, of_chart.tolist(), strict=True)
     )
     return at_a, at_b
+
+
+def _errors_of_coordinates(segment: Segment, steepness: list[float]) -> Array:
+    """Return how far a rounding of the coordinates moves each turning point, in units of the curve parameter.
+
+    The potential changes by the force times the rounding of the distance between the ends, coordinate by coordinate, so
+    that a turning point moves the farther, the more the forces cancel along the curve and not across it. In space y is
+    left out.
+    """
+    f, aside = segment.functions, TANGENT_SHARE * (segment.b - segment.a)
+    places = np.array([segment.a, segment.b, segment.a + aside, segment.b - aside])
+    x, z, ds, _, support = path_and_force_at(f.addresses, f.p, places, np.zeros(4))
+    slopes = potential_at(f.addresses, f.p, places[:2])[1]
+    found = np.zeros(2)
+    for k, steep in enumerate(steepness):
+        step = complex(x[k + 2] - x[k], z[k + 2] - z[k]) * (1.0 - 2.0 * k)
+        if not steep > 0.0 or step == 0.0:
+            continue
+        force = -complex(slopes[k] / ds[k], support[k] / f.mass) * step / abs(step)
+        terms = abs(force.real * (x[1] - x[0])) + abs(force.imag * (z[1] - z[0]))
+        found[k] = MAX_SIZE_ROUNDINGS * ULP * terms / steep
+    return found
 
 
 def _is_launch_from_rest(segment: Segment, place: float) -> bool:

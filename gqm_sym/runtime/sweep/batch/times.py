@@ -70,6 +70,9 @@ CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 # exact, as those of a launch from rest are.
 MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.15, 0.25, 0.1, 0.5
 
+# The distance of an end from zero, in widths of the orbit, from which on its rounding counts.
+FAR = 2.0
+
 # The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
 # MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
 # exact to half an ulp, because its error is the square of that.
@@ -86,14 +89,39 @@ def contains_nan(row):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-untyped-def]
+    """Fill the roundings of one end of each orbit, and dU/dlam there if any of them is not 0.
+
+    They count as 0 where the end is nearer to zero than some widths of the orbit.
+    """
+    ends = rows[END_LOW if from_below else END_HIGH, :n]
+    offset_low, offset_high, start = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[LAUNCH_PLACE, :n]
+    roundings, slopes, offsets = work[2, :n], work[5, :n], work[9, :n]
+    out, any_far = work[10:13].reshape(-1)[: 3 * n].reshape(3, n), False
+    for j in range(n):
+        _, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
+        far = fabs(ends[j]) > FAR * (offset_high[j] - offset_low[j])
+        roundings[j] = choose(far, rounding, 0.0)
+        any_far |= far
+    slopes[:] = 0.0
+    if any_far:
+        offsets[:] = 0.0
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, ends, offsets, p, out)
+        slopes[:] = out[2]
+
+
+@Inner
 def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no-untyped-def]
     """Replace NaN in the results of `potential_divdiff2` for orbits that are too wide for its closed forms.
 
-    V**2 is computed from U[a, x] or U[b, x] with the nearer turning point, which loses no digits on a wide orbit.
+    V**2 is computed from U[a, x] or U[b, x] with the nearer turning point, which loses no digits on a wide orbit. If
+    that turning point is far from zero, its rounding is taken into account.
     """
     from_below = NODE_SHARES[node] <= 0.5
+    fill_end_roundings(fns, n, from_below, rows, p, work)
     ends = rows[END_LOW if from_below else END_HIGH, :n]
     da, db, places, offsets = work[0, :n], work[1, :n], work[8, :n], work[9, :n]
+    roundings, slopes = work[2, :n], work[5, :n]
     out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
     for j in range(n):
         offsets[j] = da[j] if from_below else -db[j]
@@ -101,8 +129,11 @@ def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no
     call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, places, offsets, p, out)
     for j in range(n):
         wide = two[0, j] != two[0, j]
-        q = -out[0, j] / db[j] if from_below else out[0, j] / da[j]
-        two[0, j], two[1, j] = choose(wide, q, two[0, j]), choose(wide, out[1, j], two[1, j])
+        moved = choose(roundings[j] == 0.0, 0.0, roundings[j] * (out[2, j] - slopes[j]) / offsets[j])
+        first = out[0, j] + moved
+        q = -first / db[j] if from_below else first / da[j]
+        two[0, j] = choose(wide, q, two[0, j])
+        two[1, j] = choose(two[1, j] == two[1, j], two[1, j], out[1, j])
 
 
 @Inner
@@ -162,17 +193,17 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
         p, halves = params[: count * n].reshape(count, n), scratch.work[0, :n]
         middles, rests = scratch.work[1, :n], scratch.work[2, :n]
         invariants = params[count * n : (count + more) * n].reshape(more, n)
+        for j in range(n):
+            halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
         if kind == AXIS_LIBRATION:
-            for j in range(n):
-                halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
             call_integrand_invariants_batch(fns.integrand_invariants, n, halves, p, invariants)
         else:
             for j in range(n):
                 total, lost = two_sum(rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j])
                 middles[j], rounding = two_sum(rows[LAUNCH_PLACE, j], 0.5 * total)
                 rests[j] = rounding + 0.5 * lost
-            ends = rows[END_LOW, :n], rows[END_HIGH, :n]
-            call_orbit_invariants_batch(fns.orbit_invariants, n, ends[0], ends[1], middles, rests, p, invariants)
+            a, b = rows[END_LOW, :n], rows[END_HIGH, :n]
+            call_orbit_invariants_batch(fns.orbit_invariants, n, a, b, middles, rests, halves, p, invariants)
     return count + more
 
 

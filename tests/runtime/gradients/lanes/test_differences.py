@@ -13,7 +13,7 @@ from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble
 from gqm_sym.runtime.gradients.lanes.differences import Places
 from gqm_sym.runtime.gradients.lanes.interpreter import LANES_INTERPRETER
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
-from gqm_sym.runtime.gradients.lanes.programs import changes
+from gqm_sym.runtime.gradients.lanes.programs import changes, quotient_with_root, root_of_quotient
 
 # Formulas of a place u between 0.3 and 2.3 and a parameter p.
 FORMULAS: dict[str, Callable[..., Any]] = {
@@ -51,7 +51,7 @@ def recorded(name: str) -> LaneProgram:
         Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(FORMULAS[name], op.values[:1]).second
     )
     moves = [[op.number(int(j == k)) for j in range(3)] for k in range(3)]
-    return assemble(op, [second, *changes(op, second, op.values, moves)])
+    return assemble(op, [second, *changes(op, [(second, op.number(1))], op.values, moves)])
 
 
 @pytest.mark.parametrize("name", FORMULAS)
@@ -97,3 +97,36 @@ def test_formulas_without_a_rule(formula: Any) -> None:
     op = LaneRecorder(3, 2)
     with pytest.raises(WithoutRuleError):
         Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(formula, op.values[:1])
+
+
+@pytest.mark.parametrize("scale", [1.0, -1.0, 1e100, -1e-100])
+@pytest.mark.parametrize("with_root", [False, True])
+def test_roots_of_quotients(scale: float, with_root: bool) -> None:
+    """Roots of quotients of two numbers of either sign, and quotients by roots, have the digits of doubles, and so have
+    their derivatives; plain Python gives the same bits.
+    """
+    op = LaneRecorder(3, 2)
+    (p, a, b), (share, rest) = op.values, op.places
+    above, below = scale * (a + p * share), scale * (b + p * rest)
+    if with_root:
+        rate, given = quotient_with_root(op, a + p * share, scale * below)
+    else:
+        rate, given = root_of_quotient(op, above, below)
+    moves = [[op.number(int(j == k)) for j in range(3)] for k in range(3)]
+    program, phi = assemble(op, [rate, *changes(op, given, op.values, moves)]), 0.9
+    found = carried_out(program, LANES_INTERPRETER.call, P, (0.35, 1.25), phi)
+    in_python = plain_by_address(LANES_INTERPRETER.function, LANES_INTERPRETER.signature, LANES_INTERPRETER.text)
+    np.testing.assert_array_equal(carried_out(program, in_python, P, (0.35, 1.25), phi), found)
+    share, rest = np.sin(phi / 2) ** 2, np.cos(phi / 2) ** 2
+    x, y = 0.35 + P * share, 1.25 + P * rest
+    root = x / (abs(scale) * np.sqrt(y)) if with_root else np.sqrt(x / y)
+    by_x, by_y = root / x * (1.0 if with_root else 0.5), -root / (2 * y)
+    np.testing.assert_allclose(found, [root, by_x * share + by_y * rest, by_x, by_y], rtol=4e-15)
+
+
+def test_a_root_of_a_number_that_is_not_normal() -> None:
+    """The inverse root of zero, of a negative number and of a subnormal one is no number."""
+    op = LaneRecorder(3, 2)
+    program = assemble(op, [root_of_quotient(op, op.values[0] * op.places[0], op.number(1))[0]])
+    for p in (0.0, -1.0, 1e-310):
+        assert np.isnan(carried_out(program, LANES_INTERPRETER.call, p, (0.35, 1.25), 0.9)).all()

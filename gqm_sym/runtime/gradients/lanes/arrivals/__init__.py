@@ -1,0 +1,1 @@
+"""Gradients of the first times at places, for many launches."""
