@@ -1,6 +1,7 @@
 """Fixtures of the whole suite give generated modules and motions, each made once in a session."""
 
 import gc
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -29,12 +30,13 @@ if hasattr(providers, "is_local_module_file"):
 jit.ANNOUNCER.seconds = 1e6
 
 # Most of the suite's modules are used a few times only, and compiling their functions took half of the time of many
-# tests. Python gives the same bits, and may go on until it has taken as long as the compiler would.
-emitted.MAX_PYTHON_TIME, plain.MAX_LAUNCHES = 0.1, 8
+# tests. Python gives the same bits, and may go on until it has taken as long as the compiler would, in however many
+# launches: a user's script may run again, but the cache of the suite is not used again.
+emitted.MAX_PYTHON_TIME, plain.MAX_LAUNCHES = 0.12, math.inf
 
 # A worker has up to a million objects of SymPy and numba; collecting garbage as often as usual takes a twelfth of the
 # time.
-gc.set_threshold(100_000, 20, 50)
+gc.set_threshold(1_000_000, 20, 50)
 
 if numba.config.DISABLE_JIT:
     import uncompiled

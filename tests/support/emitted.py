@@ -71,8 +71,10 @@ def oracle(text: str, names: tuple[str, ...]) -> Callable[..., list[mpf]]:
     )
 
 
-def interpreted(model: Model, name: str) -> ModuleType:
-    """Return a module whose functions Python runs; each has the address at which the compiled one would be."""
+def interpreted(text: str, name: str) -> ModuleType:
+    """Return the module of an emitted text whose functions Python runs; each has the address at which the compiled one
+    would be.
+    """
     module = ModuleType(name)
     module.__file__ = f"{name}.py"
 
@@ -80,7 +82,7 @@ def interpreted(model: Model, name: str) -> ModuleType:
         return lambda function: SimpleNamespace(address=function)
 
     with patch.object(runtime, "compiler", lambda *_, **__: compiled):
-        exec(compile(gqm.emit(model, name=name), module.__file__, "exec"), vars(module))  # noqa: S102
+        exec(compile(text, module.__file__, "exec"), vars(module))  # noqa: S102
     return module
 
 
@@ -146,6 +148,7 @@ def check_numbers(
         function = oracle(text, (parameter, *values))
         given = [mpf(v) for v in values.values()]
 
+        @cache
         def at(place: mpf | float) -> tuple[mpf, ...]:
             z, slope, bend = function(mpf(place), *given)
             ds = mp.sqrt(1 + slope**2)

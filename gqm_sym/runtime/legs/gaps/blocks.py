@@ -13,6 +13,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     GAP_COLUMNS,
     MOMENTS,
     REFUSED,
+    WITH_FEW,
     add_moments,
     behind_gap,
     fill_gap,
@@ -22,6 +23,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     widen_bounds,
     widen_range,
 )
+from gqm_sym.runtime.legs.gaps.octaves import forget_octaves
 from gqm_sym.runtime.legs.panels.breaks import clearance
 from gqm_sym.runtime.legs.panels.equation import March, Panel
 
@@ -75,10 +77,15 @@ def fill_block(forces, route, upcoming, v, contact_sign, to, work):  # type: ign
     gaps[to] = REFUSED
     for k in range(BLOCK):
         at, _ = kept_gap(forces, route, upcoming + k, v, contact_sign, work)
-        if gaps[at] != FILLED:
+        if gaps[at] != FILLED or not (forces.linear or gaps[at + WITH_FEW] > 0.0):
             return
         widen_bounds(1.0 + before[0], k == 0, gaps, at, to)
-        before, extremes = behind_gap(before, gaps, at), widen_range(extremes, before, gaps, at)
+        if forces.linear:
+            before, extremes = behind_gap(before, gaps, at), widen_range(extremes, before, gaps, at)
+    if not forces.linear:
+        forget_octaves(gaps, to - FIRST_OF_BLOCK, v)
+        gaps[to] = FILLED
+        return
     gaps[to + END_EXPM1], gaps[to + END_GAINED] = before
     middle, largest = keep_range(extremes[0], extremes[1], gaps, to, work)
     before = (0.0, 0.0)

@@ -77,12 +77,18 @@ MAX_SHARE, POWERS, COEFFICIENTS = 0.3, 32, 16
 # The number of gaps of a block, which are passed as one where V**2 changes little.
 BLOCK = 6
 
+# With friction in space, the number of coefficients of a function of V**2 on an octave of it, the number of values that
+# are kept for an octave, and the number of octaves of a block for which there is room beside the data of each gap
+# (`gaps.octaves`).
+OCTAVE_TERMS, OCTAVE_COLUMNS, OCTAVES_OF_GAP = 16, 40, 2
+
 # The data kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
 # largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature, and of the coefficients of
 # (N/m)**2; the coefficients of the polynomial for time; and rows from which V**2, N and time follow. With friction in
 # space the first two of the rows are those of P and Q without friction, and WITH_FEW tells whether the gap is so short
 # that few nodes suffice (`panels.few_nodes`), whose rows come next. The data of the block that begins with the gap, up
-# to the coefficients, come last; their state is 0 as long as they are not known.
+# to the coefficients, come next; their state is 0 as long as they are not known. Octaves of the block in which the gap
+# lies come last.
 STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
 LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
 BOUNDS_OF_SQUARE, WITH_FEW, FACTORS = 11, 17, 24
@@ -93,7 +99,8 @@ SQUARE_ROWS = (AT_REST, MIXED, TURNING, RUBBING)
 FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
 FIRST_OF_FEW = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
 FIRST_OF_BLOCK = FIRST_OF_FEW + ROOM_FOR_FEW
-GAP_COLUMNS = FIRST_OF_BLOCK + FIRST_ROW
+FIRST_OF_OCTAVES = FIRST_OF_BLOCK + FIRST_ROW
+GAP_COLUMNS = FIRST_OF_OCTAVES + OCTAVES_OF_GAP * OCTAVE_COLUMNS
 FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.

@@ -10,7 +10,7 @@ of time are found at nodes from the rows that are kept.
 Along curves in space the rows also give the square of N/m as a polynomial in V**2 (`interface`). If the law contains
 its root because of friction, it is the kept rows of the rest of the law, and friction, from which V**2 follows by
 Newton's method, without another look at the curve; on a short gap by one step of it with a few nodes
-(`panels.few_nodes`).
+(`panels.few_nodes`). Blocks of short gaps are passed by functions of V**2 that are kept (`gaps.octaves`).
 """
 
 from math import fabs, inf, nan, sqrt
@@ -27,6 +27,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     END_GAINED,
     FACTORS,
     FILLED,
+    FIRST_OF_BLOCK,
     FIRST_OF_FEW,
     LARGEST_REST,
     LEAST_DAMPING,
@@ -47,6 +48,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     read_rows,
     solve_on_gap,
 )
+from gqm_sym.runtime.legs.gaps.octaves import pass_by_octave
 from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
@@ -211,17 +213,21 @@ def pass_gap(forces, reading, v2, contact_sign, width, gaps, at, work):  # type:
 @Inner
 def pass_block(forces, route, v2, v, contact_sign, upcoming, work):  # type: ignore[no-untyped-def]
     """Return the time over the block ahead of the break at ``upcoming``, V**2 at its end, the largest V**2 on it, and E
-    at its end; the time is NaN if there is no such block, it cannot be passed by powers, or it has to be read.
+    at its end; the time is NaN if there is no such block, it cannot be passed as one, or it has to be read.
     """
     at = kept_block(forces, route, upcoming, v, contact_sign, work)
     if at < 0:
         return nan, nan, nan, nan
-    time, end, bounds = pass_by_powers(v2, contact_sign, route.gaps, at)
+    if forces.linear:
+        time, end, bounds = pass_by_powers(v2, contact_sign, route.gaps, at)
+        lost = route.gaps[at + END_EXPM1]
+    else:
+        time, end, bounds, lost = pass_by_octave(v2, v, route.gaps, at - FIRST_OF_BLOCK)
     if route.reading.what == PEAKS and time > 0.0:
         if route.reading.length:
             bounds = lengths_on(route.gaps, at, bounds.least_v2, bounds.most_v2)
         time = nan if may_be_peak(route.reading, bounds) else time
-    return time, end, bounds.most_v2, route.gaps[at + END_EXPM1]
+    return time, end, bounds.most_v2, lost
 
 
 @Inner
@@ -264,12 +270,9 @@ class Passed(NamedTuple):
 def pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work):  # type: ignore[no-untyped-def]
     """Pass the block ahead of the break at ``upcoming``, or the gap; ``spent`` is the time up to there."""
     breaks = route.breaks
-    if forces.linear:
-        time, end, top, lost = pass_block(forces, route, v2, v, contact_sign, upcoming, work)
-        if time > 0.0 and not is_read_inside(
-            route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)
-        ):
-            return Passed(BLOCK, time, end, top, lost, False, 0)
+    time, end, top, lost = pass_block(forces, route, v2, v, contact_sign, upcoming, work)
+    if time > 0.0 and not is_read_inside(route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)):
+        return Passed(BLOCK, time, end, top, lost, False, 0)
     at, width = kept_gap(forces, route, upcoming, v, contact_sign, work)
     time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, route.gaps, at, work)
     places, times = (breaks[upcoming], breaks[upcoming + 1]), (spent, spent + time)

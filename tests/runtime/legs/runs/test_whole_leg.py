@@ -162,11 +162,11 @@ class Slope:
             gained -= 2 * GAMMA * mpf(ELL_C) ** 2 * abs(mp.diff(self.slope, x)) / (1 + self.slope(x) ** 2)
         return gained
 
-    def gain(self, a: mpf, b: mpf, v: int, panels: int = 1) -> Any:
-        """Return the change of exp(q) W from a to b, by Gauss-Legendre rules of 24 nodes."""
+    def gain(self, a: mpf, b: mpf, v: int, panels: int = 1, nodes: int = 24) -> Any:
+        """Return the change of exp(q) W from a to b, by Gauss-Legendre rules."""
         half = (b - a) / (2 * panels)
         middles = [a + (2 * k + 1) * half for k in range(panels)]
-        return v * half * mp.fsum(w * self.force(m + half * x, v) for m in middles for x, w in gauss_legendre())
+        return v * half * mp.fsum(w * self.force(m + half * x, v) for m in middles for x, w in gauss_legendre(nodes))
 
     def v2(self, a: mpf, x: mpf, v: int) -> Any:
         """Return V**2 at x after a launch from rest at a."""
@@ -200,30 +200,38 @@ class Slope:
         """Return the time from a turn at a to this share of the way to that at b.
 
         In a phase angle, which is pi at b, the rate of time is even and smooth. At nodes of equal steps it gives a
-        series of cosines, which is integrated. V**2 is summed from the nearer turn.
+        series of cosines, which is integrated. V**2 is summed from the nearer turn, by rules of 10 nodes, since these
+        parts are short.
         """
         n, h = 90, b - a
         phases = [mp.pi * (2 * j + 1) / (2 * n) for j in range(n)]
         places = [a + h * mp.sin(phase / 2) ** 2 for phase in phases]
-        gained = list(accumulate(self.gain(*pair, v) for pair in pairwise([a, *places[: n // 2]])))
-        lost = list(accumulate(self.gain(*pair, v) for pair in pairwise([b, *places[: n // 2 - 1 : -1]])))
+        gained = list(accumulate(self.gain(*pair, v, nodes=10) for pair in pairwise([a, *places[: n // 2]])))
+        lost = list(accumulate(self.gain(*pair, v, nodes=10) for pair in pairwise([b, *places[: n // 2 - 1 : -1]])))
         sums = [*gained, *reversed(lost)]
         rates = [
             abs(h) * mp.sin(phase) / 2 * mp.sqrt((1 + self.slope(x) ** 2) / (total * mp.exp(-v * self.exponent(x))))
             for phase, x, total in zip(phases, places, sums, strict=True)
         ]
         end = 2 * mp.asin(mp.sqrt(share))
-        terms = [mp.fsum(r * mp.cos(k * phase) for r, phase in zip(rates, phases, strict=True)) / n for k in range(n)]
+        cosine = cosines(n)
+        terms = [mp.fsum(r * cosine[(2 * j + 1) * k % (4 * n)] for j, r in enumerate(rates)) / n for k in range(n)]
         return terms[0] * end + 2 * mp.fsum(terms[k] * mp.sin(k * end) / k for k in range(1, n))
 
 
 @cache
-def gauss_legendre() -> list[tuple[mpf, mpf]]:
-    """Return nodes and weights of the Gauss-Legendre rule of 24 nodes."""
+def cosines(n: int) -> list[mpf]:
+    """Return the cosines of the multiples of pi/(2 n), up to 2 pi."""
+    return [mp.cos(mp.pi * k / (2 * n)) for k in range(4 * n)]
+
+
+@cache
+def gauss_legendre(n: int) -> list[tuple[mpf, mpf]]:
+    """Return nodes and weights of the Gauss-Legendre rule of n nodes."""
     pairs = []
-    for guess in np.polynomial.legendre.leggauss(24)[0].tolist():
-        x = mp.findroot(lambda x: mp.legendre(24, x), guess)
-        pairs.append((x, 2 * (1 - x * x) / (24 * mp.legendre(23, x)) ** 2))
+    for guess in np.polynomial.legendre.leggauss(n)[0].tolist():
+        x = mp.findroot(lambda x: mp.legendre(n, x), guess)
+        pairs.append((x, 2 * (1 - x * x) / (n * mp.legendre(n - 1, x)) ** 2))
     return pairs
 
 
