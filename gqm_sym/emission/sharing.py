@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import sympy
 from sympy import Basic, Expr, Function, Integer, Pow, Rational, Symbol, ordered
 
+from gqm_sym.derivation.algebra.bottom_up import distinct_parts, from_the_leaves_up
 from gqm_sym.emission.ir import Assignment
 from gqm_sym.errors import EmissionError
 
@@ -47,7 +48,7 @@ def straight_line(
         The assignments at the beginning of the loop: each symbol that depends on the place, and its value.
     """
     moving = {symbol for symbol, _ in inside}
-    prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
+    prepared, fixed = hoist(from_the_leaves_up(outputs, _half_power), moving)
     everything = [value for _, value in fixed] + prepared
     replaced, reduced = sympy.cse(everything, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
     before: list[Assignment] = []
@@ -78,16 +79,11 @@ def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
     return tuple(out)
 
 
-def _half_powers(e: Expr) -> Expr:
-    """Write half-integer powers as powers of a square root, which costs a tenth of a general power."""
-
-    def replace(power: Expr) -> Expr:
-        return Function("sqrt")(power.base) ** power.exp.p
-
-    return e.replace(
-        lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1,
-        replace,
-    )
+def _half_power(e: Expr) -> Expr:
+    """Write a half-integer power as a power of a square root, which costs a tenth of a general power."""
+    if e.is_Pow and isinstance(e.exp, Rational) and e.exp.q == 2 and abs(e.exp.p) > 1:
+        return Function("sqrt")(e.base) ** e.exp.p
+    return e
 
 
 def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], list[tuple[Symbol, Expr]]]:
@@ -106,8 +102,10 @@ def _fixed_calls(outputs: Sequence[Expr], moving: set[Symbol]) -> list[Expr]:
     """Return the outermost calls that do not depend on the place."""
     calls = {
         call
-        for e in outputs
-        for call in e.atoms(Function, Pow)
-        if not call.free_symbols & moving and call.free_symbols and not (call.is_Pow and isinstance(call.exp, Integer))
+        for call in distinct_parts(outputs)
+        if isinstance(call, Function | Pow)
+        and not call.free_symbols & moving
+        and call.free_symbols
+        and not (call.is_Pow and isinstance(call.exp, Integer))
     }
     return [c for c in ordered(calls) if not any(c != o and o.has(c) for o in calls)]

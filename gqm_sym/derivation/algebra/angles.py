@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from sympy import Expr, Function, Rational, S, Symbol, cos, expand, sin
 
+from gqm_sym.derivation.algebra.bottom_up import from_the_leaves_up
+
 
 def of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Expr:
     """Rewrite a function of a rate times the mean of some points by the numbers whose sum its argument is.
@@ -27,6 +29,8 @@ def with_exact_angles(forms: Iterable[Expr], place: Symbol) -> tuple[Expr, ...]:
     """
 
     def exact(call: Expr) -> Expr:
+        if not isinstance(call, sin | cos) or not call.has(place):
+            return call
         rate = call.args[0].diff(place)
         phase = expand(call.args[0] - rate * place)
         known = is_exact(rate) or (rate.is_Symbol and rate != place)
@@ -34,7 +38,7 @@ def with_exact_angles(forms: Iterable[Expr], place: Symbol) -> tuple[Expr, ...]:
             return call
         return of_sum(call, (place,), (place, S.Zero, S.Zero))
 
-    return tuple(form.replace(lambda t: isinstance(t, sin | cos) and t.has(place), exact) for form in forms)
+    return from_the_leaves_up(forms, exact)
 
 
 def is_exact(number: Expr) -> bool:
