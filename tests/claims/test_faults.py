@@ -5,11 +5,12 @@ nothing half done.
 import ctypes
 import errno
 import importlib.util
+import json
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +38,6 @@ def interruptible() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def uninterruptible() -> None:
-    """Ignore Ctrl-C, as jobs in the background do from their beginning."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def python(
     code: str, *arguments: str | Path, before: Callable[[], None] = interruptible, **environment: str
 ) -> subprocess.CompletedProcess[bytes]:
@@ -54,6 +50,57 @@ def python(
         check=False,
         preexec_fn=before,
     )
+
+
+# What the commands import takes a second or two, so the processes that are interrupted or killed begin with it.
+FORKING = """
+import json, os, sys
+import matplotlib.backends.backend_svg
+import gqm_sym as gqm, gqm_sym.cli.gen, gqm_sym.cli.tool, gqm_sym.figures, gqm_sym.report, gqm_sym.specfile
+gqm.emit(gqm.derive(gqm.Curve.graph("sin(x)"), gqm.Gravity()), name="first")
+for line in sys.stdin:
+    code, arguments, environment, out, err = json.loads(line)
+    child = os.fork()
+    if child == 0:
+        os.environ.update(environment)
+        for path, number in ((out, 1), (err, 2)):
+            os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        sys.argv[1:] = arguments
+        exec(code, {"__name__": "__main__"})
+        sys.exit()
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+Forked = Callable[..., subprocess.CompletedProcess[bytes]]
+
+
+@pytest.fixture(scope="module")
+def forked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forked]:
+    """Return a function that runs Python code in a process of its own, in which the commands are imported."""
+    folder = tmp_path_factory.mktemp("printed")
+    out, err = folder / "out", folder / "err"
+    with subprocess.Popen(
+        [sys.executable, "-c", FORKING],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=interruptible,
+    ) as parent:
+        assert parent.stdin is not None
+        assert parent.stdout is not None
+        requests, answers = parent.stdin, parent.stdout
+
+        def run(code: str, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
+            request = [code, [*map(str, arguments)], environment, str(out), str(err)]
+            print(json.dumps(request), file=requests, flush=True)
+            status = int(answers.readline())
+            return subprocess.CompletedProcess(code, status, out.read_bytes(), err.read_bytes())
+
+        yield run
+
+
+# Jobs in the background ignore Ctrl-C from their beginning.
+UNINTERRUPTIBLE = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 
 
 def unprivileged() -> None:
@@ -229,13 +276,21 @@ def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> N
 
 
 WRITE_AND_COMPILE = """
-import sys
+import os, sys
 from pathlib import Path
+import numba
 from gqm_sym.building import load, write_module
 text, path = Path(sys.argv[1]).read_text(encoding="utf-8"), sys.argv[2]
-write_module(text, path)
-load(path, "small").effective_potential.compile()
-print("compiled")
+numba.njit("f8(f8)")(lambda x: x)  # what numba does before it first compiles takes longer than the rest
+children = []
+for _ in range(4):
+    children.append(os.fork())
+    if children[-1] == 0:
+        write_module(text, path)
+        load(path, "small").effective_potential.compile()
+        print("compiled")
+        sys.exit()
+sys.exit(sum(os.waitpid(child, 0)[1] for child in children))
 """
 # The file is written as by gqm-gen, with one function instead of seven.
 SMALL = f"""from numba import carray
@@ -260,12 +315,8 @@ def test_four_processes_at_once(tmp_path: Path) -> None:
     """
     source, path = tmp_path / "text", tmp_path / "out" / "small.py"
     source.write_text(SMALL, encoding="utf-8")
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    command = [sys.executable, "-c", WRITE_AND_COMPILE, str(source), str(path)]
-    running = [subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) for _ in range(4)]
-    printed = [process.communicate()[0] for process in running]
-    assert [process.returncode for process in running] == [0] * 4
-    assert printed == [b"compiled\n"] * 4
+    done = python(WRITE_AND_COMPILE, source, path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (done.returncode, done.stdout) == (0, b"compiled\n" * 4), done.stderr
     assert names_in(path.parent) == ["small.py"]
     assert [entry.suffix for entry in (tmp_path / "cache").rglob("*") if entry.is_file()] == [".nbc"]
     assert path.read_text(encoding="utf-8") == SMALL
@@ -280,29 +331,29 @@ sys.exit(main(["-q", *sys.argv[1:]]))
 """
 
 
-def test_killed_while_writing(yaml: Path, text: str) -> None:
+def test_killed_while_writing(yaml: Path, text: str, forked: Forked) -> None:
     """If a run is killed while writing, the old module stays whole, and the next run writes the new one."""
     out = yaml.parent / "out"
     target = out / "bowl.py"
     write_module(text, target)
-    assert python(KILLED, "SIGKILL", "-o", out, yaml).returncode == -signal.SIGKILL
+    assert forked(KILLED, "SIGKILL", "-o", out, yaml).returncode == -signal.SIGKILL
     assert target.read_text(encoding="utf-8") == text
-    assert python(GENERATE + "sys.exit(main(['-q', *sys.argv[1:]]))", "-o", out, yaml).returncode == 0
+    assert forked(GENERATE + "sys.exit(main(['-q', *sys.argv[1:]]))", "-o", out, yaml).returncode == 0
     assert "Größe λ" in target.read_text(encoding="utf-8")
 
 
-def test_interrupted_while_writing(yaml: Path) -> None:
+def test_interrupted_while_writing(yaml: Path, forked: Forked) -> None:
     """After Ctrl-C a command ends with exit code 130 and one line, and leaves no file, whole or partial."""
     out = yaml.parent / "out"
-    done = python(KILLED, "SIGINT", "-o", out, yaml)
+    done = forked(KILLED, "SIGINT", "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
     assert names_in(out) == []
 
 
-def test_an_interruption_that_is_ignored_stays_so(yaml: Path) -> None:
+def test_an_interruption_that_is_ignored_stays_so(yaml: Path, forked: Forked) -> None:
     """A job in the background ignores Ctrl-C, which is meant for the one in the foreground, and ends its work."""
     out = yaml.parent / "out"
-    done = python(KILLED, "SIGINT", "-o", out, yaml, before=uninterruptible)
+    done = forked(UNINTERRUPTIBLE + KILLED, "SIGINT", "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
     assert names_in(out) == ["bowl.py"]
 
@@ -321,10 +372,10 @@ sys.exit(main(["-q", *sys.argv[1:]]))
 """
 
 
-def test_interrupted_while_deriving(yaml: Path) -> None:
+def test_interrupted_while_deriving(yaml: Path, forked: Forked) -> None:
     """Ctrl-C in the middle of a derivation also ends with exit code 130 and one line."""
     out = yaml.parent / "out"
-    done = python(INTERRUPTED, "-o", out, yaml)
+    done = forked(INTERRUPTED, "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
     assert not out.exists()
 
@@ -353,11 +404,11 @@ sys.exit(main(sys.argv[1:]))
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_interrupted_at_work(stage: str, tmp_path: Path) -> None:
+def test_interrupted_at_work(stage: str, tmp_path: Path, forked: Forked) -> None:
     """The same holds while a chart is made, and while a figure or a page is written; temporary files are gone."""
     (tmp_path / "ring.yaml").write_text(RING + "launch: {lam0: 0, v0: 1}\n", encoding="utf-8")
     place, arguments = STAGES[stage]
-    done = python(INTERRUPTED_AT, place, tmp_path, *arguments, TMPDIR=str(tmp_path))
+    done = forked(INTERRUPTED_AT, place, tmp_path, *arguments, TMPDIR=str(tmp_path))
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm: interrupted\n")
     assert names_in(tmp_path) == ["ring.yaml"]
 
@@ -376,12 +427,12 @@ def test_a_folder_that_cannot_be_written(yaml: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def generated(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def generated(tmp_path_factory: pytest.TempPathFactory, forked: Forked) -> bytes:
     """Return what a process with the tests' own settings writes."""
     folder = tmp_path_factory.mktemp("plain")
     (folder / "bowl.yaml").write_text(FILE, encoding="utf-8")
     command = GENERATE + "sys.exit(main(sys.argv[1:]))"
-    assert python(command, "-o", folder, folder / "bowl.yaml").returncode == 0
+    assert forked(command, "-o", folder, folder / "bowl.yaml").returncode == 0
     return (folder / "bowl.py").read_bytes()
 
 
@@ -390,10 +441,12 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     [
         {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
         {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "latin-1"},
-        {"LC_ALL": "tr_TR.UTF-8", "LANG": "tr_TR.UTF-8", "TZ": "Pacific/Kiritimati"},
-        {"PYTHONOPTIMIZE": "2", "PYTHONWARNINGS": "error"},
+        {
+            **{"LC_ALL": "tr_TR.UTF-8", "LANG": "tr_TR.UTF-8", "TZ": "Pacific/Kiritimati"},
+            **{"PYTHONOPTIMIZE": "2", "PYTHONWARNINGS": "error"},
+        },
     ],
-    ids=["C", "Latin-1", "Turkish", "optimised, with warnings as errors"],
+    ids=["C", "Latin-1", "Turkish, optimised, with warnings as errors"],
 )
 def test_no_setting_changes_the_text(environment: dict[str, str], yaml: Path, generated: bytes) -> None:
     """The file's bytes do not depend on locale, encoding, time zone or Python's flags; printing never fails."""

@@ -370,7 +370,7 @@ def test_no_file_takes_long(text: str, start: int, cut: int, yaml: Callable[[str
 GROWING = {
     "a chain": "sin(" * 24 + "x" + ")" * 24,
     "kinks": "abs(" * 20 + "x" + ")-1" * 20,
-    "a quotient": "/".join(f"(x+{n})" for n in range(100)),
+    "a quotient": "/".join(f"(x+{n})" for n in range(64)),
 }
 
 

@@ -141,12 +141,12 @@ def test_rates_of_loads(built: Build) -> None:
 
 def test_contact_is_lost_where_the_track_no_longer_pushes(built: Build) -> None:
     """On a crest a ball that only lies on the track leaves it where the load along its upward direction vanishes."""
-    curve = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="3*cos(u)", parameter="u", roll="0")
+    curve = gqm.Curve.space(x="10*u", y="u**2", z="-3*u**2", parameter="u", roll="0")
     module = built("crest_ball", curve, BALL)
-    motion = module.solve(-3, 30, contact="above", rho="0.2")
+    motion = module.solve(-1, 15, contact="above", rho="0.2")
     assert [event.kind for event in motion.events] == ["liftoff"]
     assert motion.state(motion.t_end).n_vertical == pytest.approx(0.0, abs=1e-12)
-    before = module.solve(-3, 30, rho="0.2", t_max=2).state(np.linspace(0.0, motion.t_end, 50)[:-1])
+    before = module.solve(-1, 15, rho="0.2", t_max=2).state(np.linspace(0.0, motion.t_end, 50)[:-1])
     assert before.n_vertical.min() > 0.0
 
 
