@@ -35,7 +35,8 @@ def origin_of(curve: Curve, kernel: Kernel) -> sp.Expr:
     """
     lam = curve.parameter
     laws = (kernel.potential, kernel.resistance, kernel.drag, kernel.friction, kernel.tangential_law)
-    if curve.charted or curve.banking or kernel.spin or any(law.has(X, Y, lam) for law in laws):
+    of_angle = curve.radius is not None  # the parameter of a polar curve is an angle from the x axis
+    if of_angle or curve.charted or curve.banking or kernel.spin or any(law.has(X, Y, lam) for law in laws):
         return sp.S.Zero
     linear = not any(sp.diff(law, Z).has(Z) for law in laws)
     zeros = {zero for name, form in curve.coordinates for zero in _zeros(form, lam, linear or name != "z")}
@@ -53,8 +54,6 @@ def measured_from(curve: Curve, origin: sp.Expr) -> Curve:
         return curve
     there = {curve.parameter: curve.parameter + origin}
     forms = {name: form.xreplace(there) for name, form in curve.coordinates}
-    if curve.radius is not None:
-        forms["radius"] = curve.radius.xreplace(there)
     low, high = (None if end is None else end - origin for end in curve.domain)
     return replace(curve, **forms, domain=(low, high))
 

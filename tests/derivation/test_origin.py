@@ -37,6 +37,25 @@ def test_origins(height: str, origin: str) -> None:
     assert str(model.origin) == origin
 
 
+@pytest.mark.parametrize(
+    "curve",
+    [
+        gqm.Curve.polar("(theta - 40)/5", parameter="theta", domain=("41", "60")),
+        gqm.Curve.parametric(x="(t - 40)*cos(t)", z="(t - 40)*sin(t)/2", parameter="t", domain=("41", "60")),
+        gqm.Curve.space(x="cos(t)", y="sin(t)", z="(t - 40)**4/50 + t/30", parameter="t"),
+    ],
+)
+def test_slopes_are_derivatives(curve: gqm.Curve) -> None:
+    """The slope of the potential and ds are those of the coordinates as declared."""
+    model = gqm.derive(curve, gqm.Gravity())
+    place = {model.parameter: sympy.Rational(4321, 100)}
+    rates = [sympy.diff(form, model.parameter).xreplace(place).evalf(30) for form in curve.point]
+    length = sympy.sqrt(sum(rate**2 for rate in rates))
+    assert abs(model.ds.xreplace(place).evalf(30) - length) < 1e-20
+    slope = model.effective_potential_slope.xreplace({**place, sympy.Symbol("g", real=True): sympy.S.One})
+    assert abs(slope.evalf(30) - rates[-1]) < 1e-20
+
+
 def test_no_origin_where_forces_contain_the_place() -> None:
     """A turning frame, a spring or a law by the place itself has digits about zero."""
     curve = gqm.Curve.graph("cosh(x - 40)", parameter="x")

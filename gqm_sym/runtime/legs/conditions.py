@@ -27,17 +27,17 @@ PIECE_SHARE = 2.0**-6
 SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 
 
-class FirstLeg(NamedTuple):
-    """The first leg of a launch as compiled code has followed it, from which a driver goes on.
+class FirstLegs(NamedTuple):
+    """The first leg of a launch, or the first ones, as compiled code has followed them; from there a driver goes on.
 
     Attributes
     ----------
     body : array
         The lines of the body (`legs.body`).
     what : int
-        The code for the end of the leg (`advance`), or END_NEAR_EQUILIBRIUM.
-    records : (1, n) array
-        The record of the leg (`leg_record`).
+        The code for the end of the last leg (`advance`), or END_NEAR_EQUILIBRIUM.
+    records : array
+        The records of the legs (`leg_record`), one directly behind the other.
     """
 
     body: Array
@@ -91,13 +91,16 @@ def conditions_of(problem: Problem) -> Conditions:
     return known
 
 
-def follow_first_leg(problem: Problem, horizon: float) -> FirstLeg:
-    """Follow a body from its launch along one leg, for a motion of which all legs up to a horizon in s are needed."""
+def follow_first_legs(problem: Problem, horizon: float) -> FirstLegs:
+    """Follow a body from its launch along one leg, or along several of a motion of which all legs up to a horizon in s
+    are needed.
+    """
     dissipation, track, parameters, _, space, lines = conditions_of(problem)
-    body, records, launch = lines.copy(), np.empty((1, space * COLUMNS)), problem.launch
+    body, launch, legs = lines.copy(), problem.launch, LEGS_PER_CALL if horizon < inf else 1
+    records = np.empty((legs, space * COLUMNS))
     body[0, LAM0], body[0, PREFERRED], body[0, V2] = launch.lam0.value, launch.direction, problem.w0
     if horizon < inf:
         body[0, HORIZON] = horizon
     what = drive_along(track, dissipation, parameters, FIRST_LEGS, body, records)
     # This avoids the constructor of a named tuple, which is slow.
-    return tuple.__new__(FirstLeg, (body, what, records))
+    return tuple.__new__(FirstLegs, (body, what, records))

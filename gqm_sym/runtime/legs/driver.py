@@ -52,7 +52,7 @@ from gqm_sym.runtime.legs.body import (
     V2,
     VALUE,
 )
-from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLeg, conditions_of
+from gqm_sym.runtime.legs.conditions import FEW_PANELS, LEGS_PER_CALL, SMOOTH, FirstLegs, conditions_of
 from gqm_sym.runtime.legs.endings import check_fall, check_steepness, cusp_ahead, end_name, failure, force_cancels
 from gqm_sym.runtime.legs.frames.entering import LAST_DIGIT, Entry, entry_near
 from gqm_sym.runtime.legs.frames.fitting import TryLater
@@ -112,8 +112,8 @@ class Driver:
         The launch.
     horizon : float
         The time in s up to which all legs are needed; infinite if there is none.
-    first : FirstLeg
-        The first leg of the launch.
+    first : FirstLegs
+        The first legs of the launch.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class Driver:
     # The number of panels for which a record has space, if it is not that of the conditions.
     _space = 0
 
-    def __init__(self, problem: Problem, horizon: float, first: FirstLeg) -> None:
+    def __init__(self, problem: Problem, horizon: float, first: FirstLegs) -> None:
         self.problem, self._horizon, self.body = problem, horizon, first.body
         self._conditions = conditions_of(problem)
         self.runs = Runs()

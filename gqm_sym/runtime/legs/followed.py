@@ -11,8 +11,8 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import DIRECTION, STATUS, TURNS
-from gqm_sym.runtime.legs.conditions import follow_first_leg
+from gqm_sym.runtime.legs.body import DIRECTION, STATUS, TURNS, VALUE
+from gqm_sym.runtime.legs.conditions import follow_first_legs
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
@@ -34,8 +34,9 @@ class FollowedMotion(Motion):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "dissipative", problem.launch.direction)
-        self._first = first = follow_first_leg(problem, self._horizon)
-        if first.what == END_TURN and not first.body.item(STATUS):
+        self._first = first = follow_first_legs(problem, self._horizon)
+        number = first.body.item
+        if number(VALUE) > 1.0 or (first.what == END_TURN and not number(STATUS)):
             heading = first.records.item(HEADING)
         else:  # the leg is stored at once, so that an impossible launch is refused
             runs = self._driver.runs.all()
@@ -45,7 +46,7 @@ class FollowedMotion(Motion):
 
     @computed_once
     def _driver(self) -> Driver:
-        """The body, which has been driven along the first leg."""
+        """The body, which has been driven along the first legs."""
         return Driver(self.problem, self._horizon, self._first)
 
     # -- what `Motion` needs ------------------------------------------------------------------

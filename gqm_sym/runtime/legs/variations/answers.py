@@ -199,7 +199,8 @@ def gradient(motion: Any, quantity: str) -> Array:
 def turning_points(motion: Any) -> list[list[float]]:
     """Return the derivatives of the turning points of a motion: a list for each, with respect to all variables."""
     turns, runs = motion._turns_with_runs()
-    problem, found = motion.problem, list[list[float]]()
+    problem = motion.problem
+    found: list[list[float]] = []  # `list[list[float]]()` takes a microsecond
     if problem.launch.v0.value == 0.0:  # the launch is one
         found.append([*[0.0] * len(problem.p), 1.0, 0.0])
     if not turns:

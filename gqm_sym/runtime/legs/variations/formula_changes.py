@@ -10,9 +10,10 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.double_double.interpreter import BLOCK, call_interpreter
-from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_registers, fill_signed_values_of
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpreter
+from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_signed_values_of
 from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
 from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
@@ -56,20 +57,25 @@ def fill_in_doubles(program, work, inputs, places, first, found):  # type: ignor
     found : (m, n) array
         Its last rows are filled with the results.
     """
+    work, places, found = borrowed(work), borrowed(places), borrowed(found)
     count, row, lanes = places.shape[1], found.shape[0] - program[5].size, min(BLOCK, places.shape[1] - first)
-    fill_registers(inputs, inputs.shape[1], lanes, work)
+    for k in range(inputs.shape[1]):
+        for part in range(3):
+            register, value = work[k * ROW + part * BLOCK :], inputs[part, k]
+            for i in range(lanes):
+                register[i] = value
     call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
     for start in range(first, count, BLOCK):
         n = min(BLOCK, count - start)
         for k in range(places.shape[0]):
-            at = program[4][k]
+            register, line = work[program[4][k] :], places[k, start:]
             for i in range(n):
-                work[at + i] = places[k, start + i]
+                register[i] = line[i]
         call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, n)
         for k in range(program[5].size):
-            at = program[5][k]
+            register, line = work[program[5][k] :], found[row + k, start:]
             for i in range(n):
-                found[row + k, start + i] = work[at + i]
+                line[i] = register[i]
 
 
 @Inner

@@ -14,7 +14,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import exp
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import copied, on_stack, opaque, over_rows
+from gqm_sym.runtime.compiled.registers import borrowed, copied, on_stack, opaque, over_rows
 from gqm_sym.runtime.legs.panels.polynomials import (
     COUNT,
     ENDS_BY_NODE,
@@ -269,6 +269,7 @@ def solve_panels(panels, first, law, parameters, breaks, solutions, timed):  # t
     """Fill the solutions on all panels; unless they are ``timed``, only what the places of ends follow from, for which
     the law needs ds/dlam only where runs begin and end.
     """
+    panels, law, solutions = borrowed(panels), borrowed(law), borrowed(solutions)
     n, step, size = parameters, law.shape[1], solutions.shape[1] * WIDE
     marks = step - WIDE * panels.shape[0]
     line, forces, state, work = law.reshape(law.size), law[n + 2, marks:], np.zeros((3, n + 2)), solution_buffer()

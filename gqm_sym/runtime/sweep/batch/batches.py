@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.compiled.intrinsics import choose
+from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
@@ -21,6 +21,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
     FOUND,
+    HALF_WIDTH,
     INDEX,
     LANES,
     LAUNCH_PLACE,
@@ -34,6 +35,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     STATE,
     TIME_ROWS,
     TRIAL,
+    V2_REST,
     ZERO_BEHIND,
     Orbits,
     Scratch,
@@ -175,10 +177,13 @@ def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ign
         if begin == 0 or columns[DOMAIN_LOW + row, 1] != 0:
             fill_row(columns, DOMAIN_LOW + row, begin, number, domain[row, :n])
     index, place, v2 = rows[INDEX, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
-    direction, total = rows[SEARCH_DIRECTION, :n], scratch.work[0, :n]
+    direction, rests, total = rows[SEARCH_DIRECTION, :n], rows[V2_REST, :n], scratch.work[0, :n]
+    rows[HALF_WIDTH, :n] = nan
     fill_row(columns, LAM0, begin, number, place)
     fill_row(columns, V0, begin, number, v2)
     fill_row(columns, DIRECTION, begin, number, direction)
+    for j in range(n):
+        rests[j] = fma(v2[j], v2[j], -(v2[j] * v2[j]))
     for j in range(n):
         index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
         v2[j] *= v2[j]

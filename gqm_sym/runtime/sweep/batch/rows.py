@@ -19,6 +19,7 @@ OFFSET_HIGH          offset of the upper end                                    
 END_LOW, END_HIGH    both ends as values of the curve's parameter                         time of librations
 LAUNCH_PLACE         the launch place                                                     all
 LAUNCH_V2            V**2 at launch                                                       all
+HALF_WIDTH           half the orbit's width if a closed form gives it, otherwise NaN      time about axes
 SEARCH_DIRECTION     the sign of the direction in which is searched; 0 for none           search
 SEARCH_LENGTH        how far the search goes at most                                      search
 LENGTH_BEHIND        how far it goes the other way; CLOSED on a closed curve              search
@@ -31,6 +32,7 @@ AXIS_DISTANCE        distance to the axis of symmetry that the orbit may have   
 AXIS_SPACING         distance from one axis to the next, 0 if there is only one           search
 AXIS_NUMBER          how many such distances that axis is from the one that is known      search
 ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
+V2_REST              what rounding took from V**2 at launch                               search
 ==================== ==================================================================== ======================
 
 The quadrature needs only the rows before TIME_ROWS.
@@ -50,9 +52,9 @@ from gqm_sym.runtime.compiled.types import Array
 BATCH, LANES = 128, 8
 
 INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 16)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(16, 21)
-ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(21, 27)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 17)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(17, 22)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(22, 29)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.

@@ -38,6 +38,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
+    HALF_WIDTH,
     INDEX,
     LAUNCH_PLACE,
     LAUNCH_V2,
@@ -185,6 +186,14 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
 
 
 @Inner
+def fill_halves(n, rows, halves):  # type: ignore[no-untyped-def]
+    """Fill half of each orbit's width."""
+    for j in range(n):
+        known = rows[HALF_WIDTH, j]
+        halves[j] = choose(known == known, known, 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j]))
+
+
+@Inner
 def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
     """Append the terms that are constant along an orbit to the rows of parameters; return the new number of rows."""
     count, n, rows, params = scratch.param_count, orbits.size, orbits.rows, orbits.params
@@ -193,8 +202,7 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
         p, halves = params[: count * n].reshape(count, n), scratch.work[0, :n]
         middles, rests = scratch.work[1, :n], scratch.work[2, :n]
         invariants = params[count * n : (count + more) * n].reshape(more, n)
-        for j in range(n):
-            halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
+        fill_halves(n, rows, halves)
         if kind == AXIS_LIBRATION:
             call_integrand_invariants_batch(fns.integrand_invariants, n, halves, p, invariants)
         else:
@@ -322,8 +330,7 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
     pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]
     rests = work[5, :n]
-    for j in range(n):
-        halves[j] = 0.5 * (rows[OFFSET_HIGH, j] - rows[OFFSET_LOW, j])
+    fill_halves(n, rows, halves)
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]

@@ -22,6 +22,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
     FOUND,
+    HALF_WIDTH,
     LAUNCH_PLACE,
     LAUNCH_V2,
     LENGTH_BEHIND,
@@ -33,6 +34,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     SEEKING,
     STATE,
     TRIAL,
+    V2_REST,
     ZERO,
     ZERO_BEHIND,
     contains,
@@ -49,8 +51,8 @@ EVEN_TOLERANCE = 8.0 * 2.0**-52
 MAX_WIDTH = 1.999
 
 # The turning point is given by the square of a sine, which is 1 at a potential maximum. Within NEAR_MAXIMUM of 1 the
-# closed form is not used; above INACCURATE rounding of that square moves the turning point by more than a rounding.
-NEAR_MAXIMUM, INACCURATE = 1e-9, 0.5
+# closed form is not used.
+NEAR_MAXIMUM = 1e-9
 
 
 @Inner
@@ -58,19 +60,20 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
     """Set both zeros, and the direction of bodies at rest, from the closed form of the width of the orbit in its well.
 
     If that form does not apply, ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the
-    well, and SEEKING for all others. Unless V**2 is ``monotone`` between axes for all parameters, each root is
-    improved, because it may lose digits, and launches in other periods are left to the search.
+    well, and SEEKING for all others. Each root of a thrown body is improved by a step of Newton's method, because its
+    roundings are those of the whole energy, and V**2 at launch may be much less. Unless V**2 is ``monotone`` between
+    axes for all parameters, launches in other periods are left to the search.
     """
-    limit = INACCURATE if monotone else -1.0
-    start, w0, direction, state = (
+    start, w0, direction, state, roundings = (
         rows[LAUNCH_PLACE, :n],
         rows[LAUNCH_V2, :n],
         rows[SEARCH_DIRECTION, :n],
         rows[STATE, :n],
+        rows[V2_REST, :n],
     )
     ahead, behind, axis = rows[ZERO, :n], rows[ZERO_BEHIND, :n], rows[AXIS_DISTANCE, :n]
     places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
-    out, halves, offsets, inaccurate = (
+    out, halves, offsets, thrown = (
         work[:3].reshape(-1)[: 3 * n].reshape(3, n),
         work[3, :n],
         work[4, :n],
@@ -85,17 +88,19 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
         offsets[j] = fma(-periods, period, axis[j])
         halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
         ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
-        inaccurate[j] = choose((periods == 0.0) & (w0[j] > 0.0) & (out[2, j] > limit), 1.0, 0.0)
-    if contains(inaccurate, 1.0):
-        near, ends, widths = work[6, :n], work[7, :n], work[8, :n]
+        thrown[j] = choose((periods == 0.0) & (w0[j] > 0.0), 1.0, 0.0)
+    if contains(thrown, 1.0):
+        ends, away = work[7, :n], work[8, :n]
         slopes = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
         for j in range(n):
-            near[j], ends[j] = places[j] + offsets[j], places[j] + ahead[j] * halves[j]
-            widths[j] = ahead[j] * halves[j] - offsets[j]
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, near, ends, widths, p, slopes)
+            away[j] = ahead[j] * halves[j] - offsets[j]
+            ends[j] = start[j] + away[j]
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, ends, away, p, slopes)
         for j in range(n):
-            missed = ahead[j] * ((w0[j] - 2.0 * widths[j] * slopes[0, j]) / (2.0 * slopes[2, j]))
-            halves[j] += choose(inaccurate[j] == 1.0, missed, 0.0)
+            left = fma(-2.0 * away[j], slopes[0, j], w0[j]) + roundings[j]
+            missed = ahead[j] * (left / (2.0 * slopes[2, j]))
+            halves[j] += choose(thrown[j] == 1.0, missed, 0.0)
+    widths = rows[HALF_WIDTH, :n]
     for j in range(n):
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
@@ -105,6 +110,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
         ascent = choose(sense * offset < 0.0, -inside, inside)
         known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
         ahead[j], behind[j] = choose(known_well, half - ascent, 0.0), choose(known_well, half + ascent, nan)
+        widths[j] = choose(known_well, half, nan)
         direction[j] = choose(known_well, sense, direction[j])
         axis[j] = -sense * offset
         state[j] = choose(well & (out[2, j] > 1.0 + NEAR_MAXIMUM), NOWHERE, SEEKING)
@@ -274,9 +280,10 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
     V**2 < 0, the next one is at most four times as far away.
     """
     offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, direction, length = (
+    start, w0, rests, direction, length = (
         rows[LAUNCH_PLACE, :n],
         rows[LAUNCH_V2, :n],
+        rows[V2_REST, :n],
         rows[SEARCH_DIRECTION, :n],
         rows[SEARCH_LENGTH, :n],
     )
@@ -297,7 +304,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
             places[j] = start[j] + offsets[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
-            guess, w = trial[j], w0[j] - 2.0 * offsets[j] * out[0, j]
+            guess, w = trial[j], fma(-2.0 * offsets[j], out[0, j], w0[j]) + rests[j]
             before = w > 0.0
             low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
             better = guess + guess * (w / (2.0 * offsets[j] * out[2, j] + w))

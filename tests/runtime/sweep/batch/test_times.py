@@ -1,6 +1,7 @@
 """Times of batches: their rounding errors are small, and on average nearly zero."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -91,3 +92,18 @@ def test_ball_with_a_radius(build: Callable[..., ModuleType]) -> None:
     with mp.workdps(40):
         truths = [half_period_of_ball(start, 0.4, 0.05) for start in starts.tolist()]
     assert np.abs(errors(values, truths)).max() <= 2.0
+
+
+def test_thrown_bodies_on_a_circle(tmp_path: Path) -> None:
+    """Wherever it is thrown, a body up to nine tenths of the way to the top has its digits, by elliptic integrals."""
+    module = gqm.build(gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="thrown", folder=tmp_path)
+    rng = np.random.default_rng(3)
+    energies, shares = rng.uniform(0.3, 0.9, 600), rng.uniform(0.02, 1.0, 600)
+    lam0 = 2 * np.arcsin(np.sqrt(energies * (1 - shares))) * rng.choice([-1, 1], 600)
+    v0 = np.sqrt(4 * 9.81 * energies * shares)
+    values = module.sweep("half_period", lam0, v0).values
+    with mp.workdps(40):
+        squares = [mp.sin(mpf(a) / 2) ** 2 + mpf(v) ** 2 / (4 * mpf(9.81)) for a, v in zip(lam0, v0, strict=True)]
+        found = errors(values, [2 * mp.ellipk(square) / mp.sqrt(mpf(9.81)) for square in squares])
+    assert np.abs(found).max() <= 3.5
+    assert np.quantile(np.abs(found), 0.99) <= 2.1

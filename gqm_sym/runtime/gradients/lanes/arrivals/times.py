@@ -40,13 +40,14 @@ from gqm_sym.runtime.gradients.lanes.arrivals.weights import (
     FLIP,
     LAUNCH,
     LAUNCH_SIGN,
+    PASSES,
     PLACE,
     PLACE_SIGN,
     ROWS,
     WHOLE,
 )
 from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
-from gqm_sym.runtime.gradients.lanes.launches import Launches
+from gqm_sym.runtime.gradients.lanes.launches import EVEN, Launches
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
 from gqm_sym.runtime.gradients.lanes.periods import MIN_LAUNCHES_PER_THREAD, end_program, programs_for
@@ -60,7 +61,7 @@ MAX_ERROR = 1e-15
 # The kinds of variables: a run-time parameter, and the place and the speed of the launch.
 PARAMETER, LAM0, V0 = range(3)
 
-WHICH = types.int64[:, ::1]
+WHICH, LIMITS = types.int64[:, ::1], types.UniTuple(INTEGER, 2)
 
 
 @Inner
@@ -88,8 +89,8 @@ def fill_phases(asked, v0, here, there, lanes, state):  # type: ignore[no-untype
 
     Parameters
     ----------
-    asked : (m, 3) array
-        The launch place, the direction of the launch, and the place asked for.
+    asked : (m, 4) array
+        As for `fill_swing_arrivals`.
     v0 : array
         The launch speeds.
     here, there : arrays
@@ -98,7 +99,7 @@ def fill_phases(asked, v0, here, there, lanes, state):  # type: ignore[no-untype
         As for `integrate`.
     """
     for i in range(lanes):
-        lam0, direction, place = asked[min(i, asked.shape[0] - 1)]
+        lam0, direction, place, _ = asked[min(i, asked.shape[0] - 1)]
         from_upper, rests = here[BELOW, 0, i] > here[ABOVE, 0, i], v0[i] == 0.0
         near, far = (ABOVE, BELOW) if from_upper else (BELOW, ABOVE)
         towards, onwards = (direction > 0.0) == from_upper, rests or direction * (place - lam0) > 0.0
@@ -142,7 +143,7 @@ def total_change(which, i, v0, here, there, state, integrals):  # type: ignore[n
 @entry(
     types.void(
         *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), types.UniTuple(PROGRAM, 2)),
-        *(types.UniTuple(VECTOR, 2), types.Tuple((MATRIX, WHICH)), MATRIX, MATRIX, MATRIX),
+        *(types.UniTuple(VECTOR, 2), types.Tuple((MATRIX, WHICH, LIMITS)), MATRIX, MATRIX, MATRIX),
     ),
     nogil=True,
 )
@@ -156,17 +157,18 @@ def fill_swing_arrivals(ends, works, programs, spaces, rule, launches, asked, fo
     programs, spaces
         The programs of the time per phase (`programs.libration_program`), and of a place
         (`arrivals.programs.place_program`), with their work spaces.
-    rule : ((4, n) array, (2, k) array)
-        The table of shares (`nodes.trapezoidal_nodes`), and for each derivative the kind of the variable and its number
-        among those of the programs.
+    rule : ((4, n) array, (2, k) array, (int, int))
+        The table of shares (`nodes.trapezoidal_nodes`); for each derivative the kind of the variable and its number
+        among those of the programs; and the numbers of nodes of a pass (`weights.PASSES`).
     launches : (n + 2, m) array
         The variables of each launch, and both turning points to the accuracy of doubles.
-    asked : (m, 3) array
-        The launch place, the direction of the launch, and the place asked for.
+    asked : (m, 4) array
+        The launch place, the direction of the launch, the place asked for, and 1 if the orbit is a mirror image of
+        itself.
     found : (m, k) array
         Filled.
     """
-    (orbit, at_place), (work, place_work), (nodes, which), v0 = programs, spaces, rule, np.empty(BLOCK)
+    (orbit, at_place), (work, place_work), (nodes, which, limits), v0 = programs, spaces, rule, np.empty(BLOCK)
     functions, variables = orbit[4].size, launches.shape[0] - 2
     state, integrals = np.zeros((ROWS, BLOCK)), np.empty((functions, INTEGRALS, BLOCK))
     ample, both = work_space(functions), np.empty((2, at_place[4].size, 2, BLOCK))
@@ -181,11 +183,12 @@ def fill_swing_arrivals(ends, works, programs, spaces, rule, launches, asked, fo
         evaluate_at(at_place, place_work, wanted, 0, lanes, here)
         evaluate_at(at_place, place_work, wanted, 2, lanes, there)
         for i in range(lanes):
-            v0[i] = launches[variables - 2, start + min(i, size - 1)]
+            at = min(i, size - 1)
+            v0[i], ample[4][i] = launches[variables - 2, start + at], wanted[at, 3]
         fill_phases(wanted, v0, here, there, lanes, state)
-        integrate(orbit, work, (LIBRATION, nodes), lanes, state, ample, integrals)
+        integrate(orbit, work, (LIBRATION, nodes, limits), lanes, state, ample, integrals)
         for i in range(size):
-            is_known = ample[3][i] == DONE and wanted[i, 0] != wanted[i, 2] and there[SQUARE, 0, i] > 0.0
+            is_known = ample[5][i] == DONE and wanted[i, 0] != wanted[i, 2] and there[SQUARE, 0, i] > 0.0
             for k in range(which.shape[1]):
                 found[start + i, k] = nan
                 if is_known:
@@ -195,7 +198,7 @@ def fill_swing_arrivals(ends, works, programs, spaces, rule, launches, asked, fo
 
 
 @entry(
-    types.void(PROGRAM, VECTOR, types.Tuple((MATRIX, INTEGER)), MATRIX, MATRIX, MATRIX),
+    types.void(PROGRAM, VECTOR, types.Tuple((MATRIX, INTEGER, LIMITS)), MATRIX, MATRIX, MATRIX),
     nogil=True,
 )
 def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ignore[no-untyped-def]
@@ -205,8 +208,9 @@ def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ign
     ----------
     program, work
         The program of the time per lap (`programs.circulation_program`), and its work space.
-    rule : ((4, n) array, int)
-        The table of shares, and the number of the derivative with respect to the launch place; -1 if there is none.
+    rule : ((4, n) array, int, (int, int))
+        The table of shares; the number of the derivative with respect to the launch place, or -1 if there is none; and
+        the numbers of nodes of a pass.
     launches : (n, m) array
         The inputs of the program.
     asked : (m, 2) array
@@ -214,7 +218,7 @@ def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ign
     found : (m, k) array
         Filled.
     """
-    (nodes, launch_row), functions = rule, program[4].size
+    (nodes, launch_row, limits), functions = rule, program[4].size
     state, integrals = np.zeros((ROWS, BLOCK)), np.empty((functions, INTEGRALS, BLOCK))
     ample, rates, begin = work_space(functions), np.empty((functions, 2, BLOCK)), np.zeros((1, 1))
     for start in range(0, launches.shape[1], BLOCK):
@@ -223,12 +227,12 @@ def fill_lap_arrivals(program, work, rule, launches, asked, found):  # type: ign
         for i in range(lanes):
             state[PLACE, i] = wanted[min(i, size - 1), 0]
         fill_inputs(work, launches.shape[0], some, lanes)
-        integrate(program, work, (CIRCULATION, nodes), lanes, state, ample, integrals)
+        integrate(program, work, (CIRCULATION, nodes, limits), lanes, state, ample, integrals)
         evaluate_at(program, work, begin, 0, lanes, rates)
         for i in range(size):
             for k in range(found.shape[1]):
                 at_launch = rates[0, 0, i] / wanted[i, 1] if k == launch_row else 0.0
-                is_known = ample[3][i] == DONE and wanted[i, 0] > 0.0
+                is_known = ample[5][i] == DONE and wanted[i, 0] > 0.0
                 found[start + i, k] = integrals[1 + k, VALUE, i] - at_launch if is_known else nan
 
 
@@ -252,17 +256,20 @@ def arrival_gradients(formulas: Formulas, launches: Launches, places: Array, row
     found = np.full((circulates.size, len(rows)), nan)
     if not rows:
         return found
-    for make, *last in ((libration_program, LaneRecorder), (small_swing_program,)):
+    general, small = (libration_program, LaneRecorder), (small_swing_program,)
+    for (make, *last), limits in ((general, PASSES[0]), (small, PASSES[0]), (general, PASSES[1])):
         is_open = np.flatnonzero(~circulates & np.isnan(found).any(axis=1))
         if is_open.size:
-            _fill_swings(source, launches, places, rows, (make, last), (is_open, found))
+            _fill_swings(source, launches, places, rows, (make, last, limits), (is_open, found))
     if circulates.any() and has_fixed_laps(source):
         assert formulas.domain_of is not None
         lap = np.broadcast_to(formulas.domain_of(ARRAYS, tuple(launches.lines))[2], circulates.shape)
         for direction in (1, -1):
-            chosen = np.flatnonzero(circulates & (launches.directions == direction))
-            if chosen.size:
-                _fill_laps(source, launches, (places, direction * np.abs(lap)), (direction, rows), (chosen, found))
+            for limits in PASSES:
+                is_open = circulates & (launches.directions == direction) & np.isnan(found).any(axis=1)
+                if is_open.any():
+                    asked, filled = (places, direction * np.abs(lap)), (np.flatnonzero(is_open), found)
+                    _fill_laps(source, launches, asked, (direction, rows, limits), filled)
     return found
 
 
@@ -271,7 +278,7 @@ def _fill_swings(
     launches: Launches,
     places: Array,
     rows: tuple[int, ...],
-    stage: tuple[Any, Any],
+    stage: tuple[Any, Any, tuple[int, int]],
     filled: tuple[NDArray[np.intp], Array],
 ) -> None:
     """Fill the derivatives of some librations.
@@ -282,12 +289,13 @@ def _fill_swings(
         The formulas.
     launches, places, rows
         As for `arrival_gradients`.
-    stage : (callable, sequence)
-        The function that makes the program of the time per phase (None if there is none), and its last arguments.
+    stage : (callable, sequence, (int, int))
+        The function that makes the program of the time per phase (None if there is none), its last arguments, and the
+        numbers of nodes of a pass.
     filled : pair of arrays
         The numbers of the launches, and the derivatives of all launches.
     """
-    (make, last), (chosen, found), n, energy = stage, filled, source.parameters, source.variables - 1
+    (make, last, limits), (chosen, found), n, energy = stage, filled, source.parameters, source.variables - 1
     wanted = (*((energy,) if max(rows) >= n else ()), *sorted({k for k in rows if k < n}))
     if make(source, wanted, *last) is None:
         return
@@ -296,9 +304,10 @@ def _fill_swings(
     makers = [*((end_program, end, source, wanted) for end in range(2)), (place_program, source, wanted)]
     programs, in_code = programs_for([*makers, (make, source, wanted, *last)], chosen.size)
     low, high, place, orbit = (one.operands for one in in_code)
-    ways, out = np.empty((found.shape[0], 3)), np.empty((chosen.size, len(rows)))
+    ways, out = np.empty((found.shape[0], 4)), np.empty((chosen.size, len(rows)))
     ways[:, 0], ways[:, 1], ways[:, 2] = launches.lines[-2], launches.directions, places
-    table, ways, rule = launches.table[:, chosen], ways[chosen], (trapezoidal_nodes(LIBRATION), which)
+    ways[:, 3] = launches.kinds >= EVEN
+    table, ways, rule = launches.table[:, chosen], ways[chosen], (trapezoidal_nodes(LIBRATION), which, limits)
 
     def work(part: slice) -> None:
         *spaces, place_space, space = (one.work.copy() for one in programs)
@@ -313,7 +322,7 @@ def _fill_laps(
     source: Source,
     launches: Launches,
     asked: tuple[Array, Array],
-    given: tuple[int, tuple[int, ...]],
+    given: tuple[int, tuple[int, ...], tuple[int, int]],
     filled: tuple[NDArray[np.intp], Array],
 ) -> None:
     """Fill the derivatives of some circulations.
@@ -324,16 +333,16 @@ def _fill_laps(
         As for `_fill_swings`.
     asked : pair of arrays
         The places, and the lengths of a lap in lam, with the sign of the direction.
-    given : (int, tuple of int)
-        The direction of the launches, and the variables of differentiation.
+    given : (int, tuple of int, (int, int))
+        The direction of the launches, the variables of differentiation, and the numbers of nodes of a pass.
     """
-    (places, lap), (chosen, found), n, rows = asked, filled, source.parameters, given[1]
+    (places, lap), (chosen, found), n, (direction, rows, limits) = asked, filled, source.parameters, given
     table = launches.table[:, chosen]
     ahead = np.broadcast_to(places, lap.shape)[chosen] - table[n]  # a lap begins at lam0
     ways, laps = np.stack([ahead / lap[chosen], lap[chosen]], axis=1), np.vstack([table[: source.variables], table[n]])
-    programs, in_code = programs_for([(circulation_program, source, *given)], chosen.size)
+    programs, in_code = programs_for([(circulation_program, source, direction, rows)], chosen.size)
     operands, out = in_code[0].operands, np.empty((chosen.size, len(rows)))
-    rule = trapezoidal_nodes(CIRCULATION), rows.index(n) if n in rows else -1
+    rule = trapezoidal_nodes(CIRCULATION), rows.index(n) if n in rows else -1, limits
 
     def work(part: slice) -> None:
         fill_lap_arrivals(
