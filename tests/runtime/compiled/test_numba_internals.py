@@ -167,7 +167,7 @@ def stored_answers(folder: Path) -> Iterator[Callable[..., str]]:
 def truth(compiled_answers: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the answers with all of numba's names."""
     found = compiled_answers(tmp_path_factory.mktemp("cache"))
-    assert re.fullmatch(r"0x\S+ 0x\S+\n0x\S+\n", found), found
+    assert re.fullmatch(r"-?0x\S+ 0x\S+\n0x\S+\n", found), found
     return found
 
 
