@@ -53,6 +53,17 @@ def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: 
     free = {"a": (1, 1.25, 2), "b": (0.5, 1, 2)}
     tracks = _Family(curve, gqm.Gravity(), free, {"v0": 3, "m": 2, "g": "9.81"} | given, str(tmp_path))
     found = all_limited(tracks, between)
+    found_before: dict[Any, Any] = {}  # angles, where iterations for almost the same curve begin
+
+    def angle(s: Any, a: Any, b: Any, where: Any) -> Any:
+        """Return u, with x = a sin(u) and z = -b cos(u), at an arc length, by Newton's method."""
+        u, change = found_before.get(where, s / a), mpf(1)
+        while abs(change) > mpf(10) ** -21:  # the next one would be its square
+            change = (a * mp.ellipe(u, 1 - (b / a) ** 2) - s) / mp.hypot(a * mp.cos(u), b * mp.sin(u))
+            u -= change
+        found_before[where] = u
+        return u
+
     with mp.workdps(40):
         at = [mpf(x) for x in tracks.start.tolist()]
         for k in range(PLACES)[SOME]:
@@ -60,11 +71,8 @@ def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: 
 
             def quantities(a: Any, b: Any, share: Any = share) -> list[Any]:
                 low, high = (-a / 2, a) if between is None else (mpf("-0.5"), mpf("1.25"))
-
-                def angle(s: Any) -> Any:  # x = a sin(u), z = -b cos(u)
-                    return mp.findroot(lambda u: a * mp.ellipe(u, 1 - (b / a) ** 2) - s, s / a, tol=mpf(10) ** -70)
-
-                start, u = angle(mpf(-1) / 4 if given else -a / 2), angle(low + share * (high - low))
+                start = angle(mpf(-1) / 4 if given else -a / 2, a, b, "start")
+                u = angle(low + share * (high - low), a, b, share)
                 across, rise = a * mp.cos(u), b * mp.sin(u)
                 speed = mp.hypot(across, rise)
                 w = SPEED**2 + 2 * GRAVITY * b * (mp.cos(u) - mp.cos(start))

@@ -110,11 +110,11 @@ def test_a_launch_that_moves(tmp_path: Path) -> None:
 @pytest.mark.parametrize("force", [gqm.Gravity(), gqm.Gravity() + gqm.Rolling(beta="2/5")])
 @pytest.mark.parametrize("between", [None, (0.2, 1.1)])
 def test_derivatives_along_a_spline(force: Any, between: Any, tmp_path: Path, monkeypatch: Any) -> None:
-    """The values are those of the chart, and the derivatives by all heights agree with differences of them, as far as
+    """The values are those of the chart, and the derivatives by heights agree with differences of them, as far as
     the lengths of splines are accurate.
     """
     monkeypatch.setattr(interpolation, "MAX_LAST_CHANGE", 1e-15)
-    monkeypatch.setattr(interpolation, "MAX_ITERATIONS", 100)
+    monkeypatch.setattr(interpolation, "MAX_ITERATIONS", 16)  # lengths have converged to rounding after ten
     x = np.linspace(0.0, 1.5, 9)
     points = np.column_stack([x, -0.8 * x + 0.2 * np.sin(3.0 * x)])
     tracks = _Points(points, force, range(1, 9), {"v0": 0.5, "m": 2, "lam0": 0.1}, str(tmp_path))
@@ -123,7 +123,7 @@ def test_derivatives_along_a_spline(force: Any, between: Any, tmp_path: Path, mo
         scale = np.abs(of_chart.values[name]).max()
         np.testing.assert_allclose(found.values[name], of_chart.values[name], rtol=0, atol=1e-12 * scale)
     step = 2e-4
-    for k in range(8):
+    for k in range(8)[:: 1 if between is None else 3]:
         ends = {}
         for n in (-2, -1, 1, 2):
             moved = tracks.limited(tracks.start + n * step * np.eye(8)[k], between)

@@ -1,5 +1,6 @@
 """Motions and limits along a spline have the derivatives of 40-digit differences with the heights of its points."""
 
+import math
 from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from quadrature import integral
 
 import gqm_sym as gqm
 from gqm_sym.design.limits import LIMITS, PLACES
@@ -20,6 +22,26 @@ POINTS = [(-1.0, 0.75), (-0.5, 0.25), (0.0, 0.0), (0.5, 0.125), (1.0, 0.5), (1.5
 MOVED, DIGITS, STEP = 2, 32, mpf(10) ** -10
 GRAVITY, MASS, MU, SPEED = mpf("9.81"), mpf(2), mpf("0.05"), mpf(5)
 GIVEN = {"g": "9.81", "m": 2}
+
+
+def solved(rows: list[list[Any]]) -> list[list[Any]]:
+    """Return the solutions of linear equations by Gaussian elimination; each row ends with its two right sides.
+
+    Almost all coefficients are zero, and are passed over.
+    """
+    count = len(rows)
+    for k in range(count):
+        pivot = max(range(k, count), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        for i in range(k + 1, count):
+            if rows[i][k]:
+                share = rows[i][k] / rows[k][k]
+                rows[i] = [a - share * b if b else a for a, b in zip(rows[i], rows[k], strict=True)]
+    found: list[list[Any]] = []
+    for k in reversed(range(count)):
+        known = [mp.fdot(rows[k][k + 1 : count], [row[axis] for row in found]) for axis in range(2)]
+        found.insert(0, [(rows[k][count + axis] - known[axis]) / rows[k][k] for axis in range(2)])
+    return found
 
 
 class Spline:
@@ -52,7 +74,7 @@ class Spline:
         count, rows, sides = len(widths), [], []
 
         def row(i: int, order: int, at: Any) -> list[Any]:
-            powers = [mp.ff(k, order) * at ** (k - order) if k >= order else mpf(0) for k in range(6)]
+            powers = [math.perm(k, order) * at ** (k - order) if k >= order else mpf(0) for k in range(6)]
             return [mpf(0)] * (6 * i) + powers + [mpf(0)] * (6 * (count - i - 1))
 
         for i, width in enumerate(widths):
@@ -64,8 +86,8 @@ class Spline:
         for order in (3, 4):
             rows += [row(0, order, mpf(0)), row(count - 1, order, widths[-1])]
             sides += [[mpf(0), mpf(0)]] * 2
-        found = mp.inverse(mp.matrix(rows)) * mp.matrix(sides)
-        self.terms = [[[found[6 * i + k, axis] for k in range(6)] for axis in range(2)] for i in range(count)]
+        x, z = zip(*solved([a + b for a, b in zip(rows, sides, strict=True)]), strict=True)
+        self.terms = [[column[6 * i : 6 * i + 6] for column in (x, z)] for i in range(count)]
 
     def at(self, place: Any, order: int = 0) -> tuple[Any, Any]:
         """Return x and z, or derivatives of them, at a value of the parameter."""
@@ -73,13 +95,13 @@ class Spline:
         return self._on(i, place - self.knots[i], order)
 
     def _on(self, i: int, at: Any, order: int) -> tuple[Any, Any]:
-        powers = [mp.ff(k, order) * at ** (k - order) for k in range(order, 6)]
+        powers = [math.perm(k, order) * at ** (k - order) for k in range(order, 6)]
         x, z = (mp.fdot(terms[order:], powers) for terms in self.terms[i])
         return x, z
 
     def length(self, i: int, width: Any) -> Any:
         """Return the length from a knot on."""
-        return mp.quad(lambda t: mp.hypot(*self._on(i, t, 1)), [0, width], method="gauss-legendre")
+        return integral(lambda t: mp.hypot(*self._on(i, t, 1)), [0, width], 5)
 
     def place(self, length: Any) -> Any:
         """Return the parameter at an arc length."""
@@ -98,7 +120,7 @@ class Spline:
     def integral(self, function: Callable[[Any], Any], begin: Any, end: Any) -> Any:
         """Return an integral over the parameter."""
         edges = [begin, *(knot for knot in self.knots if begin < knot < end), end]
-        return mp.quad(function, edges, method="gauss-legendre")
+        return integral(function, edges, 5)
 
 
 @cache
@@ -142,7 +164,7 @@ def half_period(spline: Spline) -> Any:
         v = mp.sqrt(2 * GRAVITY * (height - spline.at(place)[1]))
         return mp.hypot(*spline.at(place, 1)) * (end - begin) / 2 * mp.sin(phase) / v
 
-    return mp.quad(rate, [0, *edges, mp.pi], method="gauss-legendre")
+    return integral(rate, [0, *edges, mp.pi], 5)
 
 
 def time(spline: Spline, begin: Any = 0, end: Any = None) -> Any:

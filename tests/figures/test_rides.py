@@ -61,7 +61,7 @@ def test_the_labels_of_a_flat_track_do_not_overlap(tmp_path: Path) -> None:
         assert np.linalg.norm(np.diff(shown, axis=0), axis=1).min() > axis.get_ticklabels()[0].get_size()
 
 
-def test_seats_and_their_animation(tmp_path: Path) -> None:
+def test_seats_and_their_animation(hills: ModuleType, tmp_path: Path) -> None:
     """Loads of three cars are drawn against their places; the frames of an animation show all cars in space."""
     track = gqm.Curve.space(
         x="40*cos(u)", y="60*sin(u)", z="6*cos(3*u)", parameter="u", roll=("coordinated", 14), heartline="1.1"
@@ -84,7 +84,7 @@ def test_seats_and_their_animation(tmp_path: Path) -> None:
     with Image.open(tmp_path / "ride.gif") as frames:
         assert frames.n_frames == 3
     with pytest.raises(InputError, match="is not a train"):
-        gqm.figures.seats(gqm.build(gqm.derive(track, gqm.Gravity()), name="hilly_body", folder=tmp_path).solve(0, 10))
+        gqm.figures.seats(hills.solve(0, 10))
 
 
 @pytest.mark.parametrize(

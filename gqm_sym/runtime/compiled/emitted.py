@@ -3,6 +3,7 @@
 import builtins
 import ctypes
 import hashlib
+import re
 import sys
 import threading
 import time
@@ -203,11 +204,25 @@ def _is_known(function: Any, name: str) -> bool:
     return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
 
 
+def _uses_its_module(function: Any, lines: list[str]) -> bool:
+    """Return whether a function refers to something of its module that may change.
+
+    Its code names the attributes that it reads too, and their names follow a point in the text.
+    """
+    code = function.__code__
+    unknown = [name for name in code.co_names if not _is_known(function, name)]
+    if not unknown:
+        return False
+    last = max(line for *_, line in code.co_lines() if line)
+    text = "\n".join(lines[code.co_firstlineno - 1 : last])
+    return re.search(rf"(?<![.\w])({'|'.join(unknown)})\b", text) is not None
+
+
 def _text(function: Any, lines: list[str]) -> list[str]:
     """Return the lines of a function with its decorators; all lines of the module if the function uses anything else of
     it.
     """
-    if not all(_is_known(function, name) for name in function.__code__.co_names):
+    if _uses_its_module(function, lines):
         return lines
     begin = function.__code__.co_firstlineno - 1
     head = list(takewhile(lambda line: line.startswith(("@", "def ")), lines[begin:]))

@@ -49,7 +49,6 @@ from gqm_sym.runtime.legs.body import (
     V2,
     WIDTH_BEFORE,
 )
-from gqm_sym.runtime.legs.gaps.data import GAP_COLUMNS
 from gqm_sym.runtime.legs.kinks.places import ROOM_FOR_KINKS
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -134,8 +133,8 @@ class Joints(NamedTuple):
     ahead : array
         A buffer for the breaks ahead of a body; `room_ahead` returns the length that it must have.
     gaps : array
-        A buffer for the data kept of the gaps between breaks, for the run-time parameters of the body; `room_kept`
-        returns the length that it must have. It is empty if nothing is kept.
+        The data kept of the gaps between breaks, for the run-time parameters of the body (`gaps.data.room_kept`); empty
+        if nothing is kept.
     """
 
     breaks: Array
@@ -148,11 +147,6 @@ class Joints(NamedTuple):
 def room_ahead(breaks: int) -> int:
     """Return the largest number of breaks ahead of a body on a curve with this number of breaks in each lap."""
     return (LAPS_AHEAD + 3) * breaks
-
-
-def room_kept(breaks: int) -> int:
-    """Return the number of values that are kept for a curve with this number of breaks."""
-    return 4 * GAP_COLUMNS * breaks
 
 
 @Inner

@@ -23,7 +23,6 @@ from gqm_sym.runtime.legs.advance import (
     advance,
     launch,
     room_ahead,
-    room_kept,
 )
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
@@ -54,7 +53,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, SMALL_SHARE, may_be_small
-from gqm_sym.runtime.legs.gaps.data import forget_gaps
+from gqm_sym.runtime.legs.gaps.data import room_kept
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -137,12 +136,15 @@ class Track(NamedTuple):
         The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
     breaks, corners, liftoff_corners : arrays
         As in `legs.advance.Joints`.
+    keeps_blocks : bool
+        Whether data of blocks of gaps are kept, too; they pay only if many bodies have the same run-time parameters.
     """
 
     chart: Array
     breaks: Array
     corners: Array
     liftoff_corners: Array
+    keeps_blocks: bool = True
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
@@ -407,8 +409,6 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     parameters, bodies, records, what = borrowed(parameters), borrowed(bodies), borrowed(records), END_REST
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
-        if parameters.shape[0] > 1:
-            forget_gaps(joints.gaps)
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
             is_swing = question == FIRST_LEGS and not dissipation.friction
@@ -432,16 +432,17 @@ def drive_along(
     if not track.breaks.size:
         what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
         return what
-    key, kept = (dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()), NO_NUMBERS
+    chart, breaks, corners, liftoff_corners, blocks = track
+    key, kept = (dissipation, id(chart), parameters[0, : -chart.size].tobytes(), blocks), NO_NUMBERS
     if track.is_kept(dissipation):
         with _LOCK:
             found = _KEPT.pop(key, None)
-        kept = np.zeros(room_kept(track.breaks.size)) if found is None else found[0]
-    joints = Joints(*track[1:], np.empty(room_ahead(track.breaks.size)), kept)
+        kept = room_kept(breaks.size, with_blocks=blocks) if found is None else found[0]
+    joints = Joints(breaks, corners, liftoff_corners, np.empty(room_ahead(breaks.size)), kept)
     what = drive(dissipation, parameters, joints, question, bodies, records)
     if kept.size:
         with _LOCK:
-            _KEPT[key] = kept, track.chart
+            _KEPT[key] = kept, chart
             while len(_KEPT) > MAX_KEPT:
                 del _KEPT[next(iter(_KEPT))]
     return what

@@ -79,7 +79,9 @@ def conditions_of(problem: Problem) -> Conditions:
     if known is None:
         f, domain, only_sign = problem.functions, problem.domain, ONLY_SIGN[contact]
         assert f.dissipation is not None
-        track = Track(f.chart, f.joints, f.corners, f.liftoff_corners(only_sign)) if f.chart.size else SMOOTH
+        # With friction in space, a block is kept for an octave of V**2, in which one body passes it once or twice.
+        blocks = f.dissipation.linear
+        track = Track(f.chart, f.joints, f.corners, f.liftoff_corners(only_sign), blocks) if f.chart.size else SMOOTH
         has_kinks = track.has_kinks(f.dissipation)
         passes = track.is_kept(f.dissipation) or has_kinks
         given = 0.0, domain.low, domain.high, domain.period, 0.0, only_sign, inf, nan, 0.0

@@ -125,14 +125,14 @@ def sweep_with_columns(
     answers.values.fill(nan)
     answers.status.fill(quantities.UNDECIDED)
     answers.route.fill(quantities.BATCH)
-    asked = asked_of_bodies(formulas, quantity, t_max, contact)
+    asked, varies = asked_of_bodies(formulas, quantity, t_max, contact), any(array.ndim for array in given)
     if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.liftoff_corners.size:
                 continue  # tables do not contain corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
-                track = Track(group.chart, group.joints, group.corners, group.liftoff_corners)
+                track = Track(group.chart, group.joints, group.corners, group.liftoff_corners, not varies)
                 work, least = partial(answer_driven, formulas, asked, track, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 last = inf if t_max is None else as_doubles(t_max, "t_max").item()

@@ -105,7 +105,7 @@ def first_turn(height: Callable[[Any], Any], start: float, v0: float, direction:
 
     The result is None if V**2 comes so close to zero without crossing that a sample proves nothing.
     """
-    x = start + direction * np.linspace(0.0, reach, 400_001)
+    x = start + direction * np.linspace(0.0, reach, 100_001)
     w = v0**2 - 2 * G * (height(x) - height(start))
     slack = CLEAR * max(v0**2, 1.0)
     below = np.flatnonzero(w < 0)
@@ -115,7 +115,7 @@ def first_turn(height: Callable[[Any], Any], start: float, v0: float, direction:
         return None
     if not below.size:
         return math.inf if ahead[-1] > slack else None
-    if w[below[0] : below[0] + 2000].min() > -slack:
+    if w[below[0] : below[0] + 500].min() > -slack:
         return None
     lo, hi = float(x[below[0] - 1]), float(x[below[0]])
     for _ in range(60):

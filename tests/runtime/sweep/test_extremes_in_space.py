@@ -103,13 +103,13 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
     given = {"a": 0.4, "Omega": 0.7} if name == "turned_wire" else {}
     for v0 in (0.0, 0.8):
         places = np.random.default_rng(3).uniform(low, high, 6)
-        for quantity in ("normal_force_min", "normal_force_max"):
-            sweep = module.sweep(quantity, places, v0, **given)
-            assert (sweep.route < 2).all()
-            for place, value in zip(places.tolist(), sweep.values.tolist(), strict=True):
-                motion = module.solve(place, v0, 1, **given)
-                largest = motion.normal_force_max.value
-                assert abs(value - getattr(motion, quantity).value) <= 2e-13 * largest
+        swept = [module.sweep(f"normal_force_{end}", places, v0, **given) for end in ("min", "max")]
+        assert all((sweep.route < 2).all() for sweep in swept)
+        for place, least, largest in zip(places.tolist(), *(sweep.values.tolist() for sweep in swept), strict=True):
+            motion = module.solve(place, v0, 1, **given)
+            force = motion.normal_force_max.value
+            assert abs(least - motion.normal_force_min.value) <= 2e-13 * force
+            assert abs(largest - force) <= 2e-13 * force
 
 
 @pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
@@ -119,9 +119,10 @@ def test_with_friction_as_solved_motions(build: Build, name: str) -> None:
     module = build(f"{name}_extremes", curve, gqm.CoulombFriction(mu="1/20"))
     places = np.random.default_rng(4).uniform(low, high, 6)
     for t_max in (None, 1.7):
-        for quantity in ("normal_force_min", "normal_force_max"):
-            sweep = module.sweep(quantity, places, 0.0, t_max=t_max, **given)
-            assert (sweep.route == 1).all()
-            for place, value in zip(places.tolist(), sweep.values.tolist(), strict=True):
-                motion = module.solve(place, 0.0, 1, t_max=t_max, **given)
-                assert abs(value - getattr(motion, quantity).value) <= 2e-15 * motion.normal_force_max.value
+        swept = [module.sweep(f"normal_force_{end}", places, 0.0, t_max=t_max, **given) for end in ("min", "max")]
+        assert all((sweep.route == 1).all() for sweep in swept)
+        for place, least, largest in zip(places.tolist(), *(sweep.values.tolist() for sweep in swept), strict=True):
+            motion = module.solve(place, 0.0, 1, t_max=t_max, **given)
+            force = motion.normal_force_max.value
+            assert abs(least - motion.normal_force_min.value) <= 2e-15 * force
+            assert abs(largest - force) <= 2e-15 * force

@@ -18,6 +18,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     behind_gap,
     fill_gap,
     keep_range,
+    keeps_blocks,
     read_gained,
     to_time_coefficients,
     widen_bounds,
@@ -101,11 +102,13 @@ def fill_block(forces, route, upcoming, v, contact_sign, to, work):  # type: ign
 @Inner
 def kept_block(forces, route, upcoming, v, contact_sign, work):  # type: ignore[no-untyped-def]
     """Return the position of the data kept of the block of gaps ahead of the break at ``upcoming``, which are filled in
-    if they are not known yet; -1 if no block begins there, or it contains the end of the route or of a lap.
+    if they are not known yet; -1 if none are kept, no block begins there, or it contains the end of the route or of a
+    lap.
     """
     gap = gap_behind(route, upcoming, v)
     first = gap if v > 0 else gap + 1 - BLOCK
-    if first % BLOCK != 0 or first + BLOCK > route.all_breaks.size or upcoming + BLOCK >= route.breaks.size:
+    is_whole = first % BLOCK == 0 and first + BLOCK <= route.all_breaks.size and upcoming + BLOCK < route.breaks.size
+    if not is_whole or not keeps_blocks(route.gaps):
         return -1
     at = place_of_data(gap, v, contact_sign) + FIRST_OF_BLOCK
     if route.gaps[at] == 0.0:

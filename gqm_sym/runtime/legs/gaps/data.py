@@ -9,6 +9,7 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
+from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     AT_REST,
@@ -170,11 +171,19 @@ def is_square_kept(gaps, at, work):  # type: ignore[no-untyped-def]
     return is_resolved
 
 
+def room_kept(breaks: int, *, with_blocks: bool = True) -> Array:
+    """Return room for the data kept of a curve with so many breaks; blocks of gaps are kept only if that is asked for,
+    because they pay only if many bodies pass them.
+    """
+    room = np.zeros(4 * GAP_COLUMNS * breaks + 1)
+    room[-1] = 0.0 if with_blocks else REFUSED
+    return room
+
+
 @Inner
-def forget_gaps(gaps):  # type: ignore[no-untyped-def]
-    """Forget the data kept of all gaps and blocks."""
-    gaps[::GAP_COLUMNS] = 0.0
-    gaps[FIRST_OF_BLOCK::GAP_COLUMNS] = 0.0
+def keeps_blocks(gaps):  # type: ignore[no-untyped-def]
+    """Return whether data of blocks are kept."""
+    return gaps[gaps.size - 1] != REFUSED
 
 
 @Inner

@@ -29,7 +29,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     Bounds,
     lengths_on,
 )
-from gqm_sym.runtime.legs.panels.few_nodes import pass_few
+from gqm_sym.runtime.legs.panels.few_nodes import few_buffer, pass_few
 from gqm_sym.runtime.legs.panels.polynomials import LEBESGUE
 
 # The line of an octave: a number that identifies it, and whether it is FILLED or REFUSED; bounds of V**2 on the block
@@ -84,11 +84,11 @@ def follow_bodies(bodies, v, gaps, first, work):  # type: ignore[no-untyped-def]
     """Pass a block with some bodies, the first and the last of which are given; return whether that is possible, and
     1 + E of the last one at the end, roughly.
     """
-    undamped = 1.0
+    undamped, few = 1.0, few_buffer()
     for gap in range(BLOCK):
         at = first + v * 4 * GAP_COLUMNS * gap + FIRST_OF_FEW
         for k in range(bodies[0], bodies[1] + 1):
-            passed, begin = pass_few(work[SO_FAR + k], gaps, at), work[BEGIN + k]
+            passed, begin = pass_few(work[SO_FAR + k], gaps, at, few), work[BEGIN + k]
             if not (passed.time > 0.0 and passed.end >= LEAST_RATIO * begin):
                 return False, undamped
             work[LOWEST + k] = min(work[LOWEST + k], passed.low - begin)

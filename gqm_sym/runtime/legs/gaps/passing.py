@@ -81,14 +81,14 @@ from gqm_sym.runtime.legs.panels.equation import (
     root_row,
     time_rate_row,
 )
-from gqm_sym.runtime.legs.panels.few_nodes import pass_few
+from gqm_sym.runtime.legs.panels.few_nodes import SQUARED, V2, few_buffer, pass_few, rises
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
     FAR_FROM_ZERO_RATIO,
     examine,
     keeps_sign,
 )
-from gqm_sym.runtime.legs.runs.route import CurveAhead
+from gqm_sym.runtime.legs.runs.route import CurveAhead, Reading, Route
 
 # The ratio of V**2 to the largest V**2 so far above which gaps are passed by kept data. Near a turn a rounding of the
 # largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
@@ -187,21 +187,24 @@ def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def pass_gap(forces, reading, v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
+def pass_gap(forces, reading, v2, contact_sign, kept, gaps, has_next, work):  # type: ignore[no-untyped-def]
     """Return what `pass_by_rows` does, by powers or few nodes if that is possible and rows are not read; and whether
     they are.
+
+    ``kept`` is what `kept_gap` returns. If there is a next gap (``has_next``), an extreme at the end is left to that.
     """
-    time, lost, reads = nan, 0.0, reading.what == PEAKS
-    end, bounds = nan, Bounds(0.0, inf, 0.0, inf)
+    time, lost, reads, few, rises_to_end = nan, 0.0, reading.what == PEAKS, few_buffer(), False
+    (at, width), end, bounds = kept, nan, Bounds(0.0, inf, 0.0, inf)
     if forces.linear:
         time, end, bounds = pass_by_powers(v2, contact_sign, gaps, at)
         lost = gaps[at + END_EXPM1]
     elif gaps[at] == FILLED and gaps[at + WITH_FEW] > 0.0:
-        time, end, low, high, lost = pass_few(v2, gaps, at + FIRST_OF_FEW)
-        bounds = lengths_on(gaps, at, max(low, 0.0), high)
+        time, end, low, high, lost, least, most = pass_few(v2, gaps, at + FIRST_OF_FEW, few)
+        bounds = Bounds(max(low, 0.0), high, sqrt(max(least, 0.0)), sqrt(most))
+        rises_to_end = reads and has_next and time > 0.0 and rises(few, SQUARED if reading.force else V2, reading.sign)
     if forces.linear and reads and time > 0.0 and reading.length:
         bounds = lengths_on(gaps, at, bounds.least_v2, bounds.most_v2)
-    top, has_values = bounds.most_v2, reads and not (time > 0.0 and not may_be_peak(reading, bounds))
+    top, has_values = bounds.most_v2, reads and not (time > 0.0 and (rises_to_end or not may_be_peak(reading, bounds)))
     if has_values or not time > 0.0:
         time, end, top, lost = pass_by_rows(forces, v2, contact_sign, width, gaps, at, work)
     if has_values and not forces.linear and time > 0.0:
@@ -273,11 +276,23 @@ def pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work):  # typ
     time, end, top, lost = pass_block(forces, route, v2, v, contact_sign, upcoming, work)
     if time > 0.0 and not is_read_inside(route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)):
         return Passed(BLOCK, time, end, top, lost, False, 0)
-    at, width = kept_gap(forces, route, upcoming, v, contact_sign, work)
-    time, end, top, lost, has_values = pass_gap(forces, route.reading, v2, contact_sign, width, route.gaps, at, work)
+    kept, has_next = kept_gap(forces, route, upcoming, v, contact_sign, work), upcoming + 2 < breaks.size
+    time, end, top, lost, has_values = pass_gap(
+        forces, route.reading, v2, contact_sign, kept, route.gaps, has_next, work
+    )
     places, times = (breaks[upcoming], breaks[upcoming + 1]), (spent, spent + time)
     count = 1 if time > 0.0 and not is_read_inside(route, places, times) else 0
-    return Passed(count, time, end, top, lost, has_values, at)
+    return Passed(count, time, end, top, lost, has_values, kept[0])
+
+
+@Inner
+def with_better(route, work):  # type: ignore[no-untyped-def]
+    """Return a route on which only what exceeds the values in the rows SPEED and MEAN is sought."""
+    breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, all_breaks, period = route
+    low, high = extent(work, MEAN if reading.force else SPEED)
+    best = max(reading.best, high if reading.sign > 0.0 else -low)
+    reading = Reading(reading.what, reading.force, reading.length, reading.sign, best)
+    return Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, all_breaks, period)
 
 
 @Inner
@@ -310,6 +325,8 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
+            if not forces.linear:
+                route = with_better(route, work)
         record[to + RIGHT], record[to + TIME] = marched(run_length, march), total + total_low
         record[to + TIME_ERROR], may_join = NO_RATES if has_values else NO_VALUES, not has_values
         to += COLUMNS if has_values else 0

@@ -9,7 +9,7 @@ linearly. Bounds of all this are tested, and longer parts have more nodes (`solv
 Time is the integral of ``ds/sqrt(W)`` by a Gauss-Legendre rule with 8 nodes, from the polynomial W.
 """
 
-from math import fabs, nan, sqrt
+from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -56,10 +56,11 @@ to_few = multiply((_series_at(2.0 * ENDS - 1.0, FEW) @ TO_COEFFICIENTS[:FEW]).T)
 to_few_gauss = multiply((_series_at(GAUSS_NODES, FEW) @ TO_COEFFICIENTS[:FEW]).T)
 
 # From the values at few nodes: the integrals from the start in units of the width, the last two Chebyshev coefficients,
-# and the values at the nodes of the integral of time; from the values there, the mean and the last two Legendre
+# slopes, and the values at the nodes of the integral of time; from the values there, the mean and the last two Legendre
 # coefficients.
 to_integrals = multiply((ENDS[:, None] * _MEANS).T)
 to_last = multiply(_FEW_COEFFICIENTS[-2:].T)
+to_slopes = multiply((_series_at(2.0 * ENDS - 1.0, FEW - 1) @ np.polynomial.chebyshev.chebder(_FEW_COEFFICIENTS)).T)
 to_gauss = multiply((_series_at(GAUSS_NODES, FEW) @ _FEW_COEFFICIENTS).T)
 _LEGENDRE = np.polynomial.legendre.legvander(GAUSS_NODES, FEW) * GAUSS_WEIGHTS[:, None]
 to_mean = multiply(_LEGENDRE[:, [0, FEW - 1, FEW]] * (np.array([0, FEW - 1, FEW]) + 0.5))
@@ -120,6 +121,8 @@ class Passed(NamedTuple):
         V**2 at its end, and bounds of V**2.
     lost : float
         exp(q) - 1 at the end, where q contains the effect of V**2 on friction.
+    least_square, most_square : float
+        Bounds of the square of the contact force per mass.
     """
 
     time: float
@@ -127,6 +130,8 @@ class Passed(NamedTuple):
     low: float
     high: float
     lost: float
+    least_square: float
+    most_square: float
 
 
 @Inner
@@ -197,9 +202,26 @@ def keep_few(width, direction, work, gaps, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def pass_few(v2, gaps, at):  # type: ignore[no-untyped-def]
-    """Return the passage of a part, at whose start V**2 is ``v2``, by the rows kept from ``gaps[at]`` on."""
-    few = few_buffer()
+def widened(low, high):  # type: ignore[no-untyped-def]
+    """Return bounds of a polynomial whose values at the nodes are between two numbers."""
+    beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
+    return low - beyond, high + beyond
+
+
+@Inner
+def rises(few, row, sign):  # type: ignore[no-untyped-def]
+    """Return whether the function with the sign ``sign`` is proved to increase all over the part."""
+    to_slopes(few, row, few, TERM)
+    low, high = extent(few, TERM)
+    low, high = widened(low, high)
+    return low > 0.0 if sign > 0.0 else high < 0.0
+
+
+@Inner
+def pass_few(v2, gaps, at, few):  # type: ignore[no-untyped-def]
+    """Return the passage of a part, at whose start V**2 is ``v2``, by the rows kept from ``gaps[at]`` on; ``few`` is a
+    `few_buffer`, and gets the rows V2 and SQUARED.
+    """
     for row in range(0, ROOM_FOR_FEW, LANES):
         copy(few, row, gaps, at + row)
     length = sqrt(few[SQUARE] + v2 * (few[SQUARE_1] + v2 * few[SQUARE_2]))
@@ -227,12 +249,14 @@ def pass_few(v2, gaps, at):  # type: ignore[no-untyped-def]
     to_last(few, TERM, few, LAST)
     is_short = fabs(few[LAST]) <= MAX_TAIL_BEFORE * low and fabs(few[LAST + 1]) <= MAX_TAIL * low
     if not (is_solved and is_short and low > 0.0):
-        return Passed(nan, end, low, high, 0.0)
+        return Passed(nan, end, low, high, 0.0, 0.0, inf)
     to_gauss(few, V2, few, TERM)
     time_rate_row(few, RATE, LENGTHS, TERM)
     to_mean(few, RATE, few, LAST)
     is_resolved = max(fabs(few[LAST + 1]), fabs(few[LAST + 2])) <= MAX_TAIL_OF_RATE * few[LAST]
-    low, high = min(low, v2), max(high, v2)
-    beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
+    low, high = widened(min(low, v2), max(high, v2))
+    square_row(few, SQUARED, SQUARE, SQUARE_1, SQUARE_2, V2)
+    least, most = extent(few, SQUARED)
+    least, most = widened(min(least, length * length), max(most, length * length))
     lost = few[EVEN + FEW] - 1.0 + few[ODD + FEW]
-    return Passed(few[LAST] if is_resolved else nan, end, low - beyond, high + beyond, lost)
+    return Passed(few[LAST] if is_resolved else nan, end, low, high, lost, least, most)

@@ -1,6 +1,7 @@
 """V**2 and the time on short parts agree with solutions of the law in 25 digits, on a part alone and along a track."""
 
-from pathlib import Path
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numba
@@ -10,8 +11,9 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.runtime.legs.panels import equation as rows
-from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, keep_few, pass_few
+from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, few_buffer, keep_few, pass_few
 from gqm_sym.runtime.legs.panels.polynomials import ENDS_BY_NODE, WIDE
+from gqm_sym.runtime.model import CompiledModel
 
 ULP = 2.0**-52
 
@@ -25,7 +27,7 @@ def kept(width: float, direction: int, work: Any, data: Any) -> bool:
 @numba.njit
 def passed(v2: float, data: Any) -> Any:
     """Pass the part that is kept from the second number on."""
-    return pass_few(v2, data, 1)
+    return pass_few(v2, data, 1, few_buffer())
 
 
 def law(place: Any, lib: Any) -> dict[str, Any]:
@@ -110,25 +112,48 @@ def next_turn(start: Any) -> tuple[Any, Any]:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the modules."""
-    return tmp_path_factory.mktemp("rings")
+def rings(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], CompiledModel]:
+    """Return the circle with friction, put together from some pieces."""
+    folder = tmp_path_factory.mktemp("rings")
+
+    @cache
+    def built(pieces: int) -> CompiledModel:
+        parts = [gqm.transition(length=f"2*pi/{pieces}", yaw=1) for _ in range(pieces)]
+        curve = gqm.Curve.piecewise(parts, start=(0, 0, 0), heading=(0, 0, "pi/6"), closed=True)
+        forces = gqm.Gravity() + gqm.CoulombFriction()
+        return gqm.build(gqm.derive(curve, forces), name=f"ring_of_{pieces}", folder=folder)
+
+    return built
 
 
 @pytest.mark.parametrize(("pieces", "amplitude"), [(80, 0.18), (80, 0.21), (80, 0.55), (8, 0.55), (8, 1.1)])
-def test_times_to_rest_on_a_tilted_circle(pieces: int, amplitude: float, folder: Path) -> None:
+def test_times_to_rest_on_a_tilted_circle(pieces: int, amplitude: float, rings: Callable[[int], CompiledModel]) -> None:
     """Legs along some short pieces, on which V**2 is far from linear, and along many; and turns sought on parts of long
     pieces.
     """
-    parts = [gqm.transition(length=f"2*pi/{pieces}", yaw=1) for _ in range(pieces)]
-    curve = gqm.Curve.piecewise(parts, start=(0, 0, 0), heading=(0, 0, "pi/6"), closed=True)
-    forces = gqm.Gravity() + gqm.CoulombFriction()
-    ring = gqm.build(gqm.derive(curve, forces), name=f"ring_of_{pieces}", folder=folder)
     launch = np.pi - amplitude
     with mp.workdps(18):
         place, time = mp.pi - mpf(launch), mpf(0)
         while ALONG * abs(mp.sin(place)) > MU * mp.hypot(ALONG * mp.cos(place), ACROSS):
             place, more = next_turn(place)
             time += more
-    swept = ring.sweep("t_end", launch, 0.0, mu=0.05, g=9.81).values
+    swept = rings(pieces).sweep("t_end", launch, 0.0, mu=0.05, g=9.81).values
     np.testing.assert_allclose(swept, float(time), rtol=2e-14)
+
+
+def test_peaks_on_a_tilted_circle(rings: Callable[[int], CompiledModel]) -> None:
+    """The largest speed and contact force are found on the pieces on which they are, up to which both increase."""
+    launch = np.pi - 0.55
+    with mp.workdps(18):
+        start = mp.pi - mpf(launch)
+        w = mp.odefun(lambda d, w: [-slope_on_circle(1, start - d, w[0])], 0, [mpf(0)])
+        fastest = mp.findroot(lambda d: slope_on_circle(1, start - d, w(d)[0]), (start - 0.11, start - 0.1))
+        heaviest = mp.findroot(
+            lambda d: ALONG * mp.sin(start - d) - slope_on_circle(1, start - d, w(d)[0]), (start - 0.08, start - 0.07)
+        )
+        speed = mp.sqrt(w(fastest)[0])
+        force = mp.hypot(w(heaviest)[0] + ALONG * mp.cos(start - heaviest), ACROSS)
+    given = {"mu": 0.05, "g": 9.81, "t_max": 10.0}
+    ring = rings(80)
+    np.testing.assert_allclose(ring.sweep("v_max", launch, 0.0, **given).values, float(speed), rtol=1e-15)
+    np.testing.assert_allclose(ring.sweep("normal_force_max", launch, 0.0, **given).values, float(force), rtol=1e-15)

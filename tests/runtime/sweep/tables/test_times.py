@@ -269,7 +269,7 @@ def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None
         "sampled": gqm.Curve.sampled(np.column_stack([x, 0.5 * x * x + 0.01 * np.cos(3 * x)])),
     }[kind]
     module = gqm.build(gqm.derive(curve, gqm.Gravity() + gqm.RotatingFrame()), name=f"shared_{kind}", folder=tmp_path)
-    rng, count = np.random.default_rng(7), 24
+    rng, count = np.random.default_rng(7), 12
     middle = module.equilibria(Omega=0.3)[-1].lam
     given = {"g": rng.uniform(5, 20, count), "Omega": rng.uniform(-0.9, 0.9, count), "m": rng.uniform(0.5, 2, count)}
     launch = (middle + rng.uniform(-0.9, 0.9, count), rng.uniform(0, 1.5, count) * (rng.random(count) < 0.5))
