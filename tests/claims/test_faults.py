@@ -54,7 +54,7 @@ def python(
 
 # What the commands import takes a second or two, so the processes that are interrupted or killed begin with it.
 FORKING = """
-import json, os, sys
+import json, os, sys, tempfile
 import matplotlib.backends.backend_svg
 import gqm_sym as gqm, gqm_sym.cli.gen, gqm_sym.cli.tool, gqm_sym.figures, gqm_sym.report, gqm_sym.specfile
 gqm.emit(gqm.derive(gqm.Curve.graph("sin(x)"), gqm.Gravity()), name="first")
@@ -63,6 +63,7 @@ for line in sys.stdin:
     child = os.fork()
     if child == 0:
         os.environ.update(environment)
+        tempfile.tempdir = None  # as it is in a fresh process, so that TMPDIR is read
         for path, number in ((out, 1), (err, 2)):
             os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
         sys.argv[1:] = arguments
