@@ -250,6 +250,7 @@ def _operations() -> dict[Any, Callable[..., Any]]:
     return operations | {
         float: np.float64,
         math.fabs: abs,
+        math.frexp: _mantissa_and_exponent,
         math.floor: lambda x: int(np.floor(x)),
         math.ceil: lambda x: int(np.ceil(x)),
         math.isfinite: np.isfinite,
@@ -262,6 +263,11 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         intrinsics.from_bits: lambda n: np.uint64(n % 2**64).view(np.float64),
         intrinsics.choose: lambda condition, x, y: np.float64(x if condition else y),
     }
+
+
+def _mantissa_and_exponent(x: Any) -> tuple[Any, int]:
+    mantissa, exponent = math.frexp(x)
+    return np.float64(mantissa), exponent
 
 
 def _is_integer(node: ast.expr) -> bool:

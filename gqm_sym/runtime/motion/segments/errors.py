@@ -25,8 +25,9 @@ CHART_ROUNDINGS, CENTRE_ROUNDINGS, SLOPE_SAMPLES = 8.0, 4.0, 16
 # The error of a place due to the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
 
-# The share of a segment by which places lie aside of its ends, where its tangents are taken.
-TANGENT_SHARE = 1e-3
+# The share of a segment by which places lie aside of its ends, from which its tangents are taken. With a smaller one,
+# tangents at the ends of a tiny segment would be rounding.
+TANGENT_SHARE = 2.0**-4
 
 # The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
 MAX_SLOPES = (0.5, 2.0, 1.0)
