@@ -112,11 +112,11 @@ class PeriodicMotion(PeriodicTimes):
         shares = 2.0 * found if swings and quantity == "period" else found
         return dict(zip(rows, shares.tolist(), strict=True))
 
-    @locked
     def _is_turn(self, place: float) -> bool:
         turns = self.turning_points if self.kind == "libration" else ()
         return any(abs(place - turn) <= ULP * abs(turn) for turn in turns)
 
+    @locked
     def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
         return second_gradient(self._derivatives, self, quantity, wrt)
 

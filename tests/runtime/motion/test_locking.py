@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
+from gqm_sym.runtime.motion import periodic
 from gqm_sym.runtime.motion.locking import computed_once, lock_of
 
 ModuleOf = Callable[[str], ModuleType]
@@ -97,6 +98,23 @@ def test_all_threads_get_the_same_lock(module_named: ModuleOf) -> None:
 
         with ThreadPoolExecutor(THREADS) as pool:
             assert len(set(pool.map(lock, range(THREADS)))) == 1
+
+
+@pytest.mark.parametrize(("quantity", "order"), [("turning_points", 1), ("half_period", 2)])
+def test_no_other_thread_has_the_lock_while_derivatives_are_computed(
+    quantity: str, order: int, module_named: ModuleOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The derivatives of an orbit are computed once, for all threads (the lock of the second ones was lost)."""
+    motion, taken = module_named("pendulum").solve(1, L=1), list[bool]()
+
+    def spy(*_: Any) -> dict[str, Any]:
+        with ThreadPoolExecutor(1) as pool:
+            taken.append(pool.submit(lock_of(motion).acquire, blocking=False).result(60.0))
+        return {}
+
+    monkeypatch.setattr(periodic, "gradient" if order == 1 else "second_gradient", spy)
+    assert motion.gradient(quantity, order=order) == {}
+    assert taken == [False]
 
 
 def test_a_motion_is_copied_while_it_answers(module_named: ModuleOf) -> None:
