@@ -171,7 +171,7 @@ def is_square_kept(gaps, at, work):  # type: ignore[no-untyped-def]
     return is_resolved
 
 
-def room_kept(breaks: int, *, with_blocks: bool = True) -> Array:
+def room_kept(breaks: int, *, with_blocks: bool) -> Array:
     """Return room for the data kept of a curve with so many breaks; blocks of gaps are kept only if that is asked for,
     because they pay only if many bodies pass them.
     """

@@ -29,8 +29,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     Bounds,
     lengths_on,
 )
-from gqm_sym.runtime.legs.panels.few_nodes import few_buffer, pass_few
-from gqm_sym.runtime.legs.panels.polynomials import LEBESGUE
+from gqm_sym.runtime.legs.panels.few_nodes import few_buffer, pass_few, widened
 
 # The line of an octave: a number that identifies it, and whether it is FILLED or REFUSED; bounds of V**2 on the block
 # less w; exp(q) - 1 at the end, roughly; and the coefficients for the relative change of V**2 and for the time.
@@ -145,10 +144,9 @@ def fill_octave(half, v, gaps, first, to):  # type: ignore[no-untyped-def]
     if not (to_polynomial(SPENT, time_size, work, gaps, to + TIMES_IN_UNITS) and is_fine):
         return
     gaps[to + LOST_ON_BLOCK] = undamped - 1.0
-    low, high = extent(work, LOWEST), extent(work, HIGHEST)
-    beyond = 0.5 * (LEBESGUE - 1.0)
-    gaps[to + LOW_CHANGE] = low[0] - beyond * (low[1] - low[0])
-    gaps[to + HIGH_CHANGE] = high[1] + beyond * (high[1] - high[0])
+    lowest, highest = extent(work, LOWEST), extent(work, HIGHEST)
+    gaps[to + LOW_CHANGE], _ = widened(lowest[0], lowest[1])
+    _, gaps[to + HIGH_CHANGE] = widened(highest[0], highest[1])
     gaps[to + STATE_OF_OCTAVE] = FILLED
 
 

@@ -311,7 +311,7 @@ class Positions(ChecksArguments, ABC):
         """
         state, launch = self.state(t), self.state(0.0)
         formulas, p = self.problem.formulas, self.problem.p
-        mass = float(p.values[list(formulas.parameters).index("m")])
+        mass = self.problem.functions.mass
         inertia = 1.0 if formulas.inertia is None else float(formulas.inertia(FLOATS, p.values.tolist()))
         potential = Potential(formulas, p)
 

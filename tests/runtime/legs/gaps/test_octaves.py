@@ -8,13 +8,11 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from mpmath import mp, mpf
+from friction_in_space import panel, solution
 
 from gqm_sym.runtime.legs.gaps import octaves
 from gqm_sym.runtime.legs.gaps.data import BLOCK, FILLED, FIRST_OF_BLOCK, FIRST_OF_FEW, GAP_COLUMNS
-from gqm_sym.runtime.legs.panels import equation as rows
 from gqm_sym.runtime.legs.panels.few_nodes import keep_few
-from gqm_sym.runtime.legs.panels.polynomials import ENDS_BY_NODE, WIDE
 
 ULP, WIDTH = 2.0**-52, 2.0**-6
 
@@ -32,43 +30,12 @@ def passed(v2: float, direction: int, gaps: Any, first: int) -> Any:
     return time, end, bounds.least_v2, bounds.most_v2
 
 
-def law(place: Any, lib: Any) -> dict[str, Any]:
-    """Return P, Q and f of a law, and the coefficients of the square of the contact force."""
-    return {
-        "PLAIN_P": 9.75 * lib.sin(0.25 + place),
-        "PLAIN_Q": 0.125 * lib.cos(place),
-        "RUBBING": 0.125 + 0.0625 * place,
-        "AT_REST": 80 + 24 * lib.sin(place),
-        "MIXED": 11 * lib.cos(2 * place),
-        "TURNING": 0.5 + 0.5 * place,
-        "DS": 1 + 0.25 * place,
-    }
-
-
-def truth(direction: int, v2: float) -> Any:
-    """Return V**2 at the end of the block, and the time."""
-
-    def slopes(d: Any, y: Any) -> Any:
-        at = law(direction * d, mp)
-        load = mp.sqrt(at["AT_REST"] + y[0] * (at["MIXED"] + y[0] * at["TURNING"]))
-        slope = direction * (at["PLAIN_P"] - at["PLAIN_Q"] * y[0]) - at["RUBBING"] * load
-        return [slope, at["DS"] / mp.sqrt(y[0])]
-
-    with mp.workdps(20):
-        return mp.odefun(slopes, 0, [mpf(v2), mpf(0)])(mpf(BLOCK * WIDTH))
-
-
 @cache
 def block(direction: int) -> tuple[np.ndarray, int]:
     """Return the data kept of a block, and where those of its first gap begin."""
     gaps, first = np.zeros(4 * BLOCK * GAP_COLUMNS), 0 if direction > 0 else 4 * (BLOCK - 1) * GAP_COLUMNS
     for k in range(BLOCK):
-        work = np.zeros(30 * WIDE)
-        for name, values in {"N0": 1.0, **law(direction * WIDTH * (k + ENDS_BY_NODE), np)}.items():
-            at = getattr(rows, name)
-            # The factor of friction has the sign of the direction.
-            work[at : at + WIDE] = values * (direction if name == "RUBBING" else 1)
-        assert kept(direction, work, gaps, first + 4 * direction * k * GAP_COLUMNS)
+        assert kept(direction, panel(WIDTH, direction, k), gaps, first + 4 * direction * k * GAP_COLUMNS)
     gaps[first + FIRST_OF_BLOCK] = FILLED
     return gaps, first
 
@@ -78,7 +45,7 @@ def block(direction: int) -> tuple[np.ndarray, int]:
 def test_a_block(direction: int, v2: float) -> None:
     """The rounding errors are those of the result, also at the ends of an octave."""
     time, end, low, high = passed(v2, direction, *block(direction))
-    true_end, true_time = truth(direction, v2)
+    true_end, true_time = solution(BLOCK * WIDTH, direction, v2, 20)
     assert abs(end - true_end) <= 2 * ULP * max(v2, end)
     assert abs(time - true_time) <= 2 * ULP * true_time
     assert low <= min(v2, true_end) <= max(v2, true_end) <= high

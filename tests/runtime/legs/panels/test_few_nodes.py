@@ -7,12 +7,11 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from friction_in_space import panel, solution
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime.legs.panels import equation as rows
 from gqm_sym.runtime.legs.panels.few_nodes import ROOM_FOR_FEW, few_buffer, keep_few, pass_few
-from gqm_sym.runtime.legs.panels.polynomials import ENDS_BY_NODE, WIDE
 from gqm_sym.runtime.model import CompiledModel
 
 ULP = 2.0**-52
@@ -30,50 +29,13 @@ def passed(v2: float, data: Any) -> Any:
     return pass_few(v2, data, 1, few_buffer())
 
 
-def law(place: Any, lib: Any) -> dict[str, Any]:
-    """Return P, Q and f of a law, and the coefficients of the square of the contact force."""
-    return {
-        "PLAIN_P": 9.75 * lib.sin(0.25 + place),
-        "PLAIN_Q": 0.125 * lib.cos(place),
-        "RUBBING": 0.125 + 0.0625 * place,
-        "AT_REST": 80 + 24 * lib.sin(place),
-        "MIXED": 11 * lib.cos(2 * place),
-        "TURNING": 0.5 + 0.5 * place,
-        "DS": 1 + 0.25 * place,
-    }
-
-
-def panel(width: float, direction: int) -> np.ndarray:
-    """Return the rows of a panel."""
-    work = np.zeros(30 * WIDE)
-    given = {"N0": 1.0, **law(direction * width * ENDS_BY_NODE, np)}
-    for name, values in given.items():
-        at = getattr(rows, name)
-        # The factor of friction has the sign of the direction.
-        work[at : at + WIDE] = values * (direction if name == "RUBBING" else 1)
-    return work
-
-
-def truth(width: float, direction: int, v2: float) -> Any:
-    """Return V**2 at the end of a part, and the time."""
-
-    def slopes(d: Any, y: Any) -> Any:
-        at = law(direction * d, mp)
-        load = mp.sqrt(at["AT_REST"] + y[0] * (at["MIXED"] + y[0] * at["TURNING"]))
-        slope = direction * (at["PLAIN_P"] - at["PLAIN_Q"] * y[0]) - at["RUBBING"] * load
-        return [slope, at["DS"] / mp.sqrt(y[0])]
-
-    with mp.workdps(25):
-        return mp.odefun(slopes, 0, [mpf(v2), mpf(0)])(mpf(width))
-
-
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("v2", [3.0, 7.5, 40.0])
 def test_a_part(direction: int, v2: float) -> None:
     """The rounding errors are those of the result."""
     data, width = np.zeros(1 + ROOM_FOR_FEW), 0.03125
     assert kept(width, direction, panel(width, direction), data)
-    found, (end, time) = passed(v2, data), truth(width, direction, v2)
+    found, (end, time) = passed(v2, data), solution(width, direction, v2, 25)
     assert abs(found.end - end) <= ULP * end
     assert abs(found.time - time) <= 2 * ULP * time
     assert found.low <= min(v2, end) <= max(v2, end) <= found.high
