@@ -88,7 +88,7 @@ from gqm_sym.runtime.legs.panels.resolution import (
     examine,
     keeps_sign,
 )
-from gqm_sym.runtime.legs.runs.route import CurveAhead, Reading, Route
+from gqm_sym.runtime.legs.runs.route import CurveAhead, Reading
 
 # The ratio of V**2 to the largest V**2 so far above which gaps are passed by kept data. Near a turn a rounding of the
 # largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
@@ -214,7 +214,7 @@ def pass_gap(forces, reading, v2, contact_sign, kept, gaps, has_next, work):  # 
 
 
 @Inner
-def pass_block(forces, route, v2, v, contact_sign, upcoming, work):  # type: ignore[no-untyped-def]
+def pass_block(forces, route, reading, v2, v, contact_sign, upcoming, work):  # type: ignore[no-untyped-def]
     """Return the time over the block ahead of the break at ``upcoming``, V**2 at its end, the largest V**2 on it, and E
     at its end; the time is NaN if there is no such block, it cannot be passed as one, or it has to be read.
     """
@@ -226,10 +226,10 @@ def pass_block(forces, route, v2, v, contact_sign, upcoming, work):  # type: ign
         lost = route.gaps[at + END_EXPM1]
     else:
         time, end, bounds, lost = pass_by_octave(v2, v, route.gaps, at - FIRST_OF_BLOCK)
-    if route.reading.what == PEAKS and time > 0.0:
-        if route.reading.length:
+    if reading.what == PEAKS and time > 0.0:
+        if reading.length:
             bounds = lengths_on(route.gaps, at, bounds.least_v2, bounds.most_v2)
-        time = nan if may_be_peak(route.reading, bounds) else time
+        time = nan if may_be_peak(reading, bounds) else time
     return time, end, bounds.most_v2, lost
 
 
@@ -270,36 +270,46 @@ class Passed(NamedTuple):
 
 
 @Inner
-def pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work):  # type: ignore[no-untyped-def]
-    """Pass the block ahead of the break at ``upcoming``, or the gap; ``spent`` is the time up to there."""
-    breaks = route.breaks
-    time, end, top, lost = pass_block(forces, route, v2, v, contact_sign, upcoming, work)
+def pass_next(forces, route, reading, body, upcoming, spent, work):  # type: ignore[no-untyped-def]
+    """Pass the block ahead of the break at ``upcoming``, or the gap.
+
+    Parameters
+    ----------
+    forces, route, work
+        As for `pass_gaps`.
+    reading : Reading
+        What is read from the record.
+    body : (float, int, int)
+        V**2, the direction of motion, and the sign of N.
+    upcoming : int
+        The index of the break.
+    spent : float
+        The time up to there.
+    """
+    breaks, (v2, v, contact_sign) = route.breaks, body
+    time, end, top, lost = pass_block(forces, route, reading, v2, v, contact_sign, upcoming, work)
     if time > 0.0 and not is_read_inside(route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)):
         return Passed(BLOCK, time, end, top, lost, False, 0)
     kept, has_next = kept_gap(forces, route, upcoming, v, contact_sign, work), upcoming + 2 < breaks.size
-    time, end, top, lost, has_values = pass_gap(
-        forces, route.reading, v2, contact_sign, kept, route.gaps, has_next, work
-    )
+    time, end, top, lost, has_values = pass_gap(forces, reading, v2, contact_sign, kept, route.gaps, has_next, work)
     places, times = (breaks[upcoming], breaks[upcoming + 1]), (spent, spent + time)
     count = 1 if time > 0.0 and not is_read_inside(route, places, times) else 0
     return Passed(count, time, end, top, lost, has_values, kept[0])
 
 
 @Inner
-def with_better(route, work):  # type: ignore[no-untyped-def]
-    """Return a route on which only what exceeds the values in the rows SPEED and MEAN is sought."""
-    breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, all_breaks, period = route
+def with_better(reading, work):  # type: ignore[no-untyped-def]
+    """Return a reading that seeks only what exceeds the values in the rows SPEED and MEAN."""
     low, high = extent(work, MEAN if reading.force else SPEED)
     best = max(reading.best, high if reading.sign > 0.0 else -low)
-    reading = Reading(reading.what, reading.force, reading.length, reading.sign, best)
-    return Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, all_breaks, period)
+    return Reading(reading.what, reading.force, reading.length, reading.sign, best)
 
 
 @Inner
 def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
     """Pass gaps from the break ahead on, as long as V**2 is large and follows from the kept data."""
     (left, run_length, v2, largest_v2, ahead, count), v, spent = before, march.direction, 0.0
-    breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
+    breaks, gaps, reading, upcoming = route.breaks, route.gaps, route.reading, ahead.upcoming
     to, total, total_low, may_join = HEAD + count * COLUMNS, 0.0, 0.0, False
     for k in range(count):
         spent += record[HEAD + k * COLUMNS + TIME]
@@ -308,7 +318,7 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         is_ahead = offset(breaks[upcoming], march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
-        passed = pass_next(forces, route, v2, v, contact_sign, upcoming, spent, work)
+        passed = pass_next(forces, route, reading, (v2, v, contact_sign), upcoming, spent, work)
         if passed.gap_count == 0:
             break
         time, has_values = passed.time, passed.has_values
@@ -320,13 +330,13 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         total, rounding = two_sum(total if may_join and not has_values else 0.0, time)
         total_low = rounding + (total_low if may_join and not has_values else 0.0)
         if has_values:
-            if route.reading.length:
+            if reading.length:
                 fill_length_on_gap(gaps, passed.at, work)
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
             if not forces.linear:
-                route = with_better(route, work)
+                reading = with_better(reading, work)
         record[to + RIGHT], record[to + TIME] = marched(run_length, march), total + total_low
         record[to + TIME_ERROR], may_join = NO_RATES if has_values else NO_VALUES, not has_values
         to += COLUMNS if has_values else 0
