@@ -128,6 +128,7 @@ TESTED_THROUGH = {
     "gradients/lanes/programs.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/lanes/vectors.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/orbit.py": "runtime/gradients/test_quantities.py",
+    "gradients/panels.py": "runtime/gradients/test_sensitivity.py",
     "gradients/path.py": "runtime/gradients/test_sensitivity.py",
     "gradients/programs.py": "runtime/gradients/test_quantities.py",
     "gradients/second_programs.py": "runtime/gradients/test_seconds.py",
