@@ -150,7 +150,14 @@ space_roll: type[SpaceFunction] = SPACE_ROWS[ROLL][0]
 """The roll angle."""
 MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for order in range(3))
 """The mean height of a train with its derivatives, by the place of its middle."""
-SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {**SPACE_ROWS, "h": MEAN_HEIGHT}
+MEAN_PARTS: tuple[tuple[type[SpaceFunction], ...], ...] = tuple(
+    tuple(_of_axis(f"u{count}", order) for order in range(3)) for count in (1, 2, 3)
+)
+"""The means of other parts of a potential over a train, likewise."""
+SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {
+    **SPACE_ROWS,
+    **{heads[0].axis: heads for heads in (MEAN_HEIGHT, *MEAN_PARTS)},
+}
 """All functions that have charts of their own, with their derivatives."""
 
 

@@ -28,9 +28,10 @@ from gqm_sym.derivation.forces.dissipation import (
     Dissipation,
     dissipation,
 )
-from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar
 from gqm_sym.derivation.forces.rider import rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.forces.train import load_of_cars, notes_of_train, of_train
 from gqm_sym.derivation.geometry.centre_in_space import centre_in_space
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import level_set
@@ -223,7 +224,12 @@ def _closed_forms(
         defaults=defaults,
         positive=tuple(dict.fromkeys((*shape.positive, *kernel.positive))),
         at_least=kernel.at_least,
-        notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
+        notes=(
+            *(() if level is None else (level.note,)),
+            *shape.notes,
+            *(notes_of_train(kernel) if kernel.cars else ()),
+            *(() if loss is None else (speed.note,)),
+        ),
         level_set=level,
         sided=not law.loads or bool(upright),
         upright=upright,
@@ -248,7 +254,6 @@ def _refuse_of_train(kernel: Kernel) -> None:
     """Refuse forces and curves for which trains are not supported."""
     refused = (
         ("surface_tension", kernel.resistance, "a droplet's resistance"),
-        ("rotating_frame", kernel.spin, "a turning frame"),
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
         ("rolling: mu_static", kernel.static_friction_limit, "the friction that its wheels need"),
         ("law", kernel.tangential_law, "a law of acceleration"),

@@ -10,8 +10,13 @@ from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import is_real_at
 from gqm_sym.parameters import Value, exact_value
 
-# The places that are tried on a range without ends, and the shares of a range with ends.
-_PLACES = tuple(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90))
+# The places that are tried on a range without ends, and the shares of a range with ends. Curves may be as small as
+# molecules or as large as orbits, so that other orders of magnitude follow.
+_POWERS = tuple(sp.Integer(10) ** (sign * power) for power in (3, 6, 9, 12) for sign in (-1, 1))
+_PLACES = (
+    *(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90)),
+    *(sp.Rational(n, 10) * scale for scale in _POWERS for n in (3, -7)),
+)
 _SHARES = tuple(sp.Rational(n, 97) for n in (5, 17, 29, 41, 53, 67, 79, 91))
 
 

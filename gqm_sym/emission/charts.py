@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from sympy import Expr, Function, Symbol
+from sympy import Expr, Function, S, Symbol
 
 from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
@@ -11,11 +11,13 @@ from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.forces.train import potential_parts, rates_along
 from gqm_sym.derivation.geometry.geometry import cross, geometry
 from gqm_sym.emission.context import Lowering
+from gqm_sym.emission.dissipative import planar_point, point_in_space
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
-from gqm_sym.kernels.base import Z as HEIGHT
+from gqm_sym.sympy_charts import MEAN_PARTS
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -175,25 +177,49 @@ MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:
     """Return the part of a module that makes a model's chart; None for a curve with formulas."""
-    curve, train = lowering.model.curve, lowering.model.force
+    curve = lowering.model.curve
     if not curve.charted:
         return None
     along = ("along_z", "along_x", "along_y") if curve.in_space else ("chart",)
     names = (*along, *(("along_roll",) if getattr(curve.definition, "banked", False) else ()))
     made = replace(MAKERS[curve.kind](lowering), names=names)
-    if not train.cars:
-        return made
-    pull = differentiate(train.potential, HEIGHT)
+    return _of_train(lowering, made) if lowering.model.force.cars else made
+
+
+def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
+    """Return the part that makes the chart of a train's track, from that of the track."""
+    train = lowering.model.force
+    whole = potential_parts(train.potential)
     numbers = lowering.constants(
         "exact_train",
-        "Length of the train, acceleration of gravity, and coefficient of friction.",
-        (train.train_length, pull, train.friction),
+        "Length of the train, acceleration of gravity, and coefficient of friction"
+        + (", then the factors of the other parts of the potential." if whole.parts else "."),
+        (train.train_length, whole.gravity, train.friction, *whole.factors),
     )
-    length = lowering.order[train.train_length.name]
+    arguments = [track.statement, f"cars={train.cars}", f"numbers={numbers.name}"]
+    arguments.append(f"length={lowering.order[train.train_length.name]}")
+    parts: tuple[ExactIR, ...] = ()
+    if whole.parts:
+        parts = (_parts_along_track(lowering, whole.parts),)
+        held = tuple(place for _, place in parts[0].parameters)
+        arguments += [f"parts={parts[0].name}", f"held={held!r}"]
     return replace(
-        made,
-        statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
-        imports=(*made.imports, "TrackOfTrain"),
-        names=(*names, "along_h"),
-        exact=(*made.exact, numbers),
+        track,
+        statement=f"TrackOfTrain({', '.join(arguments)})",
+        imports=(*track.imports, "TrackOfTrain"),
+        means=("along_h", *(f"along_{heads[0].axis}" for _, heads in zip(whole.parts, MEAN_PARTS, strict=False))),
+        exact=(*track.exact, numbers, *parts),
     )
+
+
+def _parts_along_track(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR:
+    """Return the function for parts of a potential with two derivatives each by arc length."""
+    if lowering.model.curve.in_space:
+        names, _ = point_in_space(lowering)
+        place, tangent, bend = names[:3], names[3:6], names[6:9]
+    else:
+        names = x, z, dxds, dzds, kappa = planar_point(lowering)[0]
+        place, tangent, bend = (x, S.Zero, z), (dxds, S.Zero, dzds), (-kappa * dzds, S.Zero, kappa * dxds)
+    outputs = tuple(form for part in parts for form in rates_along(part, place, tangent, bend))
+    doc = "The other parts of the potential, each with its first two derivatives by arc length."
+    return lowering.exact_function("parts_along_track", doc, outputs, names)

@@ -153,10 +153,12 @@ def _dot(one: Sequence[Expr], other: Sequence[Expr]) -> Expr:
     return sympy.Add(*(a * b for a, b in zip(one, other, strict=True)))
 
 
-def _planar_point(place: Symbol) -> tuple[Expr, ...]:
-    """Return the coordinates, the direction and the curvature at a place of a charted curve in a plane."""
+def planar_point(lowering: Lowering) -> tuple[tuple[Symbol, ...], tuple[Expr, ...]]:
+    """Return names for coordinates, tangent and curvature at a place of a charted curve in a plane, and their forms."""
+    place = lowering.place
     angle = chart_alpha(place)
-    return chart_x(place), chart_z(place), sympy.cos(angle), sympy.sin(angle), chart_kappa(place)
+    forms = (chart_x(place), chart_z(place), sympy.cos(angle), sympy.sin(angle), chart_kappa(place))
+    return tuple(map(lowering.names.symbol, ("x", "z", "dxds", "dzds", "kappa"))), forms
 
 
 def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
@@ -164,10 +166,7 @@ def chart_law(lowering: Lowering, loss: Dissipation) -> tuple[ExactIR, ...]:
     depend on more.
     """
     model, place = lowering.model, lowering.place
-    names: tuple[str, ...] = ("x", "z", "dxds", "dzds", "kappa")
-    point, forms = tuple(map(lowering.names.symbol, names)), _planar_point(place)
-    if model.curve.in_space:
-        point, forms = point_in_space(lowering)
+    point, forms = point_in_space(lowering) if model.curve.in_space else planar_point(lowering)
     w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
     known = {**dict(zip(forms, point, strict=True)), W: w, DIRECTION: v, CONTACT_SIGN: nu}
     load = model.static_normal_load.xreplace(known)

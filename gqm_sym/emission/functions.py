@@ -22,6 +22,9 @@ CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
 for _axis, _size in TERMS_SIZES.items():
     CHART_ROWS[f"along_{_axis}"][_size] = 4
 
+# The names of the charts that follow the run-time parameters, in groups of charts of the same size.
+Charts = Sequence[Sequence[str]]
+
 # LLVM vectorises a loop if it can check, before the loop begins, that no row that is written overlaps another one that
 # is read or written, and it makes at most 128 such checks.
 MAX_OVERLAPS = 128
@@ -156,10 +159,10 @@ def _needed(function: FunctionIR, rows: Sequence[int]) -> list[Assignment]:
     return kept
 
 
-def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
+def loop(function: FunctionIR, charts: Charts = ()) -> tuple[dict[str, Any], set[str]]:
     """Return the template's fields of a function over many places, and the names that it calls.
 
-    ``charts`` are the names of the charts that follow the run-time parameters (`ChartIR`).
+    ``charts`` are the names of the charts that follow the run-time parameters, in groups of one size (`ChartIR`).
     """
     reading = _read_together(function)
     function = reading.function
@@ -199,18 +202,23 @@ def _views(function: FunctionIR) -> str:
     return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
 
 
-def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str]) -> list[str]:
+def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Charts) -> list[str]:
     """Return the lines that find the charts of the curve, which are stored after the run-time parameters."""
     if not printer.charts:
         return []
-    p, count = function.views[-2]
-    first, *others = charts
-    offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(others) + 1)]
-    needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name in printer.charts]
-    return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
+    p, begin = function.views[-2]
+    lines: list[str] = []
+    for group in charts:
+        first, *others = group
+        if not lines or printer.charts & set(group):
+            lines.append(f"{first} = chart_of({p}, {begin})")
+        places = ((name, f"{begin} + {k} * {first}.size") for k, name in enumerate(others, start=1))
+        lines += [f"{name} = chart_of({p}, {at})" for name, at in places if name in printer.charts]
+        begin = f"{begin} + {len(group)} * {first}.size"
+    return lines
 
 
-def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
+def enclosure(function: FunctionIR, parameter: str, charts: Charts = ()) -> tuple[dict[str, Any], set[str]]:
     """Return the template's fields of a function over intervals, and the names that it calls."""
     printer = IntervalPrinter()
     *count, lo, hi, p, out = function.arguments

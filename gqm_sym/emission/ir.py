@@ -80,7 +80,9 @@ class ChartIR:
         Names and texts of long literals that it needs.
     names : tuple of str
         The names of the arrays of its charts in emitted functions, in the order in which they follow the run-time
-        parameters; all except the last one have the same size.
+        parameters; all have the same size.
+    means : tuple of str
+        Those of the means over a train, which follow them and have another size.
     """
 
     statement: str
@@ -88,6 +90,7 @@ class ChartIR:
     functions: tuple[FunctionIR, ...] = ()
     exact: tuple[ExactIR, ...] = ()
     names: tuple[str, ...] = ()
+    means: tuple[str, ...] = ()
     data: tuple[tuple[str, str], ...] = ()
 
 

@@ -46,8 +46,9 @@ CHARTED = frozenset(
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
 # In space each coordinate has a chart, whose height is the coordinate and whose rows of angle, curvature and x are its
-# derivatives. The same holds for the roll angle and for the mean height of a train.
-_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll|h)")
+# derivatives. The same holds for the roll angle, and for the means of the height and of other parts of a potential over
+# a train.
+_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll|h|u[0-9])")
 ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa", "chart_x")
 
 
@@ -128,6 +129,8 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
             before, primes, axis = in_space.groups()
             name = before + ROWS_BY_ORDER[len(primes)]
             chart = f"along_{axis}"
+            if axis.startswith("u"):  # its slope has no scale, unlike that of a coordinate
+                name = name.replace("ichart_alpha", "ichart_slope")
         self.used.add(name)
         if in_space or _CHART_CALL.fullmatch(name.removeprefix("i")):
             texts.insert(0, chart)

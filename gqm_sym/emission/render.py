@@ -48,7 +48,7 @@ _OWN = frozenset(
         *_RUNTIME,
         *("Any", "BatchFunctions", "CHART", "DissipativeFunctions", "ExactFormulas", "ExactPotential", "MODEL"),
         *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
-        *("along_x", "along_y", "along_z"),
+        *("along_x", "along_y", "along_z", "along_h", "along_u1", "along_u2", "along_u3"),
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
         *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),
@@ -69,7 +69,7 @@ class _Functions:
     def add(self, module: ModuleIR) -> None:
         """Add all functions of a module, in the order in which they are printed."""
         chart, separated = module.chart, module.separated
-        charts = chart.names if chart else ()
+        charts = [group for group in (chart.names, chart.means) if group] if chart else []
         groups = (
             (self.single, (*module.functions, *(chart.functions if chart else ())), module.bounds),
             (self.batch, (*module.batch, *((separated.function,) if separated else ())), module.bounds_batch),

@@ -2,37 +2,16 @@
 part, which depends on the place.
 """
 
-from sympy import Add, Expr, Mul, S, Symbol, ordered
+from sympy import Expr, S
 
 from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.derivation.algebra.separate import separate
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, SeparatedIR
 from gqm_sym.emission.subscripts import at
 
 # The largest number of terms of the potential and the load for which tables are worth their time.
 MAX_TERMS = 12
-
-
-def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
-    """Return the parts of a form that depend on the place, each with the factor that does not.
-
-    A parameter that cannot be moved into a factor is added to ``held``. Sums are multiplied out if that moves a
-    parameter into a factor, but powers are not, because their terms may cancel.
-    """
-    parts: dict[Expr, Expr] = {}
-    waiting = list(Add.make_args(form))
-    while waiting:
-        factor, part = waiting.pop(0).as_independent(place, as_Add=False)
-        if part.free_symbols - held - {place}:
-            factors = Mul.make_args(part)
-            mixed = next((f for f in factors if f.is_Add and f.free_symbols - held - {place}), None)
-            if mixed is not None:
-                remainder = factor * Mul(*(f for f in factors if f is not mixed))
-                waiting = [remainder * term for term in mixed.args] + waiting
-                continue
-            held |= part.free_symbols - {place}
-        parts[part] = parts.get(part, S.Zero) + factor
-    return {part: parts[part] for part in ordered(parts) if parts[part] != 0}
 
 
 def separated_terms(lowering: Lowering) -> SeparatedIR | None:
@@ -47,7 +26,7 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
     held = {symbol for form in path for symbol in form.free_symbols} - {place}
     while True:
         before = set(held)
-        potential, load = (separate(form, place, held) for form in forms)
+        potential, load = (separate(form, (place,), held) for form in forms)
         if held == before:
             break
     potential.pop(S.One, None)  # a constant changes nothing

@@ -31,7 +31,7 @@ _NAMES_BY_HOME = {
     "charts.evaluate": (
         "chart_alpha chart_kappa chart_of chart_rows chart_x chart_z divdiff1_chart_alpha divdiff1_chart_x "
         "divdiff1_chart_z divdiff2_chart_alpha divdiff2_chart_x divdiff2_chart_z ichart_alpha ichart_kappa "
-        "ichart_x ichart_z spare_rows"
+        "ichart_slope ichart_x ichart_z spare_rows"
     ),
     "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",

@@ -250,9 +250,8 @@ def test_declared_in_one_piece() -> None:
     circle = gqm.families.circle()
     assert dict(gqm.derive(circle, train + gqm.Gravity()).defaults)["m"] == 1200
     for force, message in (
-        (gqm.Gravity() + gqm.RotatingFrame(), "rotating_frame: a turning frame"),
-        (gqm.Gravity() + gqm.Potential("x**2"), "no potential other than gravity"),
-        (gqm.Kernel(terms=()), "no potential other than gravity"),
+        (gqm.Gravity() + gqm.Kernel.law("-k*W", parameters={"k": 1}), "law: a law of acceleration"),
+        (gqm.Kernel(terms=()), "no potential acts on it"),
         (gqm.Gravity() + gqm.Rolling(radius=1), "rolling: radius"),
         (gqm.Gravity() + train, "train is given twice"),
     ):

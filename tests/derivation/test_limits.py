@@ -37,6 +37,20 @@ def test_whether_it_is_real_is_soon_known(z: str) -> None:
         assert gqm.derive(gqm.Curve.graph(z), gqm.Gravity()).z == gqm.Curve.graph(z).z
 
 
+@pytest.mark.parametrize(
+    "z", ["cosh(10**10*x)/10**10", "exp(10**8*x) - exp(-10**8*x)", "sqrt(x - 10**6)", "log(-x - 10**11)"]
+)
+def test_curves_of_any_size(z: str) -> None:
+    """A curve may be real, within the range of doubles, on less than a nanometre or from a thousand kilometres on."""
+    assert gqm.derive(gqm.Curve.graph(z), gqm.Gravity()).z == gqm.Curve.graph(z).z
+
+
+def test_a_curve_that_is_real_nowhere() -> None:
+    """A curve that is complex everywhere is refused."""
+    with confined(10.0), pytest.raises(DeclarationError, match="z: asin.* is not a real number at any place tried"):
+        gqm.derive(gqm.Curve.graph("asin(2 + x**2)"), gqm.Gravity())
+
+
 def test_the_mass_is_no_curve_s_parameter() -> None:
     """The mass cannot be a curve's parameter, because it means the same everywhere."""
     with pytest.raises(DeclarationError, match="'m' means mass everywhere; give the curve's parameter another name"):

@@ -14,7 +14,7 @@ from sympy import Expr, Function, Integer, Rational, S, Symbol
 
 from gqm_sym.budgets import check_budget
 from gqm_sym.errors import EmissionError
-from gqm_sym.sympy_charts import MEAN_HEIGHT, SPACE, chart_alpha, chart_x, chart_z
+from gqm_sym.sympy_charts import MEAN_HEIGHT, MEAN_PARTS, SPACE, chart_alpha, chart_x, chart_z
 
 # Functions that have the helpers `divdiff1_<name>` and `divdiff2_<name>` in the runtime.
 HELPERS = {
@@ -36,7 +36,7 @@ HELPERS = {
     chart_x: "chart_x",
     chart_z: "chart_z",
     chart_alpha: "chart_alpha",
-    **{head: head.__name__ for head in (*SPACE, MEAN_HEIGHT[0])},
+    **{head: head.__name__ for head in (*SPACE, MEAN_HEIGHT[0], *(heads[0] for heads in MEAN_PARTS))},
 }
 
 

@@ -1,7 +1,7 @@
 """A force law along a curve: potential, static normal load and tangential acceleration."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sympy as sp
 
@@ -9,9 +9,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import combine_absolute_values, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
-from gqm_sym.errors import DeclarationError
-from gqm_sym.kernels.base import DIRECTION, Kernel, W, X, Y, Z
-from gqm_sym.sympy_charts import MEAN_HEIGHT, train_load, train_load_in_plane
+from gqm_sym.kernels.base import DIRECTION, Kernel, X, Y, Z
 
 Place = tuple[sp.Expr, sp.Expr, sp.Expr]
 
@@ -135,34 +133,3 @@ def _coriolis(spin: sp.Expr, shape: Geometry) -> Place:
     """Return the components of 2 Ω t × (ẑ × t)."""
     across, along, up = shape.tangent
     return -2 * spin * up * across, -2 * spin * up * along, 2 * spin * (across**2 + along**2)
-
-
-def load_of_cars(kernel: Kernel, lam: sp.Symbol, *, in_space: bool) -> sp.Expr:
-    """Return the mean of |N|/m over the cars of a train, to which friction is proportional."""
-    pull = differentiate(kernel.potential, Z)
-    head = train_load if in_space else train_load_in_plane
-    return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), pull)
-
-
-def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
-    """Return the forces along the track of a train, in which gravity acts on its mean height.
-
-    The contact force remains that of a body at the middle of the train, and so do `Forces.loads`.
-
-    Raises
-    ------
-    DeclarationError
-        If a force of another kind acts.
-    """
-    pull = differentiate(kernel.potential, Z)
-    if not pull or (pull.free_symbols | (kernel.potential - pull * Z).free_symbols) & {X, Y, Z}:
-        raise DeclarationError("derive: train: a train can have no potential other than gravity; use Gravity() alone")
-    height, slope, _ = (head(lam) for head in MEAN_HEIGHT)
-    potential = kernel.potential.xreplace({Z: height})
-    return replace(
-        law,
-        potential=potential,
-        effective_potential=potential / kernel.inertia,
-        effective_potential_slope=pull * slope / kernel.inertia,
-        push=-pull * slope,
-    )

@@ -335,7 +335,11 @@ def _divdiff2(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
         left, right = _divdiff1_on_piece(chart, row, kr, 1.0, 1.0), _divdiff1_on_piece(chart, row, kt, -1.0, -1.0)
         jump = right - left
         # The slope of a coordinate is at most one, that of the angle the curvature.
-        largest = 1.0 if row < 2 else max(chart[EDGES + 2 * (count + 1) + kr], chart[EDGES + 2 * (count + 1) + kt])
+        largest = (
+            max(1.0, fabs(left), fabs(right))
+            if row < 2
+            else max(chart[EDGES + 2 * (count + 1) + kr], chart[EDGES + 2 * (count + 1) + kt])
+        )
         if fabs(jump) <= MAX_ROUNDING_JUMP * largest:
             jump = 0.0
         # The difference over all three is a weighted mean of those in which the common edge replaces an outer place.
@@ -412,11 +416,26 @@ def _turned(chart, s):  # type: ignore[no-untyped-def]
 @Inner
 def ichart_alpha(chart, s):  # type: ignore[no-untyped-def]
     """Return an enclosure of alpha over an interval of arc length."""
+    return _ichart_alpha(chart, s, 1.0)
+
+
+@Inner
+def ichart_slope(chart, s):  # type: ignore[no-untyped-def]
+    """Return an enclosure of alpha, which is the slope of the mean of a part of a potential, over an interval of arc
+    length.
+
+    Its rounding is compared with what it changes along the chart, as it has no scale.
+    """
+    return _ichart_alpha(chart, s, min(1.0, chart[EDGES + 2 * int(chart[1]) + 1]))
+
+
+@Inlined
+def _ichart_alpha(chart, s, scale):  # type: ignore[no-untyped-def]
     low, high = s
     middle = 0.5 * (low + high)
     value, here = chart_row(chart, 2, middle), _turned(chart, middle)
     reach = max(here - _turned(chart, low), _turned(chart, high) - here)
-    margin = 1e-12 * (1.0 + fabs(value))
+    margin = 1e-12 * (scale + fabs(value))
     return value - reach - margin, value + reach + margin
 
 

@@ -1,9 +1,10 @@
-"""The track of a train: its chart is followed by a chart of the train's mean height as a function of the place of its
+"""The track of a train: its chart is followed by charts of means over the train, as functions of the place of its
 middle.
 
 The mean height h(s) of a train of length l is the mean of z over [s - l/2, s + l/2], so that h' and h'' are the divided
 differences of z and dz/ds over its ends. These keep all their digits however short the train is. A piece of the chart
-of h ends where either end of the train passes from one piece of the track to the next.
+of h ends where either end of the train passes from one piece of the track to the next. Other parts of a potential are
+charted along the track first, on pieces that resolve them, and have such means too.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +15,9 @@ import numpy as np
 from numba import types
 
 from gqm_sym.errors import ParameterError
-from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.charts.chart import NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
+from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows, divdiff1_chart_alpha, divdiff1_chart_z
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
@@ -25,6 +26,10 @@ from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 SAME_EDGE = 1e-13
 # The largest ratio of the widths of neighbouring pieces.
 MAX_RATIO = 16.0
+
+# A piece resolves a part of a potential if the last two Chebyshev coefficients of its second derivative are below this
+# share of it, or of what roundings of the part and of its slope make of it; other pieces are halved, so many times.
+MAX_TAIL, MAX_HALVINGS = 4e-16, 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,21 +43,29 @@ class TrackOfTrain:
     cars : int
         The number of equal cars of the train.
     numbers
-        ``f(op, p)``: the length of the train, the acceleration of gravity, and the coefficient of friction.
+        ``f(op, p)``: the length of the train, the acceleration of gravity, the coefficient of friction, and the factors
+        of the other parts of the potential.
     length : int
         The index of the length among the run-time parameters.
+    parts, optional
+        ``f(op, ..., p)``: these parts at a place, each with its first two derivatives by arc length. In a plane the
+        place is given by x, z, dx/ds, dz/ds and the curvature, in space by x, y and z and their first two derivatives.
+    held : tuple of int
+        The indices of the run-time parameters that they depend on.
     """
 
     track: ChartMaker
     cars: int
     numbers: Callable[..., Any]
     length: int
+    parts: Callable[..., Any] | None = None
+    held: tuple[int, ...] = ()
 
     @property
     def shaped_by(self) -> tuple[int, ...] | None:
         """The run-time parameters that the chart depends on, by their place; None if that is not known."""
         shaping = self.track.shaped_by
-        return None if shaping is None else tuple(sorted({*shaping, self.length}))
+        return None if shaping is None else tuple(sorted({*shaping, self.length, *self.held}))
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Return the chart, whose range is that of the middle of the train.
@@ -60,9 +73,9 @@ class TrackOfTrain:
         Raises
         ------
         ParameterError
-            If the train is longer than the track, or the track has corners.
+            If the train is longer than the track, the track has corners, or the potential is infinite on it.
         """
-        track, length = self.track.chart(p), float(self.numbers(FLOATS, p)[0])
+        track, length = self.track.chart(p), float(p[self.length])
         if track.corners.size:
             raise ParameterError("train: a track with corners would bend it in one place; give a smooth track")
         whole = track.high - track.low
@@ -70,8 +83,11 @@ class TrackOfTrain:
             raise ParameterError(
                 f"train: length: {length!r} m is not shorter than the track, which is {whole!r} m long"
             )
-        edges = _graded(_edges(track, track.edges, length), track.period > 0.0)
-        block = _mean_height(track, edges, length)
+        size = int(track.block[0])
+        height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
+        charted = (height, *self._charted_parts(track, p))
+        edges = _graded(_edges(track, charted[-1].edges, length), track.period > 0.0)
+        block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
         joints = _merged(np.concatenate([edges, _inside(track.edges, edges)]), whole)
         kinks = np.concatenate([_edges(track, track.breaks, length)[1:-1], _inside(track.breaks, edges)])
         breaks = joints[np.unique(np.abs(joints[:, None] - kinks).argmin(axis=0))] if kinks.size else kinks
@@ -85,6 +101,70 @@ class TrackOfTrain:
             origins=np.empty((0, 3)),
             joints=joints,
         )
+
+    def _along(self, track: Chart, p: Sequence[float], s: Array) -> Array:
+        """Return the parts of the potential besides the height at arc lengths, each with two derivatives, as rows."""
+        if self.parts is None:
+            return np.empty((0, s.size))
+        if isinstance(track, SpaceChart):
+            point = np.concatenate([track.derivatives(s, order)[:3] for order in range(3)])
+        else:
+            x, z, angle, curvature = track.points(s)
+            point = np.stack([x, z, np.cos(angle), np.sin(angle), curvature])
+        with np.errstate(all="ignore"):
+            rows = np.stack([np.broadcast_to(row, s.shape) for row in self.parts(ARRAYS, *point, p)])
+        if not np.isfinite(rows).all():
+            raise ParameterError("train: the potential is not finite everywhere on the track; keep it off its centre")
+        return rows
+
+    def _charted_parts(self, track: Chart, p: tuple[float, ...]) -> "list[_Charted]":
+        """Return the charts of these parts along the track."""
+        if self.parts is None:
+            return []
+        edges = track.edges
+        for _ in range(MAX_HALVINGS):
+            half = 0.5 * np.diff(edges)
+            places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
+            rows = self._along(track, p, places.ravel()).reshape(-1, 3, *places.shape)
+            coefficients = rows[:, 2] @ FIT.T
+            values, slopes, bends = np.abs(rows).max(axis=3).swapaxes(0, 1)
+            above = np.abs(coefficients) > MAX_TAIL * (bends + slopes / half + values / half**2)[:, :, None]
+            coarse = above[:, :, -2:].any(axis=(0, 2))
+            if not coarse.any():
+                break
+            edges = np.sort(np.append(edges, (edges[:-1] + half)[coarse]))
+        else:
+            raise ParameterError("train: the potential changes too fast along the track; keep it off its centre")
+        # Powers of u would magnify the noise in trailing coefficients.
+        used = np.flip(np.logical_or.accumulate(np.flip(above, axis=2), axis=2), axis=2)
+        bends = np.where(used, coefficients, 0.0) @ AT_NODES
+        first = self._along(track, p, edges[:1])[::3, 0]
+        blocks = _blocks(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
+        return [_Charted(block, edges, True) for block in blocks]
+
+    def potential(self, chart: Chart, p: Sequence[float], s: Array) -> tuple[Array, Array]:
+        """Return the potential energy per unit mass of a body at arc lengths, and its derivative by arc length.
+
+        Parameters
+        ----------
+        chart : Chart
+            The chart of the track.
+        p : sequence of float
+            The run-time parameters.
+        s : array
+            Arc lengths, of any shape.
+        """
+        _, gravity, _, *factors = self.numbers(FLOATS, p)
+        places = s.ravel()
+        if isinstance(chart, SpaceChart):
+            height, slope = chart.derivatives(places, 0)[2], chart.derivatives(places, 1)[2]
+        else:
+            height, angle = chart.points(places)[1:3]
+            slope = np.sin(angle)
+        rows = self._along(chart, p, places)
+        energy = gravity * height + sum(factor * row for factor, row in zip(factors, rows[::3], strict=True))
+        change = gravity * slope + sum(factor * row for factor, row in zip(factors, rows[1::3], strict=True))
+        return energy.reshape(s.shape), change.reshape(s.shape)
 
     def is_exact(self, chart: Chart) -> bool:
         """Return False: the mean height is known in doubles only."""
@@ -165,36 +245,71 @@ def _over_train(chart, places, length):  # type: ignore[no-untyped-def]
     return out, heights
 
 
-def _mean_height(track: Chart, edges: Array, length: float) -> Array:
-    """Return the block of the chart of the mean height, whose pieces end at ``edges``."""
-    block = np.ascontiguousarray(track.block[: int(track.block[0])])
+@dataclass(frozen=True, slots=True)
+class _Charted:
+    """A function of the place along a track, of which a train has the mean.
+
+    Attributes
+    ----------
+    block : array
+        A chart whose height is the function.
+    edges : array
+        The edges of its pieces.
+    has_slope : bool
+        Whether the angle of this chart is the derivative of the function; otherwise that is the sine of the angle.
+    """
+
+    block: Array
+    edges: Array
+    has_slope: bool
+
+
+def _mean(charted: _Charted, edges: Array, length: float, period: float) -> Array:
+    """Return the block of the chart of a mean, whose pieces end at ``edges``."""
+    block = np.ascontiguousarray(charted.block)
     half = 0.5 * np.diff(edges)
     places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
     (slopes, turns, back, front), _ = _over_train(block, places.ravel(), length)
-    if isinstance(track, SpaceChart):  # there alpha is dz/ds
+    if charted.has_slope:
         bends = turns
     else:  # the divided difference of sin alpha
         bends = turns * np.cos(0.5 * (front + back)) * np.sinc((front - back) / (2.0 * np.pi))
     slopes, bends = slopes.reshape(places.shape), bends.reshape(places.shape)
-    gains = np.append(_first_height(track, block, edges[0], length), half * (slopes @ WEIGHTS))
-    heights = np.cumsum(gains, dtype=np.longdouble)
-    if track.period:
-        # A lap gains nothing but the roundings of all pieces. They must not come together where the chart begins and
-        # ends, because small swings about that place would lose as many digits as their height is smaller than a lap's.
-        heights -= (heights[-1] - heights[0]) * ((edges - edges[0]) / track.period)
-    heights = heights[:-1]
-    anchors = heights.astype(np.float64)
-    lows = (heights - anchors).astype(np.float64)
-    (made,) = blocks_of(edges, (anchors[:, None], lows[:, None]), (slopes[:, None], bends[:, None]), track.period)
+    first = _first_mean(charted, block, (edges[0] - 0.5 * length, edges[0] + 0.5 * length), period)
+    (made,) = _blocks(edges, np.array([first]), slopes[:, None], bends[:, None], period)
     return made
 
 
-def _first_height(track: Chart, block: Array, middle: float, length: float) -> float:
-    """Return the mean height of the train at the beginning of its chart."""
-    back, front = middle - 0.5 * length, middle + 0.5 * length
-    laps = (-1.0, 0.0, 1.0) if track.period else (0.0,)
-    edges = np.concatenate([track.edges + lap * track.period for lap in laps])
-    ends = np.unique(np.concatenate([[back, front], _inside(edges, np.array([back, front]))]))
-    half = 0.5 * np.diff(ends)
-    _, heights = _over_train(block, (ends[:-1, None] + half[:, None] * (1.0 + NODES)).ravel(), length)
-    return float((half * (heights.reshape(-1, TERMS) @ WEIGHTS)).sum() / length)
+def _blocks(edges: Array, first: Array, slopes: Array, bends: Array, period: float) -> list[Array]:
+    """Return the blocks of charts of functions, from their values at the first edge and from derivatives at the nodes.
+
+    Parameters
+    ----------
+    edges : (n+1,) array
+        The edges of the pieces.
+    first : (d,) array
+        The functions at the first edge.
+    slopes, bends : (n, d, TERMS) arrays
+        Their first two derivatives.
+    period : float
+        The period of a closed track; 0 for an open one.
+    """
+    gains = 0.5 * np.diff(edges)[:, None] * (slopes @ WEIGHTS)
+    values = np.cumsum(np.concatenate([first[None], gains]), axis=0, dtype=np.longdouble)
+    if period:
+        # A lap gains nothing but the roundings of all pieces. They must not come together where the chart begins and
+        # ends, because small swings about that place would lose as many digits as their height is smaller than a lap's.
+        values -= (values[-1] - values[0]) * ((edges - edges[0]) / period)[:, None]
+    anchors = values[:-1].astype(np.float64)
+    lows = (values[:-1] - anchors).astype(np.float64)
+    return blocks_of(edges, (anchors, lows), (slopes, bends), period)
+
+
+def _first_mean(charted: _Charted, block: Array, ends: tuple[float, float], period: float) -> float:
+    """Return the mean over a train whose ends are given."""
+    laps = (-1.0, 0.0, 1.0) if period else (0.0,)
+    edges = np.concatenate([charted.edges + lap * period for lap in laps])
+    parts = np.unique(np.concatenate([ends, _inside(edges, np.array(ends))]))
+    half, length = 0.5 * np.diff(parts), ends[1] - ends[0]
+    _, values = _over_train(block, (parts[:-1, None] + half[:, None] * (1.0 + NODES)).ravel(), length)
+    return float((half * (values.reshape(-1, TERMS) @ WEIGHTS)).sum() / length)

@@ -1,7 +1,7 @@
 """A periodic orbit along a curve with formulas, with its derivatives: means over equal steps of the phase angle."""
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from gqm_sym.runtime.gradients.orbit import (
     pairs,
     without_formulas,
 )
+from gqm_sym.runtime.gradients.panels import Panels, resolved
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
@@ -36,7 +37,7 @@ from gqm_sym.runtime.gradients.programs import (
     turning_point_program,
 )
 from gqm_sym.runtime.gradients.second_programs import circulation_seconds, libration_seconds, turning_point_seconds
-from gqm_sym.runtime.gradients.series import Series
+from gqm_sym.runtime.gradients.series import PanelSeries, Series
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
@@ -164,6 +165,14 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         found = None if self._orbit is None else self._means_of(self._program, *self._rule)
         return found or (*self._multiprecision.means[:2], False)
 
+    @property
+    def nodes(self) -> int:
+        """The number of nodes by which means over the orbit are found; 0 if it needs panels instead."""
+        try:
+            return self._means[1]
+        except SolutionError:  # too many of them
+            return 0
+
     def _means_of(self, program: Program, inputs: Array, nodes: Array) -> tuple[Array, int, bool] | None:
         """Return `_means` of any program whose first result is the rate of time, in double-double arithmetic; None if
         digits are lost.
@@ -200,16 +209,17 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return integrals
 
     @cached_property
-    def samples(self) -> Array:
-        """The results of the orbit's program at equal steps of the phase angle, over a whole turn of it.
+    def samples(self) -> Array | Panels:
+        """The results of the orbit's program at equal steps of the phase angle, over a whole turn of it; on panels of
+        the phase where these would be too many.
 
-        They are the midpoints of N intervals of [0, 2 pi], or of the share of a lap. In the second half of a libration
-        the values occur again in reverse order.
+        The steps are the midpoints of N intervals of [0, 2 pi], or of the share of a lap. In the second half of a
+        libration the values occur again in reverse order.
         """
         # The means at n nodes are exact as soon as terms of order 2n vanish; twice as many nodes resolve these terms.
         means, count, is_double_double = self._means
         if not count:
-            raise SolutionError(UNDECIDED)
+            return self._on_panels()
         n = min(2 * count, LEVELS[-1] // 2)
         if is_double_double:
             inputs, nodes = self._rule
@@ -219,25 +229,39 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         found[means[:, 3] <= means[:, 2]] = 0.0  # they are rounding
         return found if self.direction else np.hstack([found, found[:, ::-1]])
 
+    def _on_panels(self) -> Panels:
+        """Return the results of the orbit's program in double-double arithmetic on panels of the phase."""
+        program, inputs = self._program, self._rule[0]
+        kind = CIRCULATION if self.direction else LIBRATION
+        everything = np.arange(program.outputs.size)
+        return resolved(kind, self._edges(), lambda s: values(program, inputs, *s), everything, everywhere=True)
+
     @property
     def width(self) -> float:
         """The width of a libration, or the length of a lap with its sign, in units of the curve parameter."""
         if self.direction:
-            return float(self.samples[3 * (1 + self.source.variables), 0])
+            samples = self.samples
+            rows = samples.samples if isinstance(samples, Panels) else samples
+            return float(rows[3 * (1 + self.source.variables)].flat[0])
         low, high = self.turning_points
         return high - low
 
     @property
     def series(self) -> tuple[SeriesOf, Array]:
         """As `OrbitDerivatives.series`."""
-        n, samples = self.source.variables, self.samples
+        n, found = self.source.variables, self.samples
+        if isinstance(found, Panels):
+            samples, phases, whole = found.samples, found.phases, 1.0 if self.direction else 2.0 * np.pi
+            make: Callable[[Array], SeriesOf] = partial(PanelSeries, found.edges / whole)
+        else:
+            count = found.shape[1]
+            samples, phases, make = found, 2.0 * np.pi * (np.arange(count) + 0.5) / count, Series
         rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
         if self.direction:
-            return Series(np.vstack([rates, arcs[1 : 1 + n]])), arcs[2 + n :, 0]
-        count = samples.shape[1]
-        rise = 0.5 * self.width * np.sin(2.0 * np.pi * (np.arange(count) + 0.5) / count)
-        others = np.zeros((n - self.source.parameters, count))
-        return Series(np.vstack([rates, rise * arcs, others])), np.zeros(n)
+            lap = arcs[2 + n :].reshape(-1, phases.size)[:, 0]
+            return make(np.concatenate([rates, arcs[1 : 1 + n]])), lap
+        others = np.zeros((n - self.source.parameters, *phases.shape))
+        return make(np.concatenate([rates, 0.5 * self.width * np.sin(phases) * arcs, others])), np.zeros(n)
 
     @property
     def path_program(self) -> Program:

@@ -21,7 +21,7 @@ from gqm_sym.runtime.gradients.evaluation import CUBE, PROGRAM, begin
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows, fill_changed, path_changes
-from gqm_sym.runtime.gradients.series import Series, add_series, fill_waves
+from gqm_sym.runtime.gradients.series import PanelSeries, Series, add_series, fill_waves
 from gqm_sym.runtime.inversion.records import find_phases
 
 # The rows of launch place and speed among the variables (`programs.Source`).
@@ -217,6 +217,7 @@ class OrbitSensitivity:
         self._derivatives = derivatives
         self._scale, self._width = 1.0 if derivatives.direction else 2.0 * np.pi, derivatives.width
         self._series, self._lap = derivatives.series
+        self._from_launch: tuple[float, PanelSeries] | None = None
         self._orbits: dict[float, Array] = {}
         self._chosen: dict[tuple[float, tuple[int, ...]], tuple[Any, Any]] = {}
 
@@ -239,7 +240,7 @@ class OrbitSensitivity:
         # Without a delay of the launch, these are the changes at a fixed phase angle.
         speed = motion.direction * motion.problem.launch.v0.value
         still = np.array([[phi], [speed], [0.0], [0.0], [0.0], [motion.problem.lam0]])
-        series, found = self._series(still[PHASE] / self._scale), np.empty((STATE_ROWS, variables, 1))
+        (series, _), found = self._along(motion, still, phi), np.empty((STATE_ROWS, variables, 1))
         path = derivatives.at_places(still[PLACE])
         fill_changes(still, orbit, series, path.rows, self._scale, found)
         orbit[LAUNCH_ARC] = -self._scale * series[1, 1 + variables :, 0] - path.ds[0, 0] * derivatives.launch_changes
@@ -278,6 +279,11 @@ class OrbitSensitivity:
             passed = ds / v0 * (moves - at_launch[LAM])
         delay: Array = direction * (passed + times)
         return delay
+
+    @property
+    def has_waves(self) -> bool:
+        """Whether the changes along the orbit are a Fourier series, as `at_times` needs it."""
+        return isinstance(self._series, Series)
 
     def at_times(self, motion: Any, record: Array, t: Array, phi: float, rows: tuple[int, ...]) -> Array:
         """Return what `at` does, for times in a record of a motion along a curve with formulas."""
@@ -338,13 +344,35 @@ class OrbitSensitivity:
         orbit, out = self._orbit(motion, phi), np.empty((STATE_ROWS, len(rows), points.shape[1]))
         for start in range(0, points.shape[1], BLOCK):
             block = slice(start, start + BLOCK)
-            out[:, :, block] = self._part(orbit, np.ascontiguousarray(points[:, block]))[:, rows]
+            some = np.ascontiguousarray(points[:, block])
+            out[:, :, block] = self._part(orbit, *self._along(motion, some, phi))[:, rows]
         return out
 
-    def _part(self, orbit: Array, points: Array) -> Array:
-        """Return the derivatives at some of the points by all variables."""
+    def _along(self, motion: Any, points: Array, phi: float) -> tuple[Array, Array]:
+        """Return the series at points of the orbit, and these with the number of half periods to which its integrals
+        are added.
+
+        The integrals of a Fourier series begin with the phase. Those of a series on panels begin at the launch, and go
+        by way of the next turning point to where the body moves the other way, so that a slow passage of a hilltop
+        takes no digits from what does not contain it.
+        """
+        share = points[PHASE] / self._scale
+        if not isinstance(self._series, PanelSeries):
+            return self._series(share), points
+        if self._from_launch is None or self._from_launch[0] != phi:
+            self._from_launch = phi, self._series.begun_at(phi / self._scale)
+        series, times = self._from_launch[1], slice(1, 1 + self._derivatives.source.variables)
+        found, returns = series(share), np.flatnonzero(points[SENSE] == -motion.direction)
+        if returns.size and not self._derivatives.direction:
+            points, upwards = points.copy(), motion.direction > 0
+            found[1, times, returns] -= 2.0 * series(np.array([0.5 if upwards else 0.0]))[1, times].T
+            points[TURNS, returns] -= 2.0 if upwards else 0.0
+        return found, points
+
+    def _part(self, orbit: Array, series: Array, points: Array) -> Array:
+        """Return the derivatives at some of the points by all variables, given the series there."""
         found = np.empty((STATE_ROWS, orbit.shape[1], points.shape[1]))
-        path, series = self._derivatives.at_places(points[PLACE]).rows, self._series(points[PHASE] / self._scale)
+        path = self._derivatives.at_places(points[PLACE]).rows
         fill_changes(points, orbit, series, path, self._scale, found)
         if self._derivatives.by_arc_length:
             found[S, LAM0] += 1.0  # from the start point of the curve
@@ -355,8 +383,9 @@ class OrbitSensitivity:
 
     def places_at(self, motion: Any, points: Array, phi: float, ds: Array) -> Array:
         """Return the derivatives of lam alone, with respect to all variables, given ds/dlam."""
-        orbit, share = self._orbit(motion, phi)[:, :, None], points[PHASE] / self._scale
-        times = self._scale * self._series(share)[1, 1 : 1 + orbit.shape[1]]
+        orbit = self._orbit(motion, phi)[:, :, None]
+        series, points = self._along(motion, points, phi)
+        share, times = points[PHASE] / self._scale, self._scale * series[1, 1 : 1 + orbit.shape[1]]
         delay = orbit[LAUNCH_DELAY] - points[TURNS] * orbit[DURATION] - points[SENSE] * times
         upper = np.sin(np.pi * share) ** 2
         places = orbit[LAP] * (share + points[LAPS]) + orbit[LOWER] * (1.0 - upper) + orbit[UPPER] * upper

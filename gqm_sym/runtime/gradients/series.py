@@ -126,23 +126,42 @@ class PanelSeries:
         The edges of the panels.
     samples : (k, m, RULE) array
         The values of k functions.
+    begin : float
+        The share at which integrals begin.
     """
 
-    def __init__(self, edges: Array, samples: Array) -> None:
-        self._edges = edges
-        terms = samples @ to_legendre()
-        halves = 0.5 * np.diff(edges)[:, None]
-        integrals = np.moveaxis(legint(np.moveaxis(terms, -1, 0), lbnd=-1), 0, -1) * halves
-        totals = np.cumsum(integrals.sum(axis=-1), axis=1)
-        integrals[:, 1:, 0] += totals[:, :-1]
+    def __init__(self, edges: Array, samples: Array, begin: float = 0.0) -> None:
+        self._edges, self._samples = edges, samples
+        terms, halves = samples @ to_legendre(), 0.5 * np.diff(edges)
+        here, start = place_on.py_func(edges, begin)
+        # Each panel's integrals begin at the end of it that is nearer to the beginning.
+        integrals = np.empty((*terms.shape[:2], terms.shape[2] + 1))
+        for panels, bound in ((slice(0, here), 1.0), (slice(here, here + 1), start), (slice(here + 1, None), -1.0)):
+            given = np.moveaxis(terms[:, panels], -1, 0)
+            integrals[:, panels] = np.moveaxis(legint(given, lbnd=bound), 0, -1) * halves[panels, None]
+        at_edges = integrals.sum(axis=-1), (integrals * (-1.0) ** np.arange(integrals.shape[2])).sum(axis=-1)
+        integrals[:, here + 1 :, 0] += np.cumsum(at_edges[0][:, here:-1], axis=1)
+        integrals[:, :here, 0] += np.cumsum(at_edges[1][:, here:0:-1], axis=1)[:, ::-1]
         both = np.array([np.pad(terms, ((0, 0), (0, 0), (0, 1))), integrals])
         self._table = np.ascontiguousarray(both.transpose(2, 3, 0, 1)).reshape(len(edges) - 1, RULE + 1, -1)
+
+    def begun_at(self, share: float) -> "PanelSeries":
+        """Return the same functions with integrals that begin at a share: nothing cancels in those to places nearby."""
+        return PanelSeries(self._edges, self._samples, share)
 
     def __call__(self, share: Array) -> Array:
         """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         found = np.empty((2, self._table.shape[2] // 2, share.size))
         fill_polynomials(self._edges, self._table, share, found)
         return found
+
+
+@Inner
+def place_on(edges, share):  # type: ignore[no-untyped-def]
+    """Return the panel that contains a share, and the place on it, from -1 to 1."""
+    panel = min(max(np.searchsorted(edges, share, side="right") - 1, 0), edges.size - 2)
+    left, right = edges[panel], edges[panel + 1]
+    return panel, min(max((2.0 * share - left - right) / (right - left), -1.0), 1.0)
 
 
 @entry(types.void(VECTOR, CUBE, VECTOR, CUBE), checked=False)
@@ -154,9 +173,7 @@ def fill_polynomials(edges, table, shares, found):  # type: ignore[no-untyped-de
     degrees, functions = table.shape[1], table.shape[2]
     sums = np.empty(functions)
     for i in range(shares.size):
-        panel = min(max(np.searchsorted(edges, shares[i], side="right") - 1, 0), edges.size - 2)
-        left, right = edges[panel], edges[panel + 1]
-        x = min(max((2.0 * shares[i] - left - right) / (right - left), -1.0), 1.0)
+        panel, x = place_on(edges, shares[i])
         before, now = 0.0, 1.0
         sums[:] = 0.0
         for k in range(degrees):

@@ -16,6 +16,7 @@ from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
+from gqm_sym.runtime.gradients.passages.arrival import arrival_slopes
 from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
@@ -112,6 +113,16 @@ class PeriodicMotion(PeriodicTimes):
         shares = 2.0 * found if swings and quantity == "period" else found
         return dict(zip(rows, shares.tolist(), strict=True))
 
+    @locked
+    def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
+        if self.kind == "libration" and isinstance(derivatives := self._derivatives, FormulaOrbitDerivatives):
+            rows, state = selected(self.problem.formulas.parameters, wrt), self.state(self.time_at(lam))
+            is_passed = state.v != 0.0 and not self._is_turn(state.lam)
+            found = arrival_slopes(self, derivatives, state.lam, state.v) if is_passed else None
+            if found is not None:
+                return {name: float(found[row]) for name, row in rows.items()}
+        return super()._arrival_gradient(lam, wrt)
+
     def _is_turn(self, place: float) -> bool:
         turns = self.turning_points if self.kind == "libration" else ()
         return any(abs(place - turn) <= ULP * abs(turn) for turn in turns)
@@ -139,7 +150,8 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
-        sampled = self._sampled_times(t) if self.problem.formulas.chart is None else None
+        has_waves = self.problem.formulas.chart is None and self._orbit_sensitivity.has_waves
+        sampled = self._sampled_times(t) if has_waves else None
         if sampled is not None:
             sampler, times, phi, shape = sampled
             made = self._orbit_sensitivity.at_times(self, sampler.record, times, phi, tuple(rows.values()))

@@ -22,10 +22,8 @@ from gqm_sym.runtime.charts.double_double.pieces import (
 )
 from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
+from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
-from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
-from gqm_sym.runtime.double_double.quadrature import fill_panel
 from gqm_sym.runtime.gradients.charts.programs import (
     ChartSource,
     chart_circulation_program,
@@ -40,22 +38,14 @@ from gqm_sym.runtime.gradients.charts.second_programs import (
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_path_program
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
+from gqm_sym.runtime.gradients.panels import Panels, resolved
 from gqm_sym.runtime.gradients.path import ASIDE, PathRows, squared_force
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
-from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
+from gqm_sym.runtime.gradients.series import PanelSeries
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
-
-# A panel is resolved if the last two Legendre coefficients of all integrands are below this share of the integrals of
-# the absolute values; other panels are halved, at most this many times.
-MAX_TAIL, MAX_HALVINGS = 1e-14, 40
-
-# The largest rounding error of an integral, as a share of the integral of the absolute values.
-MAX_ROUNDING = 1e-16
 
 # A place this near to the edge of a piece counts as the edge.
 AT_EDGE = 1e-15
@@ -64,36 +54,27 @@ AT_EDGE = 1e-15
 DIFFERENCE_STEP_SHARE = 2.0**-20
 
 
-@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, types.UniTuple(types.float64, 4), MATRIX, MATRIX), checked=False)
-def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-untyped-def]
-    """Fill the nodes of Gauss's rule on panels.
+@entry(types.void(TRUE_CURVE, MATRIX, types.UniTuple(types.float64, 4), MATRIX), checked=False)
+def fill_places(curve, shares, orbit, places):  # type: ignore[no-untyped-def]
+    """Fill the places of nodes.
 
     Parameters
     ----------
     curve : TrueCurve
         The curve.
-    kind : int
-        LIBRATION or CIRCULATION.
-    panels : (m, 3) array
-        The start of each panel, as a phase angle or as a share of the lap, and its width as two doubles.
+    shares : (2, n) array
+        The share of the orbit's width at each node, as two doubles.
     orbit : tuple of float
         The orbit's width in arc length as two doubles with a sign, and the piece on which the phase begins.
-    shares : (2, n) array
-        Filled: the share of the orbit's width at each node.
     places : (PLACE, n) array
         Filled. On entry, its first column is the place at which the phase begins.
     """
     curve, width, width_low, number = unshared(curve), orbit[0], orbit[1], int(orbit[2])
     base, _ = arc_between(curve, number, (-1.0, 0.0), number, (places[1, 0], places[2, 0]))
-    nodes = np.empty((4, RULE))
-    for k in range(panels.shape[0]):
-        fill_panel(kind, (panels[k, 0], 0.0), (panels[k, 1], panels[k, 2]), 0, curve.rule, nodes)
-        for i in range(RULE):
-            distance, distance_low = multiply(nodes[0, i], nodes[1, i], width, width_low)
-            piece, place = place_at(curve, number, add(base[0], base[1], distance, distance_low))
-            to = k * RULE + i
-            shares[0, to], shares[1, to] = nodes[0, i], nodes[1, i]
-            places[0, to], places[1, to], places[2, to] = piece, place[0], place[1]
+    for i in range(shares.shape[1]):
+        distance, distance_low = multiply(shares[0, i], shares[1, i], width, width_low)
+        piece, place = place_at(curve, number, add(base[0], base[1], distance, distance_low))
+        places[0, i], places[1, i], places[2, i] = piece, place[0], place[1]
 
 
 def source_along(problem: Problem) -> ChartSource:
@@ -214,8 +195,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return np.setdiff1d(np.arange(2 + 2 * n), [row + k for k in unknown for row in (1, 2 + n)])
 
     @cached_property
-    def _panels(self) -> tuple[Array, Array, Array]:
-        """The edges of panels on which all integrands are resolved, their values there, and the integrals.
+    def _panels(self) -> Panels:
+        """All integrands on panels that resolve them.
 
         Raises
         ------
@@ -243,54 +224,23 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             return pairs((abs(high), abs(low), 0.0))
         return np.hstack([pairs((0.0, 0.0, 0.0), (high, low, UNIT * high)), ends[:, :, 0].T, ends[:, :, 1].T])
 
-    def _resolved(
-        self, evaluate: Callable[[Array, Array], Array], wanted: NDArray[np.intp]
-    ) -> tuple[Array, Array, Array]:
-        """Return `_panels` of integrands, of which the ``wanted`` are resolved, given their values as two doubles each
+    def _resolved(self, evaluate: Callable[[Array, Array], Array], wanted: NDArray[np.intp]) -> Panels:
+        """Return integrands on panels, of which the ``wanted`` are resolved, given their values as two doubles each
         and bounds on the errors for shares of the orbit's width and places.
         """
         curve, found, width = self._shape.pieces.curve, self._found, self._width
         row, kind = (LAUNCH, CIRCULATION) if self.direction else (LOWER, LIBRATION)
-        rule, tail_factors = panel_rule(), to_legendre()[:, -2:]
-        pending, done, sizes = np.stack([self._edges[:-1], np.diff(self._edges)], axis=1), [], NOWHERE
-        for _ in range(MAX_HALVINGS):
-            panels = np.column_stack([pending, np.zeros(len(pending))])
-            shares, places = np.empty((2, RULE * len(panels))), np.empty((PLACE, RULE * len(panels)))
+
+        def at_shares(shares: Array) -> Array:
+            places = np.empty((PLACE, shares.shape[1]))
             places[:, 0] = found[row, :PLACE]
-            fill_nodes(curve, kind, panels, (width[0], width[1], found[row, 0], 0.0), shares, places)
-            got = evaluate(shares, places).reshape(-1, 3, len(panels), RULE)
-            high, widths = got[wanted, 0], pending[:, 1]
-            if not np.isfinite(high).all():
-                break
-            here = (np.abs(got[:, 0]) @ rule[2]) @ widths
-            sizes = sizes if sizes.size else here
-            scale = np.where(sizes > 0.0, sizes, 1.0)[wanted, None]
-            tails = np.abs(high @ tail_factors).sum(axis=-1) * widths / scale
-            noise = (got[wanted, 2] @ rule[2]) * widths / scale
-            resolved = (tails <= np.maximum(MAX_TAIL, noise)).all(axis=0)
-            done.append((pending[resolved], got[:, :, resolved]))
-            left, width_left = pending[~resolved].T
-            if not left.size:
-                break
-            half = 0.5 * width_left
-            pending = np.stack([np.concatenate([left, left + half]), np.concatenate([half, half])], axis=1)
-        else:
-            raise SolutionError(UNDECIDED)
-        if not np.isfinite(high).all():
-            raise SolutionError(UNDECIDED)
-        panels, samples = np.concatenate([d[0] for d in done]), np.concatenate([d[1] for d in done], axis=2)
-        order = np.argsort(panels[:, 0])
-        panels, samples = panels[order], samples[:, :, order]
-        weights = rule[2] * panels[:, 1:]
-        errors = np.einsum("kmj,mj->k", samples[:, 2], weights)
-        if not (errors[wanted] <= MAX_ROUNDING * sizes[wanted]).all():
-            raise SolutionError(UNDECIDED)
-        integrals = np.array([_total(r[0] * weights, r[1] * weights) for r in samples])
-        integrals[np.abs(integrals) <= errors] = 0.0
-        return np.append(panels[:, 0], self._edges[-1]), samples[:, 0], integrals
+            fill_places(curve, shares, (width[0], width[1], found[row, 0], 0.0), places)
+            return evaluate(shares, places)
+
+        return resolved(kind, self._edges, at_shares, wanted, everywhere=False)
 
     def _integrals(self, first: int, count: int) -> Array:
-        return self._panels[2][first : first + count]
+        return self._panels.integrals[first : first + count]
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
         """Return the derivatives that `OrbitDerivatives.second_durations` describes.
@@ -323,19 +273,19 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             program = chart_libration_seconds(source, rows)
             ends = along(chart_turn_seconds(source, rows), inputs, np.zeros((2, 2)), self._turns)
         inputs = np.hstack([inputs, self._range(ends)])
-        return self._resolved(lambda *places: along(program, inputs, *places), np.arange(program.outputs.size))[2][1:]
+        everything = np.arange(program.outputs.size)
+        return self._resolved(lambda *places: along(program, inputs, *places), everything).integrals[1:]
 
     @property
     def series(self) -> tuple[SeriesOf, Array]:
         """As `OrbitDerivatives.series`."""
-        edges, samples, _ = self._panels
-        n = self.source.variables
+        panels, n = self._panels, self.source.variables
+        edges, samples = panels.edges, panels.samples
         arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
         if self.direction:
             arcs *= self.width
         else:
-            left, rule = edges[:-1, None], panel_rule()
-            arcs *= 0.5 * self.width * np.sin(left + np.diff(edges)[:, None] * rule[0])
+            arcs *= 0.5 * self.width * np.sin(panels.phases)
             edges = edges / (2.0 * np.pi)
         return PanelSeries(edges, np.concatenate([samples[: 1 + n], arcs])), np.zeros(n)
 
@@ -404,10 +354,3 @@ def _sum(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
     exact = sum(map(Fraction, (*a.tolist(), *b.tolist())), Fraction(0))
     high = float(exact)
     return high, float(exact - Fraction(high))
-
-
-def _total(high: Array, low: Array) -> float:
-    """Return the sum of numbers, rounded once."""
-    from math import fsum
-
-    return fsum([*high.ravel().tolist(), *low.ravel().tolist()])

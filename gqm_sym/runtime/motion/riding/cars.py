@@ -10,6 +10,7 @@ from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY, rider_loads
+from gqm_sym.runtime.launch.speed import length as vector_length
 from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space
 
 
@@ -85,7 +86,8 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     if not isinstance(track, TrackOfTrain):
         raise InputError("cars: this body is not a train; add Train(length=..., cars=...) to its forces")
     state, values = motion.state(t), problem.p.values.tolist()
-    length, gravity, friction = (float(number) for number in track.numbers(FLOATS, values))
+    length, _, friction, *_ = (float(number) for number in track.numbers(FLOATS, values))
+    chart = formulas.charted(problem.p)
     mass, count = values[list(formulas.parameters).index("m")], track.cars
     middle, v2 = np.atleast_1d(state.lam), np.atleast_1d(state.v2)
     shares = np.arange(2 * count + 1) / (2 * count) - 0.5
@@ -93,18 +95,23 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     lam, speeds = places.ravel(), np.broadcast_to(v2, places.shape).ravel()
     x, z, _, _, force = path_and_force_at(f.addresses, f.p, lam, speeds)
     if formulas.path_in_space is None:
-        angle = formulas.charted(problem.p).points(lam)[2]
+        angle = chart.points(lam)[2]
         y, along_x, along_y, along_z = 0.0 * lam, -force * np.sin(angle), 0.0 * lam, force * np.cos(angle)
     else:
-        y, along_x, along_y, along_z = path_in_space(formulas, f.p, lam, speeds, np.ones(lam.size))
+        directions = np.broadcast_to(np.atleast_1d(state.v), places.shape).ravel()
+        y, *vector = path_in_space(formulas, f.p, lam, speeds, directions)
+        along_x, along_y, along_z = vector
+        if formulas.directed:
+            force = vector_length(np.stack(vector))
     # Ends and couplings are at the even places, middles of cars at the odd ones.
     found = [row.reshape(places.shape)[1::2] for row in (lam, x, y, z)]
     found += [row.reshape(places.shape)[1::2] / count for row in (force, along_x, along_y, along_z)]
-    heights = z.reshape(places.shape)[::2]
-    # The force of a coupling is gravity on the cars behind it, less their mass times the acceleration of the train.
+    energies = track.potential(chart, values, places[::2])[0]
+    # The force of a coupling is that of the potential on the cars behind it, less their mass times the acceleration of
+    # the train.
     share = shares[2:-2:2].reshape(-1, *np.ones(middle.ndim, dtype=int)) + 0.5
-    behind = (heights[1:-1] - heights[0]) - share * (heights[-1] - heights[0])
-    coupling = mass * gravity / length * behind
+    behind = (energies[1:-1] - energies[0]) - share * (energies[-1] - energies[0])
+    coupling = mass / length * behind
     if friction:
         # The same holds for the friction on the cars behind, which is unknown for a train at rest.
         rubbing = np.cumsum(friction * np.sign(np.atleast_1d(state.v)) * np.abs(found[4]), axis=0)
@@ -112,18 +119,20 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     rows: list[Array] = [*found, coupling]
     kind: type[Cars] | type[CarsOfRiders] = Cars
     if formulas.rider_loads is not None:
-        rows, kind = [*rows, *_loads(problem, state, found[0], gravity)], CarsOfRiders
+        rows, kind = [*rows, *_loads(problem, state, found[0], track, values)], CarsOfRiders
     return kind(state.t, *(row if np.ndim(state.lam) else row[:, 0] for row in rows))
 
 
-def _loads(problem: Problem, state: Any, places: Array, gravity: float) -> tuple[Array, Array, Array]:
+def _loads(
+    problem: Problem, state: Any, places: Array, track: TrackOfTrain, values: list[float]
+) -> tuple[Array, Array, Array]:
     """Return the loads on riders upwards, to the left and ahead at places of a train."""
     lam, v, ahead = (np.atleast_1d(row) for row in (state.lam, state.v, state.n_longitudinal))
     speeds, direction = (np.broadcast_to(row, places.shape).ravel() for row in (v * v, np.sign(v)))
     formulas, p, car_places = problem.formulas, problem.functions.p, places.ravel()
     upwards, sideways = rider_loads(formulas, p, car_places, speeds, direction, np.zeros(car_places.size))[:2]
-    # The acceleration is that of the train; the component of gravity along the track is that at the car.
+    # The acceleration is that of the train; the component of the applied force along the track is that at the car.
     chart = formulas.charted(problem.p)
-    slopes, slope = chart.points(car_places)[2].reshape(places.shape), chart.points(lam.ravel())[2].reshape(lam.shape)
-    felt = ahead + (slopes - slope) * gravity / STANDARD_GRAVITY
+    slopes, slope = (track.potential(chart, values, at)[1] for at in (places, lam))
+    felt = ahead + (slopes - slope) / STANDARD_GRAVITY
     return upwards.reshape(places.shape), sideways.reshape(places.shape), felt
