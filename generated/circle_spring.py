@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 17, input bcc7b1afa151, body 334c6cd5db3e
+# interface 17, input bcc7b1afa151, body fdfda18fd73e
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -321,17 +321,18 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (13, n)), carray(out, (2, n))
     for i in range(n):
         L, w, h, g, _c0, _c1, _c2, _c3 = p[0, i], p[1, i], p[2, i], p[3, i], p[5, i], p[6, i], p[7, i], p[8, i]
-        _c4, _c5, _c6, _c7, a, b, da, db = p[9, i], p[10, i], p[11, i], p[12, i], lows[i], highs[i], left[i], right[i]
-        theta = place_from_ends(a, b, da, db)
+        _c4, _c5, _c6, _c7, da, db = p[9, i], p[10, i], p[11, i], p[12, i], left[i], right[i]
         _t0 = divdiff1_cos_in_square(da, db)
         _t1 = da/2 - db/2
         _t2 = _t1*divdiff1_sinc_in_square(da, db)
-        _t3 = L*(-_c5*_t2 + _c7*_t0)
-        _t4 = L**2
-        _t5 = da*db
-        _t6 = _c6 - _t0*_t5
-        _t7 = _c4*_t1 - _t2*_t5
-        out[0, i] = -_t3*g + w**2*(_c2*_t4*divdiff1_cos(a, theta, da) + _t3*(L*_c1 + L*(-_c5*_t7 + _c7*_t6) + 2*h) + _t4*(_c3*divdiff1_sin(a, theta, da) + (_c5*_t0 + _c7*_t2)*(_c0 + _c5*_t6 + _c7*_t7)))/2
+        _t3 = -_c5*_t2 + _c7*_t0
+        _t4 = L*_t3
+        _t5 = L**2
+        _t6 = da*db
+        _t7 = _c6 - _t0*_t6
+        _t8 = _c4*_t1 - _t2*_t6
+        _t9 = _c5*_t0 + _c7*_t2
+        out[0, i] = -_t4*g + w**2*(_c2*_t5*(-_c4*_c5 - _t3*db) + _t4*(L*_c1 + L*(-_c5*_t8 + _c7*_t7) + 2*h) + _t5*(_c3*(_c4*_c7 - _t9*db) + _t9*(_c0 + _c5*_t7 + _c7*_t8)))/2
         out[1, i] = L
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 17, input a0162e77d64e, body 424ef9cbe56f
+# interface 17, input a0162e77d64e, body 574dfa63efba
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -380,8 +380,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     for i in range(n):
         a, ecc, k, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
         _c5, _c6, _c7, _c8, _c9, _c10, _c11 = p[9, i], p[10, i], p[11, i], p[12, i], p[13, i], p[14, i], p[15, i]
-        _c12, _c13, _c14, _a, b, da, db = p[16, i], p[17, i], p[18, i], lows[i], highs[i], left[i], right[i]
-        E = place_from_ends(_a, b, da, db)
+        _c12, _c13, _c14, da, db = p[16, i], p[17, i], p[18, i], left[i], right[i]
         _t0 = divdiff1_cos_in_square(da, db)
         _t1 = da*db
         _t2 = _c5 - _t0*_t1
@@ -397,12 +396,14 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         _t12 = _c9/_t11
         _t13 = -2*ecc
         _t14 = _c14 + _t13
-        _t15 = divdiff1_cos(_a, E, da)
-        _t16 = _c6*_t2 - _t6
-        _t17 = divdiff1_sin(_a, E, da)
-        _t18 = (_c1*(_c13 + _t14) + _c2*_t8*(_c11 + _c12))*(_t15*(_c13 + _t13 + _t16) + _t17*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
-        _t19 = 1/(_c10 + _t11)
-        out[0, i] = -k*(_c7*_t12*_t18 - _t12*(-_t18*_t19 + _t19*(_c1*_t15 + _t8*(_c2*_t17 + (_c12 + _t9)*(_c4*_t0 + _c6*_t4)) + (_t14 + _t16)*(-_c4*_t4 + _c6*_t0))))/_c0
+        _t15 = -_c4*_t4 + _c6*_t0
+        _t16 = -_c3*_c4 - _t15*db
+        _t17 = _c6*_t2 - _t6
+        _t18 = _c4*_t0 + _c6*_t4
+        _t19 = _c3*_c6 - _t18*db
+        _t20 = (_c1*(_c13 + _t14) + _c2*_t8*(_c11 + _c12))*(_t16*(_c13 + _t13 + _t17) + _t19*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
+        _t21 = 1/(_c10 + _t11)
+        out[0, i] = -k*(_c7*_t12*_t20 - _t12*(-_t20*_t21 + _t21*(_c1*_t16 + _t15*(_t14 + _t17) + _t8*(_c2*_t19 + _t18*(_c12 + _t9)))))/_c0
         out[1, i] = a*sqrt(_t10 + _t7**2*_t8)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 17, input 8cb1e254c2ba, body 1a91ea1536a1
+# interface 17, input 8cb1e254c2ba, body 11901a01a5be
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -33,7 +33,7 @@ from gqm_sym.runtime.vocabulary import (
     CompiledFunctions, CompiledModel, ExactFormulas, Pass1, cos, cos_of_sum, divdiff1_cos_in_square,
     divdiff1_cosh_in_square, divdiff1_exp, divdiff1_sin, divdiff1_sin_of_sum, divdiff1_sinc_in_square,
     divdiff1_sinhc_in_square, divdiff2_exp, divdiff2_sin, exp, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt,
-    place_from_ends, sin, sin_of_sum, sinhc_near, speed_squared_from_potential,
+    place_from_ends, sin, sin_of_sum, sinc_near, sinhc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -307,34 +307,36 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (11, n)), carray(out, (2, n))
     for i in range(n):
         r0, b, g, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
-        _c5, a, _b, da, db = p[9, i], lows[i], highs[i], left[i], right[i]
+        _c5, _c6, a, _b, da, db = p[9, i], p[10, i], lows[i], highs[i], left[i], right[i]
         theta = place_from_ends(a, _b, da, db)
         _t0 = da/2
         _t1 = db/2
-        _t2 = _t1*b
-        _t3 = b*theta
-        _t4 = b*da
-        _t5 = b*db
-        out[0, i] = g*r0*(_c0*_c5*b**2*((_t0*b - _t2)*divdiff1_sinhc_in_square(_t4, _t5) + divdiff1_cosh_in_square(_t4, _t5)) + _c1*(_c3*divdiff1_cos_in_square(da, db) + _c4*(_t0 - _t1)*divdiff1_sinc_in_square(da, db)) + b*divdiff1_sin(a, theta, da)*sinhc_near(_t2)*exp(_b*b/2 + _t3/2))
-        out[1, i] = _c2*r0*exp(_t3)
+        _t2 = _c4*divdiff1_cos_in_square(da, db) + _c5*(_t0 - _t1)*divdiff1_sinc_in_square(da, db)
+        _t3 = b*da
+        _t4 = b*db
+        _t5 = _t1*b
+        _t6 = b*theta
+        out[0, i] = g*r0*(_c0*_c6*b**2*((_t0*b - _t5)*divdiff1_sinhc_in_square(_t3, _t4) + divdiff1_cosh_in_square(_t3, _t4)) + _c1*_t2 + b*(_c3*_c5 - _t2*db)*sinhc_near(_t5)*exp(_b*b/2 + _t6/2))
+        out[1, i] = _c2*r0*exp(_t6)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (6, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (7, n))
     for i in range(n):
         b, middle, rest, a, _b = p[1, i], middles[i], rests[i], lows[i], highs[i]
         _t0 = exp(b*middle)
         out[0, i] = sin(a)
         out[1, i] = exp(_b*b)
         out[2, i] = sqrt(b**2 + 1)
-        out[3, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[4, i] = cos_of_sum(0, 1, middle, rest, 0)
-        out[5, i] = _t0*b*rest + _t0
+        out[3, i] = sinc_near(_b/2 - a/2)
+        out[4, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[5, i] = cos_of_sum(0, 1, middle, rest, 0)
+        out[6, i] = _t0*b*rest + _t0
 
 
 @compiled(BOUNDS_BATCH)
@@ -357,7 +359,7 @@ MODEL = CompiledModel(
     ),
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=6,
+        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=7,
     ),
     domain_of=exact_domain, load_map=load_map,
     exact=ExactFormulas(

@@ -16,6 +16,7 @@ from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import axis_orbits_batch
 
 _CIRCULAR = frozenset({"divdiff2_cos", "divdiff2_sin"})
+_CIRCULAR_FIRST = frozenset({"divdiff1_cos", "divdiff1_sin"})
 _HYPERBOLIC = frozenset({"divdiff2_cosh", "divdiff2_exp", "divdiff2_sinh", "divdiff2_tanh"})
 """Divided differences that are split into factors of the orbit and factors of the place (MATHS, section 3). The latter
 are NaN for points too far apart, and a sweep then computes the orbit in another way.
@@ -56,6 +57,13 @@ class _Middle:
         even, odd = self.parts
         return self._turned(sin if name == "divdiff2_sin" else cos, even, odd)
 
+    def first(self, name: str, *, from_low: bool) -> Expr:
+        """Return the first difference of sin or cos over the place and one end, by that over both ends and the second
+        one: f[x,y] = f[x,w] - (w - y)*f[x,y,w].
+        """
+        whole = (cos(self.m) if name == "sin" else -sin(self.m)) * Function("sinc_near")((self.w - self.x) / 2)
+        return whole + (-self.gaps[1] if from_low else self.gaps[0]) * self.second(f"divdiff2_{name}")
+
     def hyperbolic_second(self, name: str, y: Expr) -> Expr:
         """Return the second difference of sinh, cosh, exp or tanh.
 
@@ -93,11 +101,19 @@ def _with_constant_factors(
 ) -> list[Expr]:
     """Write sines, cosines and second differences in terms of factors most of which are constant along an orbit."""
     known, narrow = set[tuple[Expr, Expr]](), set[Expr]()
+    # The orbits of the second differences, by the arguments of the first differences over the place and one end.
+    with_end: dict[tuple[Expr, ...], tuple[_Middle, bool]] = {}
 
     def second(t: Expr) -> Expr:
-        x, _y, w, *both = t.args
+        x, y, w, *both = t.args
         known.add((both[0], both[1]))
-        return _Middle(x, w, (both[0], both[1])).second(t.func.__name__)
+        middle = _Middle(x, w, (both[0], both[1]))
+        with_end[x, y, both[0]], with_end[y, w, both[1]] = (middle, True), (middle, False)
+        return middle.second(t.func.__name__)
+
+    def first(t: Expr) -> Expr:
+        middle, from_low = with_end[t.args]
+        return middle.first(t.func.__name__.removeprefix("divdiff1_"), from_low=from_low)
 
     def hyperbolic_second(t: Expr) -> Expr:
         x, y, w, *both = t.args
@@ -119,6 +135,12 @@ def _with_constant_factors(
         return _Middle(x, w, scaled).value(t.func)
 
     forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR, second) for f in forms]
+    forms = [
+        f.replace(
+            lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR_FIRST and t.args in with_end, first
+        )
+        for f in forms
+    ]
     forms = [
         f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _HYPERBOLIC, hyperbolic_second)
         for f in forms

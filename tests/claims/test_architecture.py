@@ -115,6 +115,8 @@ TESTED_THROUGH = {
     "gradients/charts/space_programs.py": "runtime/gradients/test_space_charts.py",
     "gradients/evaluation.py": "runtime/gradients/test_quantities.py",
     "gradients/formula_orbit.py": "runtime/gradients/test_quantities.py",
+    "gradients/lanes/arrivals/beside_hilltops.py": "runtime/gradients/passages/test_arrival.py",
+    "gradients/lanes/arrivals/changes.py": "runtime/gradients/lanes/arrivals/test_times.py",
     "gradients/lanes/arrivals/integrals.py": "runtime/gradients/lanes/arrivals/test_times.py",
     "gradients/lanes/arrivals/programs.py": "runtime/gradients/lanes/arrivals/test_times.py",
     "gradients/lanes/arrivals/weights.py": "runtime/gradients/lanes/arrivals/test_times.py",

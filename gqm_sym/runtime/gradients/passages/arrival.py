@@ -39,8 +39,12 @@ def arrival_slopes(motion: Any, derivatives: FormulaOrbitDerivatives, place: flo
     heading, lam0, at_rest = motion.direction, motion.problem.lam0, motion.problem.w0 == 0.0
     ahead = int(heading > 0)
     has_turned = not at_rest and heading * (place - lam0) < 0.0
-    # The motion begins or turns at one of the ends; on its direct way to the place, times may be counted from either.
-    base = 1 - ahead if at_rest or (not has_turned and moves[1 - ahead] < moves[ahead]) else ahead
+    # The motion begins or turns at one of the ends. On its direct way to the place, times may be counted from either:
+    # from the one that moves less, or is nearer.
+    least, most = min(lam0, place), max(lam0, place)
+    base = 1 - ahead if at_rest else ahead
+    if not at_rest and not has_turned:
+        base = int(moves[1] * (ends[1] - least) < moves[0] * (most - ends[0]))
     sign = -1 if base != ahead and not at_rest else 1
     changes = PassageChanges(motion.problem, sign * heading, ends[base], inf, has_asymptote=False)
     try:

@@ -157,9 +157,13 @@ def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
         rows[SEARCH_DIRECTION, :n],
         rows[TRIAL, :n],
     )
+    any_axis = False
     for j in range(n):
         offsets[j] = direction[j] * axes[j]
         places[j] = start[j] + offsets[j]
+        any_axis |= axes[j] != trial[j]
+    if not any_axis:
+        return
     call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
     for j in range(n):
         trial[j] = choose(w0[j] - 2.0 * offsets[j] * out[0, j] < 0.0, axes[j], trial[j])

@@ -18,7 +18,7 @@ from gqm_sym.runtime.gradients.lanes.arrivals.weights import (
     fill_weights,
     tail_size,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import MAX_OPEN, rows_of
+from gqm_sym.runtime.gradients.lanes.evaluation import rows_of
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The largest size of the last terms of a series, and the largest change of an integral by the last doubling of the
@@ -110,7 +110,7 @@ def integrate(program, work, rule, lanes, state, spaces, found):  # type: ignore
         The program of the time per phase, whose inputs are filled.
     rule : (int, (4, n) array, (int, int))
         LIBRATION or CIRCULATION; the table of shares (`nodes.trapezoidal_nodes`); the number of nodes to begin with,
-        and the one after which no more are tried for few orbits (`weights.PASSES`).
+        and the largest one (`weights.PASSES`).
     lanes : int
         The number of orbits.
     state : (ROWS, BLOCK) array
@@ -142,7 +142,7 @@ def integrate(program, work, rule, lanes, state, spaces, found):  # type: ignore
             fill_tail(kind, n, node, factors)
             add_node(program, work, (weights[node], counts[0], counts[1]), factors, lanes, sums)
         left = judge(kind, n == limits[0], lanes, sums, found, states)
-        if left == 0 or (n >= limits[1] and left <= MAX_OPEN * lanes):
+        if left == 0 or n >= limits[1]:
             return
 
 

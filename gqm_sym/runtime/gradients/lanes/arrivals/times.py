@@ -8,7 +8,7 @@ to an end they are large, and of those of the launch parts cancel there, so that
 arithmetic.
 """
 
-from math import atan2, fabs, nan, sqrt
+from math import atan2, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -23,14 +23,12 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpret
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
 from gqm_sym.runtime.gradients.evaluation import PROGRAM
 from gqm_sym.runtime.gradients.formula_orbit import source_of
-from gqm_sym.runtime.gradients.lanes.arrivals.integrals import DONE, INTEGRALS, SCALE, VALUE, integrate, work_space
+from gqm_sym.runtime.gradients.lanes.arrivals.beside_hilltops import fill_beside_hilltops, gauss_nodes
+from gqm_sym.runtime.gradients.lanes.arrivals.changes import LAM0, MAX_ERROR, PARAMETER, V0, evaluate_at, total_change
+from gqm_sym.runtime.gradients.lanes.arrivals.integrals import DONE, INTEGRALS, VALUE, integrate, work_space
 from gqm_sym.runtime.gradients.lanes.arrivals.programs import (
     ABOVE,
     BELOW,
-    DS,
-    MOVED,
-    SHIFTS,
-    SLOPE,
     SQUARE,
     has_fixed_laps,
     place_program,
@@ -46,7 +44,7 @@ from gqm_sym.runtime.gradients.lanes.arrivals.weights import (
     ROWS,
     WHOLE,
 )
-from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
+from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs
 from gqm_sym.runtime.gradients.lanes.launches import EVEN, Launches
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
@@ -55,26 +53,7 @@ from gqm_sym.runtime.gradients.programs import Source, circulation_program, libr
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
-# The largest bound on the rounding errors of the derivatives of phases, as a share of the terms of a sum.
-MAX_ERROR = 1e-15
-
-# The kinds of variables: a run-time parameter, and the place and the speed of the launch.
-PARAMETER, LAM0, V0 = range(3)
-
 WHICH, LIMITS = types.int64[:, ::1], types.UniTuple(INTEGER, 2)
-
-
-@Inner
-def evaluate_at(program, work, places, column, lanes, found):  # type: ignore[no-untyped-def]
-    """Fill the results of a program at places, which are a column, and the bounds on their errors."""
-    high, low, error = rows_of(work, program[3] * ROW)
-    for i in range(lanes):
-        high[i], low[i], error[i] = places[min(i, places.shape[0] - 1), column], 0.0, 0.0
-    call_interpreter(program[0], program[1], program[2], program[1].shape[0], work, lanes)
-    for j in range(program[4].size):
-        values, _, errors = rows_of(work, program[4][j])
-        for i in range(lanes):
-            found[j, 0, i], found[j, 1, i] = values[i], errors[i]
 
 
 @Inner
@@ -109,35 +88,6 @@ def fill_phases(asked, v0, here, there, lanes, state):  # type: ignore[no-untype
         passes_far_end = not rests and not towards and not onwards
         state[PLACE_SIGN, i] = -1.0 if passes_far_end or (towards and onwards and not rests) else 1.0
         state[WHOLE, i] = 2.0 if passes_far_end else 0.0
-
-
-@Inner
-def total_change(which, i, v0, here, there, state, integrals):  # type: ignore[no-untyped-def]
-    """Return the derivative of a time of a libration, and the bound on its error as a share of its terms.
-
-    Parameters
-    ----------
-    which : (int, int)
-        The kind of the variable, and the number of its derivatives among those of the program.
-    i : int
-        The number of the orbit.
-    v0, here, there, state, integrals
-        As for `fill_phases` and `integrate`.
-    """
-    (kind, j), rests = which, v0 == 0.0
-    along = state[FLIP, i] * state[PLACE_SIGN, i] * there[DS, 0, i] / sqrt(there[SQUARE, 0, i])
-    speed = 1.0 if kind == V0 or rests else v0
-    from_launch = state[FLIP, i] * state[LAUNCH_SIGN, i] * here[DS, 0, i] / speed
-    factor = here[SLOPE, 0, i] if kind == LAM0 else (v0 if kind == V0 else 1.0)
-    row = MOVED if kind == LAM0 else SHIFTS + j
-    inside, at_place = factor * integrals[1 + j, VALUE, i], factor * along * there[SHIFTS + j, 0, i]
-    # A launch at rest is an end of the orbit, except for other speeds.
-    from_launch = 0.0 if rests and kind != V0 else from_launch
-    at_launch = from_launch * here[row, 0, i]
-    error = fabs(factor * along) * there[SHIFTS + j, 1, i] + fabs(from_launch) * here[row, 1, i]
-    error += 0.5 * fabs(at_place) * there[SQUARE, 1, i] / there[SQUARE, 0, i]
-    size = fabs(factor) * integrals[1 + j, SCALE, i] + fabs(at_place) + fabs(at_launch)
-    return inside + (at_place + at_launch), error / size if size > 0.0 else error
 
 
 @entry(
@@ -257,7 +207,7 @@ def arrival_gradients(formulas: Formulas, launches: Launches, places: Array, row
     if not rows:
         return found
     general, small = (libration_program, LaneRecorder), (small_swing_program,)
-    for (make, *last), limits in ((general, PASSES[0]), (small, PASSES[0]), (general, PASSES[1])):
+    for (make, *last), limits in ((general, PASSES[0]), (small, PASSES[0]), (general, None), (general, PASSES[1])):
         is_open = np.flatnonzero(~circulates & np.isnan(found).any(axis=1))
         if is_open.size:
             _fill_swings(source, launches, places, rows, (make, last, limits), (is_open, found))
@@ -278,7 +228,7 @@ def _fill_swings(
     launches: Launches,
     places: Array,
     rows: tuple[int, ...],
-    stage: tuple[Any, Any, tuple[int, int]],
+    stage: tuple[Any, Any, tuple[int, int] | None],
     filled: tuple[NDArray[np.intp], Array],
 ) -> None:
     """Fill the derivatives of some librations.
@@ -291,7 +241,7 @@ def _fill_swings(
         As for `arrival_gradients`.
     stage : (callable, sequence, (int, int))
         The function that makes the program of the time per phase (None if there is none), its last arguments, and the
-        numbers of nodes of a pass.
+        numbers of nodes of a pass; None in place of these for integrals from one turning point (`beside_hilltops`).
     filled : pair of arrays
         The numbers of the launches, and the derivatives of all launches.
     """
@@ -307,12 +257,16 @@ def _fill_swings(
     ways, out = np.empty((found.shape[0], 4)), np.empty((chosen.size, len(rows)))
     ways[:, 0], ways[:, 1], ways[:, 2] = launches.lines[-2], launches.directions, places
     ways[:, 3] = launches.kinds >= EVEN
-    table, ways, rule = launches.table[:, chosen], ways[chosen], (trapezoidal_nodes(LIBRATION), which, limits)
+    table, ways = launches.table[:, chosen], ways[chosen]
 
     def work(part: slice) -> None:
         *spaces, place_space, space = (one.work.copy() for one in programs)
         given = (low, high), tuple(spaces), (orbit, place), (space, place_space)
-        fill_swing_arrivals(*given, rule, np.ascontiguousarray(table[:, part]), ways[part], out[part])
+        of_part = np.ascontiguousarray(table[:, part]), ways[part], out[part]
+        if limits is None:
+            fill_beside_hilltops(*given, (gauss_nodes(), which), *of_part)
+        else:
+            fill_swing_arrivals(*given, (trapezoidal_nodes(LIBRATION), which, limits), *of_part)
 
     run_in_threads(work, chosen.size, MIN_LAUNCHES_PER_THREAD)
     found[chosen] = out

@@ -12,7 +12,7 @@ import numpy as np
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 
-# The numbers of nodes that are tried in turn; those to begin with, and those after which few orbits of a batch are left
+# The numbers of nodes that are tried in turn; those to begin with, and those after which orbits that are open are left
 # to the next pass, in successive passes. The first one of a lap only shows how much the second one changes.
 NODES, PASSES = (16, 32, 64, 128, 256, 512), ((16, 64), (64, 512))
 MOST = NODES[-1]
