@@ -319,6 +319,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side and the last time as in `GivenCurve`.
     """
     (quantity, target, side, t_max), limit, half_v2_at_edges = asked, inf, buffers.half_v2_at_edges
+    lost = nan  # the place at which a body that is to arrive elsewhere leaves the track
     by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
     tabulated = not by_ends or side != 0
     tabulated = tabulated and passage.panels > 0 and fill_half_v2_at_edges(curve, passage, half_v2_at_edges)
@@ -332,7 +333,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
                 return UNDECIDED
         if place == place and needs_period:
             return NOT_PERIODIC
-        if quantity != END_TIME and place == place:
+        if quantity not in (END_TIME, ARRIVAL_TIME) and place == place:
             return UNDECIDED
         if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
             return UNDECIDED
@@ -341,6 +342,8 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
             return ANSWERED if t_max < inf else NOT_PERIODIC
         if quantity == END_TIME:
             quantity, target, limit = ARRIVAL_TIME, place, t_max
+        elif quantity == ARRIVAL_TIME:
+            lost = place
     if quantity == SPANS:
         out[0], out[1] = orbit.low, orbit.high
         if orbit.circulates:
@@ -354,6 +357,10 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
+    if lost == lost:
+        until = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, lost, buffers)
+        if not value <= until:
+            return NEVER_THERE if value > until else UNDECIDED
     out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
     return ANSWERED if isfinite(value) else UNDECIDED
 

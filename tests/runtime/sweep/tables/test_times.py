@@ -207,7 +207,11 @@ def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of:
         with mp.workdps(30):
             place = mp.acos((2 - v0**2 / G) / 3)
             truth = 2 * mp.ellipf(place / 2, 4 * G / v0**2) / v0
+            on_way = 2 * mp.ellipf(mpf(float(place) / 2) / 2, 4 * G / v0**2) / v0
         assert swept.values[k] == pytest.approx(float(truth), rel=1e-13)
+        arrivals = sweep("time_at", 0.0, speed[k], lam=np.array([0.5, 1.01]) * float(place), contact="above")
+        assert arrivals.route_counts() == {"single": 2}  # the second place is beyond that where contact is lost
+        assert arrivals.values == pytest.approx([float(on_way), np.nan], rel=1e-13, nan_ok=True)
         cut = sweep("t_end", 0.0, speed[k], contact="above", t_max=0.9 * float(truth))
         assert cut.values == pytest.approx(0.9 * float(truth))
     assert sweep("half_period", 0.0, speed, contact="above").status_counts() == {STATUS_SENTENCES[2]: 4}
