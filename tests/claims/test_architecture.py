@@ -107,6 +107,7 @@ TESTED_THROUGH = {
     "double_double/interpreter.py": "runtime/double_double/test_arithmetic.py",
     "double_double/nodes.py": "runtime/double_double/test_orbit_time.py",
     "double_double/quadrature.py": "runtime/double_double/test_orbit_time.py",
+    "gradients/charts/means.py": "runtime/gradients/test_means.py",
     "gradients/charts/orbit.py": "runtime/gradients/test_charts.py",
     "gradients/charts/programs.py": "runtime/gradients/test_charts.py",
     "gradients/charts/second_programs.py": "runtime/gradients/test_seconds.py",

@@ -176,11 +176,13 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
     """Return whether the next leg has to be followed too."""
     if body[ENDING] != 0.0 or arrival < inf:
         return False
+    # A body that has turned at two points reaches no place outside of them any more.
+    if question == ARRIVAL and body[TURNS] >= (1.0 if body[FROM_REST] else 2.0):
+        return False
     if isfinite(body[HORIZON]):
         return body[ELAPSED] < body[HORIZON]
     if question == ARRIVAL:
-        # A body that has turned at two points reaches no place outside of them any more.
-        return body[TURNS] < (1.0 if body[FROM_REST] else 2.0)
+        return True
     return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
 
 
@@ -286,7 +288,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        if dissipation.friction and slides_little(record, body):
+        if dissipation.friction and slides_little(dissipation, p, joints, record, body):
             break
         findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
@@ -300,16 +302,22 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
 
 
 @Inner
-def slides_little(record, body):  # type: ignore[no-untyped-def]
-    """Return whether a leg from rest is so short that, with friction, it is followed by the distance from where
-    friction balances the other forces.
+def slides_little(dissipation, p, joints, record, body):  # type: ignore[no-untyped-def]
+    """Return whether a leg from rest is so short that, with friction, it may have to be followed by the distance from
+    where friction balances the other forces. Between two planes legs are as short, but there is no such place nearby.
     """
     width, size = fabs(record[END] - record[START]), max(fabs(record[END]), body[LEAST_SIZE])
-    return record[START_V2] == 0.0 and width < SLIDING_SHARE * min(size, body[FIRST_STEP])
+    if not (record[START_V2] == 0.0 and width < SLIDING_SHARE * min(size, body[FIRST_STEP])):
+        return False
+    place, direction, v2 = body[PLACE], body[DIRECTION], body[V2]
+    body[PLACE], body[DIRECTION], body[V2] = record[START], record[HEADING], 0.0
+    is_near_balance = may_be_small(dissipation, p, joints.corners, body)
+    body[PLACE], body[DIRECTION], body[V2] = place, direction, v2
+    return is_near_balance
 
 
 @Inner
-def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
+def is_tiny(dissipation, p, joints, record, body):  # type: ignore[no-untyped-def]
     """Return whether a leg is so short that the next one, or with friction this one, may have to be followed by the
     distance from an equilibrium, or cannot be followed at all.
     """
@@ -317,7 +325,7 @@ def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
     if max(fabs(start), fabs(end)) < LEAST_SWING:
         return True
     if dissipation.friction:
-        return slides_little(record, body)
+        return slides_little(dissipation, p, joints, record, body)
     width = fabs(end - start)
     is_too_wide = body[RETRY_WIDTH] < width <= body[RETRY_WIDTH] / LEAST_RETRY_SHARE
     return width < SMALL_SHARE * max(fabs(end), body[LEAST_SIZE]) and not is_too_wide
@@ -362,7 +370,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         count += 1
         record[USED] = size
         body[PANEL_COUNT] += 1.0 + record[AHEAD] + record[BACK]
-        body[STATUS] = 1.0 if is_tiny(dissipation, record, body) else 0.0
+        body[STATUS] = 1.0 if is_tiny(dissipation, p, joints, record, body) else 0.0
         if what in (END_TURN, END_REST):
             pack(record)
         body[LAST_AT] = used

@@ -4,7 +4,8 @@ A part between two joints of a sampled curve is so short that polynomials throug
 the length L of the contact force per mass, the law is ``dW/dd = P - Q W - f L`` along the distance d. With an L that
 changes evenly from its value at the start to about that at the end, W follows from integrals that are kept. From there
 one step of Newton's method for the actual L leads to W with an error below rounding, because L depends on W almost
-linearly. Bounds of all this are tested, and longer parts have more nodes (`solving`).
+linearly; where it does not, the second derivative of L with respect to W is taken into account too. Bounds of all this
+are tested, and longer parts have more nodes (`solving`).
 
 Time is the integral of ``ds/sqrt(W)`` by a Gauss-Legendre rule with 8 nodes, from the polynomial W.
 """
@@ -82,12 +83,12 @@ few_buffer = on_stack(22 * LANES)
 # The largest q, with which the terms left out of its exponential function are below rounding.
 MAX_EXPONENT = 2.0**-5
 
-# The largest last two coefficients of friction as shares of V**2, with which those beyond are far below rounding; and
-# the largest ones of the rate of time as a share of its mean. Its integral is right up to twice the degree, and has an
-# error of about the square of them.
-MAX_TAIL_BEFORE, MAX_TAIL, MAX_TAIL_OF_RATE = 2.0**-39, 2.0**-46, 2.0**-20
+# The largest last two coefficients of friction as shares of V**2, with which the integrals of those beyond are below
+# rounding; and the largest ones of the rate of time as a share of its mean. Its integral is right up to twice the
+# degree, and has an error of about the square of them.
+MAX_TAIL_BEFORE, MAX_TAIL, MAX_TAIL_OF_RATE = 2.0**-34, 2.0**-41, 2.0**-20
 
-# A bound, as a share of V**2, of several times the error of the step of Newton's method.
+# A bound, as a share of V**2, of several times the error of the solution.
 NEGLIGIBLE = 2.0**-54
 
 scaled_row = over_rows(lambda row, factor: factor * row, LANES)
@@ -107,6 +108,10 @@ root_row = over_rows(np.sqrt, LANES)
 slope_row = over_rows(lambda b, c, w, length: (0.5 * b + w * c) / length, LANES)
 rate_row = over_rows(lambda q, f, slope: q + f * slope, LANES)
 excess_row = over_rows(lambda f, f_1, length, begin, more: f * (length - begin) - more * f_1, LANES)
+discriminant_row = over_rows(lambda a, b, c: a * c - 0.25 * (b * b), LANES)
+bent_row = over_rows(
+    lambda f, bend, length, change: 0.5 * f * bend * ((change * change) / (length * length * length)), LANES
+)
 time_rate_row = over_rows(lambda ds, w: ds / np.sqrt(w), LANES)
 
 
@@ -136,7 +141,7 @@ class Passed(NamedTuple):
 
 @Inner
 def is_row_short(work, row, size):  # type: ignore[no-untyped-def]
-    """Return whether few nodes resolve a row of a panel."""
+    """Return whether few nodes resolve a row of a panel, apart from a rounding of ``size``."""
     to_coefficients(work, row, work, SERIES)
     tail = 0.0
     for k in range(FEW, COUNT):
@@ -159,8 +164,10 @@ def is_law_short(width, work):  # type: ignore[no-untyped-def]
     ):
         if not is_row_short(work, row, size):
             return False
+    # Only the share f of an error of L is one of the law.
+    share = 1.0 / size_of(work, RUBBING)
     for row, size in ((AT_REST, at_rest), (MIXED, 2.0 * sqrt(at_rest * turning)), (TURNING, turning)):
-        if not is_row_short(work, row, size):
+        if not is_row_short(work, row, share * size):
             return False
     return True
 
@@ -218,6 +225,16 @@ def rises(few, row, sign):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def correct(v2, few):  # type: ignore[no-untyped-def]
+    """Correct W, the row V2, for a term of the law that has been left out, the row TERM, and fill in the change."""
+    grown_row(few, TERM, TERM, EVEN, ODD)
+    to_integrals(few, TERM, few, CHANGE)
+    decayed_row(few, CHANGE, CHANGE, EVEN, ODD)
+    corrected_row(few, INCREASE, INCREASE, CHANGE)
+    v2_row(few, V2, INCREASE, v2)
+
+
+@Inner
 def pass_few(v2, gaps, at, few):  # type: ignore[no-untyped-def]
     """Return the passage of a part, at whose start V**2 is ``v2``, by the rows kept from ``gaps[at]`` on; ``few`` is a
     `few_buffer`, and gets the rows V2 and SQUARED.
@@ -237,17 +254,21 @@ def pass_few(v2, gaps, at, few):  # type: ignore[no-untyped-def]
     to_integrals(few, RATE, few, EXPONENT)
     is_small = exponentiate(few)
     excess_row(few, TERM, FRICTION, FRICTION_1, LENGTH, length, more)
-    grown_row(few, TERM, TERM, EVEN, ODD)
-    to_integrals(few, TERM, few, CHANGE)
-    decayed_row(few, CHANGE, CHANGE, EVEN, ODD)
-    corrected_row(few, INCREASE, INCREASE, CHANGE)
-    v2_row(few, V2, INCREASE, v2)
+    correct(v2, few)
     end, (low, high), change = few[V2 + FEW], extent(few, V2), size_of_few(few, CHANGE)
-    # The second derivative of f L with respect to W, times L**3.
-    bend = few[FRICTION + FEW] * (few[SQUARE + FEW] * few[SQUARE_2 + FEW] - 0.25 * few[SQUARE_1 + FEW] ** 2)
-    is_solved = is_small and bend * change * change <= NEGLIGIBLE * end * few[SQUARED + FEW] * few[LENGTH + FEW]
     to_last(few, TERM, few, LAST)
     is_short = fabs(few[LAST]) <= MAX_TAIL_BEFORE * low and fabs(few[LAST + 1]) <= MAX_TAIL * low
+    # The second derivative of f L with respect to W, times L**3.
+    bend = few[FRICTION + FEW] * (few[SQUARE + FEW] * few[SQUARE_2 + FEW] - 0.25 * few[SQUARE_1 + FEW] ** 2)
+    left, allowed = bend * change * change, NEGLIGIBLE * end * few[SQUARED + FEW] * few[LENGTH + FEW]
+    if is_small and is_short and left > allowed:
+        discriminant_row(few, TERM, SQUARE, SQUARE_1, SQUARE_2)
+        bent_row(few, TERM, FRICTION, TERM, LENGTH, CHANGE)
+        correct(v2, few)
+        end, (low, high) = few[V2 + FEW], extent(few, V2)
+        # The third derivative is the second one times -3 dL/dW over L.
+        left *= change * fabs(0.5 * few[SQUARE_1 + FEW] + w * few[SQUARE_2 + FEW]) / few[SQUARED + FEW]
+    is_solved = is_small and left <= allowed
     if not (is_solved and is_short and low > 0.0):
         return Passed(nan, end, low, high, 0.0, 0.0, inf)
     to_gauss(few, V2, few, TERM)
