@@ -313,6 +313,25 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
 
 
 @Inner
+def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with a time or an extreme on an orbit; return the status.
+
+    ``asked`` is the quantity, the place for ARRIVAL_TIME, the place before which the body must arrive there (NaN if
+    there is none), and the largest value.
+    """
+    quantity, target, lost, limit = asked
+    value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
+    if value == inf:
+        return NEVER_THERE
+    if lost == lost:
+        until = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, lost, buffers)
+        if not value <= until:
+            return NEVER_THERE if value > until else UNDECIDED
+    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
+    return ANSWERED if isfinite(value) else UNDECIDED
+
+
+@Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; return the status, which is SPAN_KNOWN for SPANS.
 
@@ -354,15 +373,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
-    value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
-    if value == inf:
-        return NEVER_THERE
-    if lost == lost:
-        until = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, lost, buffers)
-        if not value <= until:
-            return NEVER_THERE if value > until else UNDECIDED
-    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
-    return ANSWERED if isfinite(value) else UNDECIDED
+    return fill_value(curve, orbit, passage, tabulated, (quantity, target, lost, limit), buffers, out)
 
 
 @entry(
