@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 17, input 2558bd3a8d44, body b39d2801bbae
+# interface 17, input 2558bd3a8d44, body d60883e9fd97
 """Bead on a hanging chain
 
 x              = x
@@ -32,7 +32,7 @@ from gqm_sym.runtime.vocabulary import (
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
     TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, Pass1,
     cosh, divdiff1_cosh, divdiff1_cosh_in_square, divdiff1_sinhc_in_square, divdiff2_cosh, iconst, icosh, idiv, imul,
-    isinh, place_from_ends, sinh, speed_squared_from_potential,
+    isinh, place_from_ends, sinh, sinh_of_ratio, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -335,15 +335,14 @@ def integrand_invariants_batch(n, halves, p, out):
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
         c, half = p[0, i], halves[i]
-        _t0 = half/(2*c)
-        _t1 = cosh(_t0)
-        _t2 = _t1 + 1
-        _t3 = _t2**2
-        _t4 = 1/_t3
-        out[0, i] = _t4*sinh(_t0)**2
-        out[1, i] = 2/_t2
-        out[2, i] = 4*_t1*_t4
-        out[3, i] = _t3/4
+        _t0 = sinh_of_ratio(1, half, 4*c)**2
+        _t1 = _t0 + 1
+        _t2 = 1/_t1
+        _t3 = _t1**2
+        out[0, i] = _t0*_t2
+        out[1, i] = _t2
+        out[2, i] = (2*_t0 + 1)/_t3
+        out[3, i] = _t3
 
 
 @compiled(TURNING_POINT_BATCH)
@@ -373,15 +372,13 @@ def bounds_batch(n, lo, hi, p, out):
 def exact_time_integrand(op, half, sine2, cosine2, p):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     c, g = p[0], p[1]
-    _t0 = half/(2*c)
-    _t1 = op.cosh(_t0)
-    _t2 = _t1 + 1
-    _t3 = 1/_t2**2
-    _t4 = _t3*sine2
-    _t5 = 4*_t1*_t4 + cosine2
-    _t6 = _t4*op.sinh(_t0)**2
-    _t7 = 4*c
-    return _t3*_t7*(4*_t6 + (_t6 + 1)**2)**2/(_t5*g*(cosine2 + 2*sine2/_t2)**4), _t5*_t7*g
+    _t0 = op.sinh(half/(4*c))**2
+    _t1 = _t0 + 1
+    _t2 = 1/_t1**2
+    _t3 = sine2/_t1
+    _t4 = _t2*sine2*(2*_t0 + 1) + cosine2
+    _t5 = _t0*_t3
+    return _t2*c*(4*_t5 + (_t5 + 1)**2)**2/(_t4*g*(_t3 + cosine2)**4), 4*_t4*c*g
 
 
 MODEL = CompiledModel(

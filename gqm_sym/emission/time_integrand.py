@@ -1,7 +1,8 @@
 """The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
-from sympy import Expr, Symbol
+from sympy import Expr, Function, Symbol, sinh
 
+from gqm_sym.derivation.algebra.angles import is_power_of_two
 from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, FunctionIR
@@ -92,6 +93,20 @@ def _without_constant_divisors(form: Expr, moving: set[Symbol]) -> Expr:
     return above * below * rest
 
 
+def _with_exact_arguments(value: Expr, half: Symbol) -> Expr:
+    """Let hyperbolic sines of a multiple of half the orbit's width be those of the exact multiple.
+
+    On a wide orbit the rounding of the argument is several roundings of the sine, and all nodes have it in common.
+    """
+
+    def exact(call: Expr) -> Expr:
+        rate = call.args[0] / half
+        above, below = rate.as_numer_denom()
+        return call if rate.has(half) or is_power_of_two(rate) else Function("sinh_of_ratio")(above, half, below)
+
+    return value.replace(lambda t: isinstance(t, sinh), exact)
+
+
 def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr) -> tuple[FunctionIR, ...]:
     names = lowering.names
     sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
@@ -121,7 +136,7 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr
         (halves,),
         "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters.",
         inside=[(own[HALF], at(halves))],
-        outputs=tuple(value for _, value in held),
+        outputs=tuple(_with_exact_arguments(value, own[HALF]) for _, value in held),
         batch=True,
     )
     return emitted, invariants

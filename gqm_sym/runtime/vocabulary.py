@@ -22,7 +22,7 @@ _NAMES_BY_HOME = {
         "divdiff2_cosh_near divdiff2_exp divdiff2_sin divdiff2_sin_near divdiff2_sinh divdiff2_sinh_near "
         "divdiff2_tan divdiff2_tanh mean_sech sinc_near sinhc_near sum_of_sinhc"
     ),
-    "arithmetic.elementary": "atan cos cos_of_sum cosh exp sin sin_of_sum sinh tanh",
+    "arithmetic.elementary": "atan cos cos_of_sum cosh exp sin sin_of_sum sinh sinh_of_ratio tanh",
     "arithmetic.intervals": (
         "iabs iacos iacosh iadd iasin iasinh iatan iatanh iconst icos icosh idiv iexp iinv ilog imul ipi "
         "ipoint ipow irpow isin isinh isqrt itan itanh"

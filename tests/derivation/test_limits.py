@@ -47,7 +47,7 @@ def test_curves_of_any_size(z: str) -> None:
 
 def test_a_curve_that_is_real_nowhere() -> None:
     """A curve that is complex everywhere is refused."""
-    with confined(10.0), pytest.raises(DeclarationError, match="z: asin.* is not a real number at any place tried"):
+    with confined(10.0), pytest.raises(DeclarationError, match=r"z: asin.* is not a real number at any place tried"):
         gqm.derive(gqm.Curve.graph("asin(2 + x**2)"), gqm.Gravity())
 
 

@@ -139,15 +139,7 @@ def symmetric_orbits(
     by_square = {_SINE: 4 * Y / more**2, _COSINE: less**2 / more**2}
     divisor = sp.together(slope.xreplace(by_square)) * ONE_MINUS_YT  # each takes one division
     integrand = 4 * sp.together(metric.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
-    # The squares of a cosine and a tangent of half an argument, by functions of the argument itself.
-    sine, cosine = waves.sine(rate * HALF / 2), waves.cosine(rate * HALF / 2)
-    invariants = (
-        (T, (sine / (1 + cosine)) ** 2),
-        (ONE_MINUS_T, (2 * cosine if waves.sign < 0 else 2) / (1 + cosine)),
-        (ONE_MINUS_TT, 4 * cosine / (1 + cosine) ** 2),
-        (SINE_SQUARED, sine**2),
-        (COSINE_FOURTH, (1 + cosine) ** 2 / 4),
-    )
+    invariants = _invariants(waves, rate * HALF / 2)
     degrees = [_degree_inside(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
     cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
     times = None if cancels else integrand, divisor, invariants
@@ -160,6 +152,33 @@ def symmetric_orbits(
     if waves.sign < 0:
         turn, share = 4 * sp.atan(sp.sqrt(square) / (1 + sp.sqrt(1 - square))) / abs(rate), square
     return _with_agm(*times, (turn, growth, share), squares)
+
+
+def _invariants(waves: _Waves, argument: sp.Expr) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
+    """Return the symbols of the whole orbit as functions of the argument at the turning point.
+
+    Those of a circular wave are the squares of a cosine and a tangent of half the argument, by functions of the
+    argument itself, because 1 - T nearly vanishes beside a barrier. Those of a hyperbolic wave follow without
+    cancellation from one number, so that its rounding is that of a slightly different orbit.
+    """
+    if waves.sign > 0:
+        square = sp.sinh(argument / 2) ** 2
+        more = 1 + square
+        return (
+            (T, square / more),
+            (ONE_MINUS_T, 1 / more),
+            (ONE_MINUS_TT, (1 + 2 * square) / more**2),
+            (SINE_SQUARED, 4 * square * more),
+            (COSINE_FOURTH, more**2),
+        )
+    sine, cosine = sp.sin(argument), sp.cos(argument)
+    return (
+        (T, (sine / (1 + cosine)) ** 2),
+        (ONE_MINUS_T, 2 * cosine / (1 + cosine)),
+        (ONE_MINUS_TT, 4 * cosine / (1 + cosine) ** 2),
+        (SINE_SQUARED, sine**2),
+        (COSINE_FOURTH, (1 + cosine) ** 2 / 4),
+    )
 
 
 def _isochronous(

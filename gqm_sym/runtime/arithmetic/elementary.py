@@ -10,7 +10,7 @@ unit in the last place, for sin and cos if ``|x|`` < 1e9; for larger arguments t
 the others their limits.
 """
 
-from math import fabs, factorial, inf, pi
+from math import fabs, factorial, inf, pi, sqrt
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, from_bits, polynomial
@@ -97,6 +97,9 @@ ROOT_HALF_BITS = 0x3FE6A09E667F3BCD
 
 # Beyond MAX_EXPONENT exp overflows or underflows; beyond MAX_HYPERBOLIC sinh and cosh overflow.
 MAX_EXPONENT, MAX_HYPERBOLIC = 1000.0, 710.4758600739439
+
+# Beyond this value sinh and cosh have the same double or neighbouring ones.
+LARGE_SINH = 1e9
 
 # Below this argument exp is less than half an ulp of 1.
 NEGLIGIBLE_EXPONENT = -45.0
@@ -261,6 +264,18 @@ def sinh(x):  # type: ignore[no-untyped-def]
     up, low, down = half_exp(choose(size > MAX_HYPERBOLIC, MAX_HYPERBOLIC, size))
     far = choose(size > MAX_HYPERBOLIC, inf, up - (down - low))
     return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))
+
+
+@Inlined
+def sinh_of_ratio(above, x, below):  # type: ignore[no-untyped-def]
+    """The hyperbolic sine of ``above*x/below``, without the roundings of this argument."""
+    product = above * x
+    ratio = product / below
+    rest = (fma(-ratio, below, product) + fma(above, x, -product)) / below
+    value = sinh(ratio)
+    size = fabs(value)
+    slope = choose(size < LARGE_SINH, sqrt(fma(value, value, 1.0)), size)
+    return fma(rest, slope, value)
 
 
 @Inlined

@@ -156,11 +156,9 @@ class TrackOfTrain:
         """
         _, gravity, _, *factors = self.numbers(FLOATS, p)
         places = s.ravel()
-        if isinstance(chart, SpaceChart):
-            height, slope = chart.derivatives(places, 0)[2], chart.derivatives(places, 1)[2]
-        else:
-            height, angle = chart.points(places)[1:3]
-            slope = np.sin(angle)
+        height, slope = chart.points(places)[1:3]
+        if not isinstance(chart, SpaceChart):  # there it is an angle
+            slope = np.sin(slope)
         rows = self._along(chart, p, places)
         energy = gravity * height + sum(factor * row for factor, row in zip(factors, rows[::3], strict=True))
         change = gravity * slope + sum(factor * row for factor, row in zip(factors, rows[1::3], strict=True))

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.gradients.programs import AnySource
@@ -28,8 +29,8 @@ def requested_quantity(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
-        "gradients: there are none along tracks of rolling bodies with a radius or of trains, and along curves that "
-        "are known in doubles only; declare the curve by formulas"
+        "gradients: there are none along tracks of rolling bodies with a radius, of trains with losses or under many "
+        "potentials, and along curves that are known in doubles only; declare the curve by formulas"
     )
 
 
@@ -47,6 +48,11 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     """
     if quantity not in OF_FORCE:
         return
+    if isinstance(formulas.chart, TrackOfTrain):
+        raise SolutionError(
+            f"gradients: there are none of {quantity} of a train, whose contact force is that of a body at its middle; "
+            "those of its places and times exist"
+        )
     exact = formulas.exact
     has_force = formulas.signed or isinstance(exact, ExactPotential)
     has_force = has_force or getattr(exact, "load_along_curvature", None) is not None

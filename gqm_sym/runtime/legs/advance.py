@@ -79,8 +79,9 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TOO_NARROW,
     END_TURN,
 )
-from gqm_sym.runtime.legs.runs.follow import IN_PARTS, direction_from_rest, follow
+from gqm_sym.runtime.legs.runs.follow import IN_PARTS, follow
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
+from gqm_sym.runtime.legs.runs.rest_on_corners import breaks_before, is_break, leaving, rests_on_corner
 from gqm_sym.runtime.legs.runs.route import Route, RunStart
 from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 
@@ -159,57 +160,6 @@ def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: ignore[no-untyped-def]
-    """Return the breaks strictly between two places, in the order in which they are passed, and the index of the first
-    among all breaks.
-    """
-    count, first_break = 0, 0
-    low, high = min(begin, limit), max(begin, limit)
-    first_lap, last_lap = 0, 0
-    if period > 0.0 and breaks.size > 0:
-        first_lap, last_lap = int((low - breaks[-1]) // period), -int((breaks[0] - high) // period)
-    for i in range(last_lap - first_lap + 1):
-        lap = (first_lap + i if direction > 0 else last_lap - i) * period
-        # One more break is taken on either side, because the subtraction of a lap is rounded.
-        from_k = max(np.searchsorted(breaks, low - lap) - 1, 0)
-        to_k = min(np.searchsorted(breaks, high - lap) + 1, breaks.size)
-        while from_k < to_k and not breaks[from_k] + lap > low:
-            from_k += 1
-        while from_k < to_k and not breaks[to_k - 1] + lap < high:
-            to_k -= 1
-        first, step = (from_k, 1) if direction > 0 else (to_k - 1, -1)
-        first_break = first if count == 0 else first_break
-        passed = min(to_k - from_k, ahead.size - count)
-        for j in range(passed):
-            ahead[count + j] = breaks[first + step * j] + lap
-        count += passed
-    return ahead[:count], first_break
-
-
-@Inner
-def is_break(breaks, period, place):  # type: ignore[no-untyped-def]
-    """Return whether the curve is not smooth at a place."""
-    for known in breaks:
-        lap = period * round((place - known) / period) if period > 0.0 else 0.0
-        if known + lap == place:
-            return True
-    return False
-
-
-@Inner
-def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-untyped-def]
-    """Return the direction in which a body at rest leaves a place; 0 if it stays.
-
-    At a corner the planes on both sides decide; if the body could slide down either of them, it takes the ``preferred``
-    direction.
-    """
-    off, period = 0.0, body[PERIOD]
-    if is_break(joints.breaks, period, place):
-        off = clearance(place, period if period > 0.0 else max(fabs(body[LOW]), fabs(body[HIGH])))
-    return direction_from_rest(dissipation.static_balance, p, place - off, place + off, preferred)[0]
-
-
-@Inner
 def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
     """Return a width for the first panel, based on a distance of at most ``step`` over which the force on a body, or
     else V**2, hardly changes.
@@ -241,23 +191,6 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     if body[V2] == 0.0:
         body[DIRECTION] = leaving(dissipation, p, joints, body, lam0, preferred)
     body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], body[V2], step))
-
-
-@Inner
-def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
-    """Return whether the body, which turns at a place, has come to rest on a corner there within the resolution of
-    times.
-
-    Between two planes the times from turn to turn decrease geometrically, in both directions by the same factor. The
-    body is at rest if the sum of all that follow is less than a rounding of the time.
-    """
-    before, last, now = body[LEG_BEFORE], body[LAST_LEG], body[ELAPSED]
-    this = body[LEG_TIME]
-    if joints.corners.size == 0 or not this < before:
-        return False
-    if now + this * (last + this) / (before - this) != now or not is_break(joints.breaks, body[PERIOD], place):
-        return False
-    return leaving(dissipation, p, joints, body, place, 0) == 0
 
 
 @Inner
@@ -367,7 +300,7 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     """Return whether a body rests where V**2 has vanished; if it turns, store the data of the turn."""
     place, low = record[END], record[END_LOW]
     stays = found.direction == 0 or (place == body[PLACE] and low == body[PLACE_LOW] and body[V2] == 0.0)
-    rests = stays or rests_between(dissipation, p, joints, body, place)
+    rests = stays or rests_on_corner(dissipation, p, joints, body, place)
     body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
     width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
     body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0

@@ -28,21 +28,18 @@ from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
     ENDING,
-    FIRST_STEP,
     FROM_REST,
     HORIZON,
     LAM0,
     LAPS,
     LAST_AT,
-    LEAST_SIZE,
-    LEAST_SWING,
+    LEG_BEFORE,
     MAY_END,
     ONLY_SIGN,
     PANEL_COUNT,
     PAUSES,
     PERIOD,
     PLACE,
-    RETRY_WIDTH,
     SIZE,
     STATUS,
     STEP,
@@ -52,7 +49,8 @@ from gqm_sym.runtime.legs.body import (
     V2,
     VALUE,
 )
-from gqm_sym.runtime.legs.frames.local_frame import LEAST_RETRY_SHARE, SMALL_SHARE, may_be_small
+from gqm_sym.runtime.legs.frames.local_frame import may_be_small
+from gqm_sym.runtime.legs.frames.tiny_legs import is_tiny, slides_little
 from gqm_sym.runtime.legs.gaps.data import room_kept
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
@@ -60,7 +58,6 @@ from gqm_sym.runtime.legs.leg_record import (
     BACK,
     BEGIN,
     BEGIN_LOW,
-    END,
     HEADING,
     LAPS_BEFORE,
     PANELS,
@@ -84,6 +81,7 @@ from gqm_sym.runtime.legs.runs.ends import (
     END_TURN,
 )
 from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
+from gqm_sym.runtime.legs.runs.rest_on_corners import predicted_rest
 from gqm_sym.runtime.legs.runs.route import Reading
 
 # The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
@@ -106,9 +104,8 @@ MAX_TURNS = 20000
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
 
-# With friction, a leg that is shorter than this share of its place, and of the first step of a search, loses digits of
-# its time: those of the force, which is a difference.
-SLIDING_SHARE = 2.0**-15
+# The number of successive predictions of the time of rest on a corner that must agree with the one before.
+AGREEMENTS = 2
 
 # Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
 # without bound there, as at a cusp.
@@ -176,11 +173,13 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
     """Return whether the next leg has to be followed too."""
     if body[ENDING] != 0.0 or arrival < inf:
         return False
+    # A body that has turned at two points reaches no place outside of them any more.
+    if question == ARRIVAL and body[TURNS] >= (1.0 if body[FROM_REST] else 2.0):
+        return False
     if isfinite(body[HORIZON]):
         return body[ELAPSED] < body[HORIZON]
     if question == ARRIVAL:
-        # A body that has turned at two points reaches no place outside of them any more.
-        return body[TURNS] < (1.0 if body[FROM_REST] else 2.0)
+        return True
     return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
 
 
@@ -278,15 +277,16 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     function, sign = sought_extreme(question)
     has_length = function == LENGTH and dissipation.squared_contact != 0
+    predicted, agreements = np.nan, 0
     for _ in range(MAX_LEGS):
-        reading = Reading(reads, function != SPEED, has_length, sign, findings.peak)
+        reading, before = Reading(reads, function != SPEED, has_length, sign, findings.peak), body[LEG_BEFORE]
         what = advance(dissipation, p, joints, body, reading, record)
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.
         if what in (END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_OUT_OF_DOMAIN, END_OVERFLOW):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        if dissipation.friction and slides_little(record, body):
+        if dissipation.friction and slides_little(dissipation, p, joints, record, body):
             break
         findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
@@ -296,31 +296,22 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             if is_at_limit and force_is_unbounded(dissipation, p, body, findings.peak):
                 break
             return conclude(body, question, findings)
+        if what == END_TURN and question < LEAST_LOAD and question != ARRIVAL:
+            predicted, place, agrees = predicted_rest(dissipation, p, joints, body, before, predicted, record)
+            agreements = agreements + 1 if agrees else 0
+            if agreements == AGREEMENTS and predicted < body[HORIZON]:
+                return conclude_at_rest(question, findings, predicted, place), FOUND
     return np.nan, LEFT
 
 
 @Inner
-def slides_little(record, body):  # type: ignore[no-untyped-def]
-    """Return whether a leg from rest is so short that, with friction, it is followed by the distance from where
-    friction balances the other forces.
-    """
-    width, size = fabs(record[END] - record[START]), max(fabs(record[END]), body[LEAST_SIZE])
-    return record[START_V2] == 0.0 and width < SLIDING_SHARE * min(size, body[FIRST_STEP])
-
-
-@Inner
-def is_tiny(dissipation, record, body):  # type: ignore[no-untyped-def]
-    """Return whether a leg is so short that the next one, or with friction this one, may have to be followed by the
-    distance from an equilibrium, or cannot be followed at all.
-    """
-    start, end = record[START], record[END]
-    if max(fabs(start), fabs(end)) < LEAST_SWING:
-        return True
-    if dissipation.friction:
-        return slides_little(record, body)
-    width = fabs(end - start)
-    is_too_wide = body[RETRY_WIDTH] < width <= body[RETRY_WIDTH] / LEAST_RETRY_SHARE
-    return width < SMALL_SHARE * max(fabs(end), body[LEAST_SIZE]) and not is_too_wide
+def conclude_at_rest(question, findings, time, place):  # type: ignore[no-untyped-def]
+    """Return the answer for a body that comes to rest at a place after ever slower swings."""
+    if question == END_TIME:
+        return time
+    if question == REST_PLACE:
+        return place
+    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak
 
 
 @Inner
@@ -362,7 +353,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         count += 1
         record[USED] = size
         body[PANEL_COUNT] += 1.0 + record[AHEAD] + record[BACK]
-        body[STATUS] = 1.0 if is_tiny(dissipation, record, body) else 0.0
+        body[STATUS] = 1.0 if is_tiny(dissipation, p, joints, record, body) else 0.0
         if what in (END_TURN, END_REST):
             pack(record)
         body[LAST_AT] = used

@@ -226,9 +226,13 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
             if segment.kind == TO_EQUILIBRIUM:
                 continue
             phi[0] = segment.edges[-1]  # at the end itself it is larger by a rounding
-        out += [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
-        if phi[0] in (0.0, segment.edges[-1]) and phi[0] == timed.phi_stop:
-            out.append(timed.t_stop[0])
+        found = [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
+        if not found and min(timed.phi_start, timed.phi_stop) <= phi[0] <= max(timed.phi_start, timed.phi_stop):
+            # At an end, and a rounding before it, the time is that of the end.
+            r = float(segment.times(phi)[0])
+            is_at_start = abs(r - timed.r_start[0]) < abs(r - timed.r_stop[0])
+            found = [(timed.t_start if is_at_start else timed.t_stop)[0]]
+        out += found
     return out
 
 

@@ -10,7 +10,9 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
@@ -74,10 +76,12 @@ class PeriodicMotion(PeriodicTimes):
         return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, lambda: segment.edges)
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
-        segment, f = self._segment, self.problem.functions
-        if self.problem.formulas.rolling_radius or self.problem.true_pieces is None or self.problem.tape is None:
+        segment, f, problem = self._segment, self.problem.functions, self.problem
+        if isinstance(problem.formulas.chart, TrackOfTrain):
+            problem = on_curve_of_means(problem)
+        if problem.formulas.rolling_radius or problem.true_pieces is None or problem.tape is None:
             raise without_formulas()
-        passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
+        passage = timing.passage_of(problem, self.kind, self.direction, self._offsets)
         if passage is None:
             raise SolutionError(UNDECIDED)
         # The places where pieces of the chart meet; on a closed chart the first and the last edge are the same place.
@@ -87,7 +91,7 @@ class PeriodicMotion(PeriodicTimes):
         if not direction:
             last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
-        return ChartOrbitDerivatives(self.problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
+        return ChartOrbitDerivatives(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
     @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:

@@ -239,6 +239,9 @@ def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None
         assert swept.values == pytest.approx(solved, rel=ROUNDING)
         assert passed.size
         assert (np.diff(solved) > 0.0).all()
+        for beside in (np.nextafter(passed, -math.inf), np.nextafter(passed, math.inf)):
+            near = [motion.time_at(place) for place in beside.tolist()]
+            assert near == pytest.approx(solved, rel=ROUNDING, abs=ROUNDING)
         assert solved[-1] < turn.t_end
         assert motion.lam(solved) == pytest.approx(passed, rel=0.0, abs=1e-13)
 

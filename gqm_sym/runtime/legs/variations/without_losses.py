@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.emitted import Emitted, RunByPython
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import scalar_product
+from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.interface import (
     PATH_ROWS,
@@ -54,6 +56,8 @@ def followed_in_legs(problem: Problem) -> Motion:
     SolutionError
         If the curve is known in doubles only.
     """
+    if isinstance(problem.formulas.chart, TrackOfTrain):
+        problem = on_curve_of_means(problem)
     formulas = problem.formulas
     if not isinstance(formulas.exact, ExactPotential) or formulas.rolling_radius or problem.true_pieces is None:
         raise without_formulas()

@@ -1,0 +1,268 @@
+"""A train as a body on another curve, whose coordinates are the means of the parts of its potential.
+
+The speed of a train depends on its place through these means alone, as that of a body on a curve in arc length depends
+on its coordinates. The means, made small by powers of 2, are one or two coordinates of such a curve, and a further one,
+in which there is no force, makes its speed one: x' = sqrt(1 - z'**2 - y'**2). So whatever is known of the times of
+bodies along charts is known of the times of trains. The contact force on the other curve means nothing.
+
+The polynomials of the means are taken as they are in the chart of the train, so that results have the accuracy of
+doubles.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import frexp, nan
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.arithmetic.doubledouble import Pair, two_sum
+from gqm_sym.runtime.charts.chart import Chart, SpaceChart
+from gqm_sym.runtime.charts.double_double.pieces import NODES, Samples, TruePieces, sample_places, starting_context
+from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
+from gqm_sym.runtime.charts.train import TrackOfTrain
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, square_root
+from gqm_sym.runtime.gradients.orbit import without_formulas
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.formulas import ParameterValues, chart_with, shape_of
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
+
+# The slope of a coordinate that is a mean is no larger than this, so that the remaining one changes evenly.
+MAX_SLOPE = 0.5
+
+# A curve in space has one coordinate without a force and two with one.
+MOST_MEANS = 2
+
+
+def on_curve_of_means(problem: Problem) -> Problem:
+    """Return the launch of a body whose times are those of a train.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch of a train.
+
+    Raises
+    ------
+    SolutionError
+        If its potential has too many parts.
+    """
+    formulas, values = problem.formulas, tuple(problem.p.values.tolist())
+    train = formulas.chart
+    assert isinstance(train, TrackOfTrain)
+    means = _means_of(train, len(values))
+    chart = chart_with(train, values)
+    records = [_records(chart, mean) for mean in means]
+    steepest = (float(np.abs(record[:, 6 + 2 * TERMS : 6 + 3 * TERMS]).sum(axis=1).max()) for record in records)
+    scales = tuple(2.0 ** (frexp(slope / MAX_SLOPE)[1]) if slope else 1.0 for slope in steepest)
+    curve = _CurveOfMeans(train, means, scales, shape_of(train, values, 1.0))
+    potential = _Potential(train, formulas.inertia, means, scales)
+    other = replace(
+        formulas,
+        chart=curve,
+        exact=ExactPotential(potential),
+        path_in_space=formulas.functions.effective_potential if len(means) > 1 else None,
+    )
+    p = ParameterValues(problem.p)
+    p.values, p.conditions = problem.p.values, {}
+    return Problem(other, problem.launch, p, problem.domain)
+
+
+def _means_of(train: TrackOfTrain, parameters: int) -> tuple[int, ...]:
+    """Return the numbers of the means that the potential has: 0 for the height, then those of other parts."""
+    _, gravity, _, *factors = train.numbers(FLOATS, (nan,) * parameters)
+    means = tuple(range(0 if gravity != 0 else 1, len(factors) + 1))
+    if len(means) > MOST_MEANS:
+        raise without_formulas()
+    return means
+
+
+def _records(chart: Chart, mean: int) -> Array:
+    """Return the records of the pieces of the chart of a mean (`charts.evaluate`)."""
+    size = int(chart.block[0])
+    begin = size * (3 + chart.banked if isinstance(chart, SpaceChart) else 1)
+    begin += mean * int(chart.block[begin])
+    count = int(chart.block[begin + 1])
+    first = begin + EDGES + 3 * count + 2
+    return chart.block[first : first + count * RECORD].reshape(count, RECORD)
+
+
+@dataclass(frozen=True, slots=True)
+class _Potential:
+    """The potential by coordinates (`interface.ExactPotential`): x, y and z, or x and z, of which x has no force.
+
+    Attributes
+    ----------
+    train : TrackOfTrain
+        What makes the train's chart.
+    inertia : callable or None
+        The factor of the inertia, ``f(op, p)``.
+    means : tuple of int
+        The numbers of the means that are the coordinates z and y.
+    scales : tuple of float
+        The means over these coordinates.
+    """
+
+    train: TrackOfTrain
+    inertia: Callable[..., Any] | None
+    means: tuple[int, ...]
+    scales: tuple[float, ...]
+
+    def __call__(self, op: Any, *arguments: Any) -> tuple[Any, ...]:
+        *coordinates, p = arguments
+        _, gravity, _, *others = self.train.numbers(op, p)
+        inertia = 1 if self.inertia is None else self.inertia(op, p)
+        slopes = [
+            (gravity, *others)[mean] * scale / inertia for mean, scale in zip(self.means, self.scales, strict=True)
+        ]
+        value = sum((slope * place for slope, place in zip(slopes, reversed(coordinates[1:]), strict=True)), op.mpf(0))
+        return value, op.mpf(0), *reversed(slopes)
+
+
+@dataclass(frozen=True, slots=True)
+class _CurveOfMeans:
+    """The curve, which makes its chart: that of the train.
+
+    Attributes
+    ----------
+    train, means, scales
+        As `_Potential` has them.
+    shape : tuple of float
+        The values of the parameters for which the curve is made; there are no neighbouring curves.
+    """
+
+    train: TrackOfTrain
+    means: tuple[int, ...]
+    scales: tuple[float, ...]
+    shape: tuple[float, ...]
+
+    @property
+    def shaped_by(self) -> tuple[int, ...] | None:
+        """The run-time parameters that the chart depends on, by their place; None if that is not known."""
+        return self.train.shaped_by
+
+    def chart(self, p: tuple[float, ...]) -> Chart:
+        """Return the chart of the train."""
+        return chart_with(self.train, p)
+
+    def is_exact(self, chart: Chart) -> bool:
+        """Return False: the means are known in doubles only."""
+        return False
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Any:
+        """Return None, because the means are known in doubles only."""
+        return None
+
+    def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
+        """Return the curve in double-double arithmetic; None for other values of the parameters that shape it."""
+        if shape_of(self.train, tuple(number.value for number in p), 1.0) != shape_of(self.train, self.shape, 1.0):
+            return None
+        return _Pieces(chart, _sampler(chart, self.means, self.scales), in_space=len(self.means) > 1)
+
+
+class _Pieces(TruePieces):
+    """The pieces of such a curve. The middle of a train cannot be where arc length is 0 on an open track."""
+
+    @property
+    def start_length(self) -> Pair:
+        """The arc length from the left edge of the piece ``begin`` to arc length 0."""
+        return -float(self.curve.edges[self.begin]), 0.0
+
+
+@entry(types.void(MATRIX, VECTOR, REAL, REAL, MATRIX, types.float64[:, :, ::1], types.float64[:, :, ::1]))
+def fill_samples(records, scales, low, high, nodes, integrals, samples):  # type: ignore[no-untyped-def]
+    """Fill the samples of a piece (`charts.double_double.pieces`).
+
+    Parameters
+    ----------
+    records : (d, RECORD) array
+        The pieces of the charts of all means there.
+    scales : (d,) array
+        The means over the coordinates.
+    low, high : float
+        Both ends of the piece in arc length.
+    nodes : (2, NODES) array
+        The Chebyshev points, the high doubles before the low ones.
+    integrals : (2, NODES, NODES) array
+        The matrix that takes values at these points to integrals from the middle of the piece, likewise.
+    samples : (1 + d, 2, NODES) array
+        Filled.
+    """
+    middle, middle_low = two_sum(0.5 * low, 0.5 * high)
+    half, half_low = two_sum(-0.5 * low, 0.5 * high)
+    rates = np.zeros((2, NODES))
+    for i in range(NODES):
+        s, s_low = multiply(half, half_low, nodes[0, i], nodes[1, i])
+        s, s_low = add(s, s_low, middle, middle_low)
+        rate, rate_low = 1.0, 0.0
+        for row in range(records.shape[0]):
+            record = records[row]
+            u, u_low = add(s, s_low, -record[0], 0.0)
+            u, u_low = multiply(u, u_low, record[1], 0.0)
+            value, value_low, slope, slope_low = 0.0, 0.0, 0.0, 0.0
+            for j in range(TERMS - 1, -1, -1):
+                slope, slope_low = multiply(slope, slope_low, u, u_low)
+                slope, slope_low = add(slope, slope_low, value, value_low)
+                value, value_low = multiply(value, value_low, u, u_low)
+                value, value_low = add(value, value_low, record[6 + TERMS + j], 0.0)
+            whole, whole_low = two_sum(record[4], record[5])
+            value, value_low = add(value, value_low, whole, whole_low)
+            # The scales are powers of 2.
+            samples[1 + row, 0, i], samples[1 + row, 1, i] = value / scales[row], value_low / scales[row]
+            slope, slope_low = multiply(slope / scales[row], slope_low / scales[row], record[1], 0.0)
+            slope, slope_low = multiply(slope, slope_low, slope, slope_low)
+            rate, rate_low = add(rate, rate_low, -slope, -slope_low)
+        rates[0, i], rates[1, i] = square_root(rate, rate_low)
+    for i in range(NODES):
+        total, total_low = 0.0, 0.0
+        for k in range(NODES):
+            part, part_low = multiply(integrals[0, i, k], integrals[1, i, k], rates[0, k], rates[1, k])
+            total, total_low = add(total, total_low, part, part_low)
+        samples[0, 0, i], samples[0, 1, i] = multiply(total, total_low, half, half_low)
+
+
+def _sampler(chart: Chart, means: tuple[int, ...], scales: tuple[float, ...]) -> Callable[[int], Samples]:
+    """Return the function that samples a piece (`charts.double_double.pieces`)."""
+    records, edges, sizes = [_records(chart, mean) for mean in means], chart.edges.tolist(), np.array(scales)
+
+    def sample(k: int) -> Samples:
+        low, high = edges[k], edges[k + 1]
+        here = np.stack([_piece_at(record, 0.5 * (low + high)) for record in records])
+        samples = np.empty((1 + len(means), 2, NODES))
+        fill_samples(here, sizes, low, high, sample_places(), _integrals(), samples)
+        return samples, 4.0 * UNIT * float(np.abs(samples).max())
+
+    return sample
+
+
+def _piece_at(records: Array, place: float) -> Array:
+    """Return the record of the piece on which a place lies."""
+    nearest: Array = records[np.argmin(np.abs(records[:, 0] - place) * records[:, 1])]
+    return nearest
+
+
+@lru_cache(maxsize=1)
+def _integrals() -> Array:
+    """Return the matrix that takes values at the Chebyshev points to integrals from 0 to these points, but for a
+    constant, as two doubles each.
+    """
+    context = starting_context()
+    angles = [context.pi * (2 * k + 1) / (2 * NODES) for k in range(NODES)]
+
+    def integral(j: int, angle: Any) -> Any:  # of the Chebyshev polynomial of degree j
+        if j < 2:
+            return context.cos(angle) if j == 0 else context.cos(2 * angle) / 4
+        return context.cos((j + 1) * angle) / (2 * (j + 1)) - context.cos((j - 1) * angle) / (2 * (j - 1))
+
+    # The Chebyshev coefficients of a function are its values at these points times a table of cosines.
+    shares = [[context.cos(j * angle) * (1 if j == 0 else 2) / NODES for j in range(NODES)] for angle in angles]
+    series = [[integral(j, angle) for j in range(NODES)] for angle in angles]
+    found = [[two_doubles(context.fdot(row, share)) for share in shares] for row in series]
+    return np.ascontiguousarray(np.array(found).transpose(2, 0, 1))
