@@ -114,51 +114,63 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
     return high + (low + polynomial(_powers(chart, start, row), u))
 
 
-@intrinsic
-def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
-    """Fill a register's numbers of ``out``, from ``to`` on, with a row of the chart at the places from ``at`` on.
+def _filling(count: int) -> Any:
+    """Return a function that fills so many registers' numbers of a row at a time, a term of all of them after the
+    other, so that none waits for the last operation on itself.
 
-    Lanes before ``first`` keep their values. The powers of u are stored at ``terms``; ``numbers`` are the length of all
-    laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
+    It is called with ``(chart, terms, places, at, out, to, first, numbers)``: the powers of u are stored at ``terms``
+    of the chart, the places from ``at`` on in ``places``, and the values from ``to`` on in ``out``. Lanes before
+    ``first`` keep their values. The ``numbers`` are the length of all laps before, the piece's middle and scale, the
+    limit of u, and two numbers that the polynomial is added to.
     """
 
-    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        lines = [line_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4)]
-        powers, given, target = (builder.gep(line, [args[k]]) for line, k in zip(lines, (1, 3, 5), strict=True))
-        lap, middle, scale, limit, whole, low = (
-            broadcast(builder, builder.extract_value(args[7], k)) for k in range(6)
-        )
-        s = builder.load(register(builder, given, 0), align=8)
-        u = builder.fmul(builder.fsub(builder.fsub(s, lap), middle), scale)
-        below = builder.fneg(limit)
-        u = builder.select(builder.fcmp_ordered("<", u, below), below, u)
-        u = builder.select(builder.fcmp_ordered(">", u, limit), limit, u)
-        value = ir.Constant(REGISTER, [0.0] * LANES)
-        for k in range(TERMS - 1, -1, -1):
-            term = broadcast(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
-            value = operation(builder, "fma", value, u, term)
-        value = builder.fadd(whole, builder.fadd(low, value))
-        old = builder.load(register(builder, target, 0), align=8)
-        lane = ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
-        bound = ir.Constant(ir.VectorType(ir.IntType(64), LANES), ir.Undefined)
-        for k in range(LANES):
-            bound = builder.insert_element(bound, args[6], ir.Constant(INDEX, k))
-        kept = builder.icmp_signed("<", lane, bound)
-        builder.store(builder.select(kept, old, value), register(builder, target, 0), align=8)
-        return context.get_dummy_value()
+    @intrinsic
+    def fill(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
+        def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            lines = [line_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4)]
+            powers, given, target = (builder.gep(line, [args[k]]) for line, k in zip(lines, (1, 3, 5), strict=True))
+            lap, middle, scale, limit, whole, low = (
+                broadcast(builder, builder.extract_value(args[7], k)) for k in range(6)
+            )
+            below, us = builder.fneg(limit), []
+            for k in range(count):
+                s = builder.load(register(builder, given, k * LANES), align=8)
+                u = builder.fmul(builder.fsub(builder.fsub(s, lap), middle), scale)
+                u = builder.select(builder.fcmp_ordered("<", u, below), below, u)
+                us.append(builder.select(builder.fcmp_ordered(">", u, limit), limit, u))
+            values = [ir.Constant(REGISTER, [0.0] * LANES)] * count
+            for k in range(TERMS - 1, -1, -1):
+                term = broadcast(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
+                values = [operation(builder, "fma", value, u, term) for value, u in zip(values, us, strict=True)]
+            values = [builder.fadd(whole, builder.fadd(low, value)) for value in values]
+            old = builder.load(register(builder, target, 0), align=8)
+            lane = ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
+            bound = ir.Constant(ir.VectorType(ir.IntType(64), LANES), ir.Undefined)
+            for k in range(LANES):
+                bound = builder.insert_element(bound, args[6], ir.Constant(INDEX, k))
+            values[0] = builder.select(builder.icmp_signed("<", lane, bound), old, values[0])
+            for k, value in enumerate(values):
+                builder.store(value, register(builder, target, k * LANES), align=8)
+            return context.get_dummy_value()
 
-    return types.void(chart, terms, places, at, out, to, first, numbers), lower
+        return types.void(chart, terms, places, at, out, to, first, numbers), lower
+
+    @in_python(fill)
+    def _fill(chart: Any, terms: int, places: Any, at: int, out: Any, to: int, first: int, numbers: Any) -> None:
+        lap, middle, scale, limit, whole, low = numbers
+        for lane in range(max(first, 0), count * LANES):
+            u = min(max(((places[at + lane] - lap) - middle) * scale, -limit), limit)
+            value = 0.0
+            for k in range(TERMS - 1, -1, -1):
+                value = fma(value, u, chart[terms + k])
+            out.reshape(-1)[to + lane] = whole + (low + value)
+
+    return fill
 
 
-@in_python(fill_lanes)
-def _fill_lanes(chart: Any, terms: int, places: Any, at: int, out: Any, to: int, first: int, numbers: Any) -> None:
-    lap, middle, scale, limit, whole, low = numbers
-    for lane in range(max(first, 0), LANES):
-        u = min(max(((places[at + lane] - lap) - middle) * scale, -limit), limit)
-        value = 0.0
-        for k in range(TERMS - 1, -1, -1):
-            value = fma(value, u, chart[terms + k])
-        out.reshape(-1)[to + lane] = whole + (low + value)
+# One register is filled, or several, which together take less time than one by one.
+SEVERAL = 4
+fill_lanes, fill_several = _filling(1), _filling(SEVERAL)
 
 
 @Inner
@@ -198,11 +210,14 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
                     u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
                     out[first + k, j] = whole + (constant_low + polynomial(_powers(chart, start, row), u))
                 continue
+            numbers, filled = (lap, middle, scale, limit, whole, constant_low), begin
+            while filled + SEVERAL * LANES <= i:
+                fill_several(chart, terms, places, filled, out, (first + k) * n + filled, 0, numbers)
+                filled += SEVERAL * LANES
             # A register at the end of the places also takes places before the first one, whose values it does not
             # store.
-            for j in range(begin, i, LANES):
+            for j in range(filled, i, LANES):
                 at = min(j, n - LANES)
-                numbers = (lap, middle, scale, limit, whole, constant_low)
                 fill_lanes(chart, terms, places, at, out, (first + k) * n + at, begin - at, numbers)
 
 
@@ -303,10 +318,7 @@ def _divdiff1_between(chart, row, lower, upper, h):  # type: ignore[no-untyped-d
             chart, row, kt, -1.0, ut
         )
         return gained / (before + after)
-    one, two = 0.0, 0.0
-    for j in range(TERMS - 1, -1, -1):
-        one = one * us + item_at(chart, from_s + 6 + row * TERMS + j)
-        two = two * ut + item_at(chart, from_t + 6 + row * TERMS + j)
+    one, two = polynomial(_powers(chart, from_s, row), us), polynomial(_powers(chart, from_t, row), ut)
     if row >= 2:  # the angle increases with each lap
         return ((laps_t - laps_s) * chart[5] + (two - one)) / h
     whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]

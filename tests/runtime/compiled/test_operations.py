@@ -7,7 +7,7 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic import exponential_rows, matrices
 from gqm_sym.runtime.arithmetic.clenshaw import GROUP, sum_group
-from gqm_sym.runtime.charts.evaluate import LANES, TERMS, fill_lanes
+from gqm_sym.runtime.charts.evaluate import LANES, SEVERAL, TERMS, fill_lanes, fill_several
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.intrinsics import (
     bits,
@@ -65,6 +65,7 @@ def everything(x, y, columns, out):  # type: ignore[no-untyped-def]
     put(out[8], 3, y, 1, 50, True)
     put(out[9], 3, y, 1, 50, False)
     fill_lanes(y, 5, x, 2, out, 10 * out.shape[1] + 4, 3, (0.1, 0.2, 0.8, 1.0, 2.0, 1e-17))
+    fill_several(y, 30, x, 40, out, 10 * out.shape[1] + 20, 2, (0.1, 0.2, 0.8, 1.0, 2.0, 1e-17))
 
 
 def _results(run: Any) -> np.ndarray:
@@ -83,5 +84,5 @@ def test_python_gives_the_bits_of_each_operation() -> None:
     expected, found = _results(compiled), _results(lambda *arguments: plain(arguments))
     assert np.count_nonzero(expected) > 500
     assert np.flatnonzero(expected != found).tolist() == []
-    assert LANES * 4 == GROUP
+    assert LANES * 4 == LANES * SEVERAL == GROUP
     assert TERMS == 16
