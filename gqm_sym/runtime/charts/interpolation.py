@@ -31,6 +31,9 @@ MAX_ITERATIONS = 10
 # An open spline through at most so many points is natural.
 FEW_POINTS = 12
 
+# The largest distance between a spline and its points, as a share of the largest coordinate, that is rounding.
+MAX_MISSING = 2.0 * 2.0**-52
+
 # A spline whose distance from a point is below this share of the track's length passes through it to rounding. No
 # points are left out any more when only MIN_POINTS remain.
 MAX_FIT_ERROR = 8.0 * 2.0**-52
@@ -75,8 +78,19 @@ def _converged(points: Array, ends: Ends) -> Array | None:
 def interpolated(points: Array, knots: Array, ends: Ends, at_end: Sequence[Any] = (0.0, 0.0)) -> Any:
     """Return the interpolating spline of each column of ``points``, as a `scipy.interpolate.BSpline`.
 
-    ``at_end`` contains the third and the fourth derivative of a natural spline at its last knot.
+    ``at_end`` contains the third and the fourth derivative of a natural spline at its last knot. Where rounding makes
+    the spline pass beside its points, that of what is missing is added, as in iterative refinement.
     """
+    spline = _solved(points, knots, ends, at_end)
+    missing = points - spline(knots)
+    if np.abs(missing).max() > MAX_MISSING * np.abs(points).max():
+        missing[-1] = missing[0] if ends == "periodic" else missing[-1]
+        spline.c += _solved(missing, knots, ends, (0.0, 0.0)).c
+    return spline
+
+
+def _solved(points: Array, knots: Array, ends: Ends, at_end: Sequence[Any]) -> Any:
+    """Return the interpolating spline as SciPy solves for it."""
     from scipy.interpolate import make_interp_spline
 
     conditions: Any = "periodic" if ends == "periodic" else None

@@ -102,7 +102,10 @@ def test_a_straight_track() -> None:
     assert state.s == pytest.approx(2.0 * fall, rel=4 * ULP)
     assert state.v == pytest.approx(2.0 * fall, rel=4 * ULP)
     wanted = 9.81 * np.array([12 * 3 / 169, 12 * 4 / 169, 25 / 169])
-    assert [state.normal_x, state.normal_y, state.normal_z] == pytest.approx(wanted, rel=1e-13)
+    # The second derivative of a quintic spline has the roundings of its coefficients, times up to 20, 40 and 20 next to
+    # its ends, over the square of the distance of its points.
+    noise = 64 * ULP * np.abs(points).max() / 13**2 * state.v**2
+    assert np.abs(np.array([state.normal_x, state.normal_y, state.normal_z]) - wanted).max() <= noise
 
 
 def test_the_time_along_the_spline_itself() -> None:

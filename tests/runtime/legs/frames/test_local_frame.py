@@ -265,7 +265,7 @@ def test_many_nodes_in_one_call(tmp_path: Path) -> None:
     shape = np.linspace(-3.0, 3.0, 61)
     track = gqm.Curve.sampled(np.column_stack([shape, np.cosh(shape / 2)]))
     model = gqm.derive(track, gqm.Gravity() + gqm.QuadraticDrag(b="c_d"))
-    motion: Any = gqm.build(model, name="many_nodes", folder=tmp_path).solve(4.99, c_d=0.05, t_max=300.0)
+    motion: Any = gqm.build(model, name="many_nodes", folder=tmp_path).solve(4.99, c_d=0.5, t_max=300.0)
     assert len(motion.legs) > 140
     frame = motion._driver._frame
     places = np.linspace(-0.9, 0.9, 72) * frame.reach

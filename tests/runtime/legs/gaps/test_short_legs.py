@@ -3,7 +3,8 @@
 The true numbers were found in 33 digits by a program of its own: Gauss-Legendre collocation with 26 nodes on each piece
 of the chart, whose polynomials are exact data, with turns by Newton's method and the time in the root of the distance
 from them. With 32 nodes they agree in 27 digits. One unit in the last place of the launch changes none of them by more
-than 3e-16 of itself.
+than 3e-16 of itself. But the polynomials of a track through points have roundings that depend on the processor: one
+unit in the last place of its points changes the time of such a track by 5e-15 of itself.
 """
 
 from pathlib import Path
@@ -44,7 +45,7 @@ def swept(curve: gqm.Curve, folder: Path, quantity: str, **given: float) -> floa
 def test_short_last_legs_past_a_break(tmp_path: Path, lam0: float, v0: float, true: float) -> None:
     """The last legs are 0.5 to 0.9 mm long and take over a second."""
     end = swept(gqm.Curve.sampled(POINTS), tmp_path, "t_end", lam0=lam0, v0=v0, t_max=200.0)
-    np.testing.assert_allclose(end, true, rtol=1e-14)
+    np.testing.assert_allclose(end, true, rtol=3e-14)
 
 
 def test_a_short_last_leg_past_a_joint(tmp_path: Path) -> None:
