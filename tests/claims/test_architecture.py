@@ -230,7 +230,6 @@ TESTED_THROUGH = {
     "sweep/tables/extremes.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/fitting.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/layout.py": "runtime/sweep/tables/test_times.py",
-    "sweep/tables/liftoff.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/panel_forces.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/passage.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/places.py": "runtime/sweep/tables/test_times.py",

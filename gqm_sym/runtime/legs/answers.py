@@ -71,7 +71,7 @@ from gqm_sym.runtime.legs.leg_record import (
     pack,
 )
 from gqm_sym.runtime.legs.panels.equation import forces_on
-from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load, slope_of_v2
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
     END_LIMIT,
@@ -228,9 +228,15 @@ def after_leg(dissipation, p, body, question, findings, record):  # type: ignore
 
 @Inner
 def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
-    """Return the answer for a body that stays where it is, and its status."""
+    """Return the answer for a body that stays where it is, or that the track would have to pull there at once, and its
+    status.
+    """
     if body[ONLY_SIGN] != 0.0:
-        return np.nan, LEFT
+        contact_sign = sign_of_load(forces_on(dissipation, p, 1), body[LAM0], 0.0, point_buffer())
+        if contact_sign == 0:
+            return np.nan, LEFT
+        if contact_sign != body[ONLY_SIGN] and question in (END_TIME, REST_PLACE):
+            return (0.0, FOUND) if question == END_TIME else (np.nan, NONE)
     if question == END_TIME:
         return (body[HORIZON], FOUND) if isfinite(body[HORIZON]) else (np.nan, NONE)
     if question == REST_PLACE:

@@ -34,8 +34,8 @@ PEAK_NODES, MAX_TAIL = 13, 1e-12
 # The distance from an end of a segment within which a peak counts as being at the end, as a share of the segment.
 END_SHARE = 1e-9
 
-# The share of a segment before a corner at which contact is lost in which loads are not searched.
-BEFORE_CORNER = 1e-13
+# The share of a segment before a joint at which contact is lost in which loads are not searched.
+BEFORE_JOINT = 1e-13
 
 # The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
 # of the phase angle.
@@ -201,8 +201,8 @@ def _on_segment(
     """Return the size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
     segment = timed.segment
     start, stop = phases(timed, trajectory, end)
-    if timed.end == "liftoff" and quantity is not SPEED and _ends_at_corner(timed):
-        stop -= BEFORE_CORNER * (stop - start)  # the body leaves before the load on the next plane acts
+    if timed.end == "liftoff" and quantity is not SPEED and _ends_at_joint(timed):
+        stop -= BEFORE_JOINT * (stop - start)  # the body leaves before the load beyond the joint acts
     low, high = min(start, stop), max(start, stop)
     edges = segment.edges
     steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
@@ -252,12 +252,12 @@ def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[flo
     return timed.phi_start, float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
 
 
-def _ends_at_corner(timed: TimedSegment) -> bool:
-    """Return whether a timed segment ends at a corner of the curve, to rounding."""
+def _ends_at_joint(timed: TimedSegment) -> bool:
+    """Return whether a timed segment ends at a place at which the curve is not smooth, to rounding."""
     f, segment = timed.segment.functions, timed.segment
     place = float(segment.places(np.array([timed.phi_stop]))[0])
     near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
-    return bool(f.corners.size and f.between(f.corners, place - near, place + near).size)
+    return bool(f.joints.size and f.between(f.joints, place - near, place + near).size)
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:

@@ -30,7 +30,7 @@ from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Arra
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, TURN, SearchArrays, speed_squared
-from gqm_sym.runtime.quadrature.time_panels import joints_between
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
@@ -64,16 +64,17 @@ from gqm_sym.runtime.sweep.quantities import (
     UNDECIDED,
 )
 from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
-from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
+from gqm_sym.runtime.sweep.tables.extremes import passage_extreme, stretch_of
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
-from gqm_sym.runtime.sweep.tables.liftoff import liftoff_place
+from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
 from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_half_v2_at_edges, find_passage, passage_of
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
-# The quantities that only motions that repeat have.
+# The quantities that only motions that repeat have, and the extremes.
 PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
+EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
 
 class GivenCurve(NamedTuple):
@@ -237,9 +238,10 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def extreme_on(curve, orbit, passage, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
-    """Return an extreme of speed or contact force on an orbit, on its passage through a table if that has panels; NaN
-    if it is not accurate.
+def extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force on an orbit up to a loss of contact; NaN if it is not accurate.
+
+    It is computed on the orbit's passage through a table if that has panels.
     """
     force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
     function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
@@ -248,21 +250,40 @@ def extreme_on(curve, orbit, passage, half_v2_at_edges, quantity):  # type: igno
         return nan
     if passage.panels == 0:
         return extreme(curve, orbit, (function, direction), sign)
-    value = passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, direction), sign)
+    stretch = stretch_of(curve, orbit, passage, loss)
+    value = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, direction), sign)
     if direction != 0 and orbit.leaves == 0 and not orbit.circulates:
-        back = passage_extreme(curve, orbit, passage, half_v2_at_edges, (function, -direction), sign)
+        back = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, -direction), sign)
         value = sign * max(sign * value, sign * back)
+    return value
+
+
+@Inner
+def extreme_on_table(curve, orbit, passage, loss, edges, quantity):  # type: ignore[no-untyped-def]
+    """Return the result of `extreme_on` on a passage through a table; NaN if it is a speed that has lost digits.
+
+    ``edges`` contains V**2/2 at the edges of panels, and whether it keeps enough digits everywhere. The contact force
+    has as many digits as the largest V**2.
+    """
+    half_v2_at_edges, keeps_digits = edges
+    value, peak = extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity), 0.0
+    if not keeps_digits and quantity in (MIN_SPEED, MAX_SPEED) and value > 0.0:
+        for j in range(passage.panels):
+            peak = max(peak, half_v2_at_edges[j])
+        if not 0.5 * value * value >= MIN_CANCELLATION_RATIO * peak:
+            return nan
     return value
 
 
 @Inner
 def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):  # type: ignore[no-untyped-def]
     """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
-    if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
-        return extreme_on(curve, orbit, passage, half_v2_at_edges, quantity)
-    low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
-    if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
-        return nan  # the orbit computed without the table is more accurate than a part of a panel
+    low, high, is_extreme = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, quantity in EXTREMES
+    by_itself = orbit.leaves == 0 and (passage.panels <= 2 or is_extreme) and not curve.table.is_exact
+    if by_itself and joints_between(curve.joints, curve.period, low, high).size == 0:
+        return nan  # computed without the table, they are more accurate than on it
+    if is_extreme:
+        return extreme_on(curve, orbit, passage, KEPT, half_v2_at_edges, quantity)
     return travel_time(curve, orbit, passage, half_v2_at_edges, target if quantity == ARRIVAL_TIME else nan)
 
 
@@ -276,7 +297,7 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
     inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
     if inside.size:
         return nan
-    return extreme_on(curve, orbit, NOWHERE, buffers.half_v2_at_edges, quantity)
+    return extreme_on(curve, orbit, NOWHERE, KEPT, buffers.half_v2_at_edges, quantity)
 
 
 @Inner
@@ -321,6 +342,8 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
     """
     quantity, target, lost, limit = asked
     value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
+    if value != value and quantity in EXTREMES and passage.panels > 0:
+        value = extreme_on_table(curve, orbit, passage, KEPT, (buffers.half_v2_at_edges, False), quantity)
     if value == inf:
         return NEVER_THERE
     if lost == lost:
@@ -340,20 +363,22 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     (quantity, target, side, t_max), limit, half_v2_at_edges = asked, inf, buffers.half_v2_at_edges
     lost = nan  # the place at which a body that is to arrive elsewhere leaves the track
     by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
-    tabulated = not by_ends or side != 0
-    tabulated = tabulated and passage.panels > 0 and fill_half_v2_at_edges(curve, passage, half_v2_at_edges)
+    on_table = passage.panels > 0 and (not by_ends or side != 0)
+    tabulated = on_table and fill_half_v2_at_edges(curve, passage, half_v2_at_edges)
     if orbit.leaves != 0 and needs_period:
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        place = liftoff_place(curve, orbit, passage, half_v2_at_edges, side) if side != 0 and tabulated else nan
-        if side != 0 and not tabulated:  # a small swing keeps contact if the track pushes at the extreme force
+        loss = loss_of_contact(curve, orbit, passage, half_v2_at_edges, side) if side != 0 and on_table else KEPT
+        place = loss.place
+        if side != 0 and not on_table:  # a small swing keeps contact if the track pushes at the extreme force
             least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
             if orbit.leaves != 0 or not side * least > 0.0:
                 return UNDECIDED
         if place == place and needs_period:
             return NOT_PERIODIC
-        if quantity not in (END_TIME, ARRIVAL_TIME) and place == place:
-            return UNDECIDED
+        if quantity in EXTREMES and place == place:
+            out[0] = extreme_on_table(curve, orbit, passage, loss, (half_v2_at_edges, tabulated), quantity)
+            return ANSWERED if isfinite(out[0]) else UNDECIDED
         if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
             return UNDECIDED
         if quantity == END_TIME and place != place and orbit.leaves == 0:

@@ -25,6 +25,7 @@ ROUNDING = 4e-14
 
 Build = Callable[..., ModuleType]
 EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
+HELD = ("t_end", "rest_position", "v_max", "normal_force_max")
 
 
 def ring() -> Any:
@@ -65,6 +66,12 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
     assert (module.sweep("v_min", starts, **given).values == 0.0).all()
     for quantity in ("normal_force_min", "normal_force_max"):
         assert module.sweep(quantity, starts, m=2, **given | {"k": 2 * k}).values == pytest.approx(2 * G, rel=FEW)
+    # Friction holds a body at the middle, on whichever side of the line it is; from above the line supports it.
+    for contact, sense in (("above", 1.0), ("below", math.nan)):
+        held = {what: module.sweep(what, [0.0], t_max=2.0, contact=contact, **given) for what in HELD}
+        assert all(one.route_counts() == {"single": 1} for one in held.values())
+        expected = [2.0 if contact == "above" else 0.0, sense * 0.0, 0.0, G]
+        assert [one.values[0] for one in held.values()] == pytest.approx(expected, rel=FEW, nan_ok=True)
     # The body passes the middle after slightly more than a quarter of a swing.
     first = np.arccos(-np.sign(1.0) * offset / (np.abs(starts) - offset)) / math.sqrt(k)
     assert module.sweep("time_at", starts, lam=0.0, **given).values == pytest.approx(first, rel=FEW)

@@ -1,6 +1,7 @@
 """The smallest and largest speed or contact force on a tabulated curve: the best sample, refined on its panel."""
 
 from math import asin, fabs, inf, pi, sqrt
+from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_in_space
@@ -29,8 +30,8 @@ from gqm_sym.runtime.sweep.tables.layout import (
     SAMPLE_POINTS,
     SAMPLES,
 )
+from gqm_sym.runtime.sweep.tables.liftoff import launch_on
 from gqm_sym.runtime.sweep.tables.panel_forces import AT_REST, FAR, LOAD, MOVING, NEAR, TURNING, VECTORS, prepare
-from gqm_sym.runtime.sweep.tables.places import locate
 from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
 
 # Half the widths of the first and of the last parabola on a panel of a tabulated curve, whose width is 2, and the
@@ -42,6 +43,47 @@ CLEARANCE = 4e-16
 
 # The last step for the smallest square of a force. It may almost vanish, and then the force is not flat there.
 LAST_STEP_OF_SQUARE = 1e-8
+
+
+class Stretch(NamedTuple):
+    """The part of a passage along which a body moves.
+
+    Attributes
+    ----------
+    low, high : (j, x)
+        The panels of both ends, and the places on them.
+    begin : (j, x)
+        The end at which the body begins, with a speed that is known; j is -1 if it turns before it leaves the track, or
+        if it stays on it.
+    turns : bool
+        Whether the body is at a turning point, at which its speed is 0.
+    is_lap : bool
+        Whether it is a whole lap, the ends of which are the same place.
+    """
+
+    low: tuple[int, float]
+    high: tuple[int, float]
+    begin: tuple[int, float]
+    turns: bool
+    is_lap: bool
+
+
+@Inner
+def stretch_of(curve, orbit, passage, loss):  # type: ignore[no-untyped-def]
+    """Return the `Stretch` of a body up to a loss of contact, which may be `liftoff.KEPT`."""
+    low, high, begin, lost = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0), loss.panel >= 0
+    passes_once = orbit.circulates or orbit.leaves == orbit.direction
+    passes_once = not loss.has_turned if lost else passes_once
+    upwards = orbit.direction > 0
+    if passes_once and (lost or not orbit.circulates):
+        begin = launch_on(curve, orbit, passage)
+        low, high = (begin, high) if upwards else (low, begin)
+    if lost:
+        end, onwards = (loss.panel, loss.x), upwards != loss.has_turned
+        if loss.x == (-1.0 if onwards else 1.0) and begin != end:  # the body leaves before the load beyond a joint acts
+            end = (loss.panel - 1, 1.0) if onwards else (loss.panel + 1, -1.0)
+        low, high = (low, end) if onwards else (end, high)
+    return Stretch(low, high, begin, orbit.v2 == 0.0 or not passes_once, orbit.circulates and not lost)
 
 
 @Inlined
@@ -205,13 +247,13 @@ def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[n
 
 
 @Inner
-def best_sample(curve, path, passage, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
+def best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
     """Return the largest value of ``sign`` times what `load_on` returns at the samples, its panel, and its place
     there.
     """
     samples, count, squared = line_buffer(), curve.levels.size, sought[0] == FORCE_SQUARED
     best, best_j, best_x = -inf, 0, 0.0
-    (first, low_x), (last, high_x) = path
+    (first, low_x), (last, high_x) = stretch.low, stretch.high
     for j in range(first, last + 1):
         k, slack, inside = (passage.first + j) % count, half_v2_at_edges[j], first < j < last
         low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
@@ -231,38 +273,32 @@ def best_sample(curve, path, passage, half_v2_at_edges, sought, sign):  # type: 
 
 
 @Inner
-def passage_extreme(curve, orbit, passage, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
-    """Return the result of `orbit_extremes.extreme` on a tabulated curve: the best of all samples, refined on the
-    panels to which it belongs.
+def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
+    """Return the result of `orbit_extremes.extreme` on a stretch of a tabulated curve: the best of all samples, refined
+    on the panels to which it belongs.
 
     At a joint the values on both sides are compared.
     """
     count, last, force = curve.levels.size, passage.panels - 1, sought[0] != V2
-    turns = sought[1] != 0 and not orbit.circulates
-    path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
-    if orbit.leaves == orbit.direction:  # a body whose turning point is not ahead does not reach it
-        index, x, _ = locate(curve.table, curve.period, orbit.lam0)
-        begin = index - passage.first, x
-        path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
-    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
-    if meets_turn and not (force or sign > 0.0):
+    is_directed, low, high = sought[1] != 0 and not orbit.circulates, stretch.low, stretch.high
+    if stretch.turns and not (force or sign > 0.0):
         return 0.0
-    best, best_j, best_x = best_sample(curve, path, passage, half_v2_at_edges, sought, sign)
+    best, best_j, best_x = best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign)
     if sought[0] == FORCE_SQUARED:
         best = -inf  # the sample is computed once more, to the last digits
-    if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
+    if not force and (best_j, best_x) == stretch.begin:
         return sqrt(orbit.v2)
     for step in range(-1, 2):
         # The extreme is refined on the panel itself, and on the panel with which it shares the place.
         j, x, shared = best_j + step, best_x, step == 0
         if step != 0 and best_x == float(step):
-            x, shared = -best_x, path[0][0] <= j <= path[1][0]
-        if orbit.circulates and step != 0 and not 0 <= j <= last:
+            x, shared = -best_x, low[0] <= j <= high[0]
+        if stretch.is_lap and step != 0 and not 0 <= j <= last:
             j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
         if shared:
-            ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
+            ends = low[1] if j == low[0] else -1.0, high[1] if j == high[0] else 1.0
             k = (passage.first + j) % count
-            level, is_angle = level_on(passage, half_v2_at_edges, j), turns and j in (path[0][0], path[1][0])
+            level, is_angle = level_on(passage, half_v2_at_edges, j), is_directed and j in (low[0], high[0])
             best = max(best, sign * refined(curve, k, level, sought, sign, x, ends, is_angle))
     value = sign * best
     if sought[0] == V2:

@@ -1,6 +1,7 @@
 """The first place of an orbit at which the track would have to pull, on a tabulated curve."""
 
 from math import fabs
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,30 @@ from gqm_sym.runtime.sweep.tables.potential import potential_on, value_on
 
 # The number of steps of the search for a zero of N between two samples.
 MAX_STEPS = 80
+
+
+class Loss(NamedTuple):
+    """The place at which a body leaves the track that would have to pull it there.
+
+    Attributes
+    ----------
+    place : float
+        The place in lam, which is NaN if the body keeps contact up to the end of its orbit.
+    panel : int
+        The panel of the passage on which it is; -1 if there is none.
+    x : float
+        The place on that panel.
+    has_turned : bool
+        Whether the body has turned before.
+    """
+
+    place: float
+    panel: int
+    x: float
+    has_turned: bool
+
+
+KEPT = Loss(np.nan, -1, 0.0, False)
 
 
 @Inner
@@ -101,22 +126,28 @@ def loss_on_way(curve, passage, half_v2_at_edges, side, begin, sense):  # type: 
 
 
 @Inner
-def liftoff_place(curve, orbit, passage, half_v2_at_edges, side):  # type: ignore[no-untyped-def]
-    """Return the place at which a body leaves the track before it reaches an end of it; NaN if it never does."""
-    table, period = curve.table, curve.period
-    index, x, _ = locate(table, period, orbit.lam0)
-    j, last = index - passage.first, passage.panels - 1
-    if orbit.circulates and orbit.direction < 0:
-        j = last
-    at_low, at_high = orbit.low == 0.0, orbit.high == 0.0
-    if not orbit.circulates and (at_low or at_high):
-        j, x = (0, passage.low_x) if at_low else (last, passage.high_x)
+def launch_on(curve, orbit, passage):  # type: ignore[no-untyped-def]
+    """Return the panel of a passage on which the launch is, and its place there."""
+    index, x, _ = locate(curve.table, curve.period, orbit.lam0)
+    last = passage.panels - 1
+    if not orbit.circulates and (orbit.low == 0.0 or orbit.high == 0.0):
+        return (0, passage.low_x) if orbit.low == 0.0 else (last, passage.high_x)
+    return last if orbit.circulates and orbit.direction < 0 else index - passage.first, x
+
+
+@Inner
+def loss_of_contact(curve, orbit, passage, half_v2_at_edges, side):  # type: ignore[no-untyped-def]
+    """Return where a body leaves the track before it reaches an end of it, as a `Loss`."""
+    begin = launch_on(curve, orbit, passage)
+    if orbit.direction < 0 and begin[0] > 0 and begin[1] == -1.0:  # from an edge the body moves to the panel before
+        begin = begin[0] - 1, 1.0
     for passes in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
         sense = orbit.direction if passes == 0 else -orbit.direction
-        lost, where = loss_on_way(curve, passage, half_v2_at_edges, side, (j, x), sense)
-        if passes == 0 and lost == j and where == x:
-            return orbit.lam0
-        if lost >= 0:
-            k = (passage.first + lost) % curve.levels.size
-            return edge_place(table, period, passage.first + lost) + table.paths[k, HALF] * (1.0 + where)
-    return np.nan
+        j, x = loss_on_way(curve, passage, half_v2_at_edges, side, begin, sense)
+        if passes == 0 and (j, x) == begin:
+            return Loss(orbit.lam0, j, x, False)
+        if j >= 0:
+            k = (passage.first + j) % curve.levels.size
+            place = edge_place(curve.table, curve.period, passage.first + j) + curve.table.paths[k, HALF] * (1.0 + x)
+            return Loss(place, j, x, passes == 1)
+    return KEPT
