@@ -40,8 +40,10 @@ from gqm_sym.runtime.gradients.panels import fill_shares
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The numbers of panels with Gauss's rule that are tried in turn, and the largest change of an integral by the last
-# doubling, as a share of the integral of the absolute values: the error is about the square of the change.
-PANELS, MAX_CHANGE = (1, 2, 4, 8), 1e-8
+# doubling, as a share of the integral of the absolute values. The turning point of the next well is a branch point
+# beyond the end of the interval, z half widths of the last panel from its middle: the error is about
+# exp(-2 * RULE * acosh(z)). Halving the panel puts 2 z - 1 in place of z, and leaves less than a rounding.
+PANELS, MAX_CHANGE = (1, 2, 4, 8), 1e-12
 
 
 @cache
