@@ -9,7 +9,7 @@ import pytest
 from newton import Newton, viviani
 
 import gqm_sym as gqm
-from gqm_sym.errors import DeclarationError, LaunchError
+from gqm_sym.errors import LaunchError
 
 Build = Callable[[str, Any, Any], ModuleType]
 Vector = np.ndarray[Any, np.dtype[np.float64]]
@@ -279,5 +279,3 @@ def test_sides_that_nothing_tells_are_refused(built: Build) -> None:
     )
     with pytest.raises(LaunchError, match="declare the upward direction"):
         module.solve(0, 1, contact="above")
-    with pytest.raises(DeclarationError, match="rotating_frame: a turning frame is not known of a train"):
-        gqm.derive(VIVIANI, gqm.Gravity() + gqm.RotatingFrame() + gqm.Train(length=1))
