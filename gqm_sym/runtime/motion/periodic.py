@@ -118,14 +118,14 @@ class PeriodicMotion(PeriodicTimes):
         return dict(zip(rows, shares.tolist(), strict=True))
 
     @locked
-    def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
-        if self.kind == "libration" and isinstance(derivatives := self._derivatives, FormulaOrbitDerivatives):
-            rows, state = selected(self.problem.formulas.parameters, wrt), self.state(self.time_at(lam))
-            is_passed = state.v != 0.0 and not self._is_turn(state.lam)
-            found = arrival_slopes(self, derivatives, state.lam, state.v) if is_passed else None
-            if found is not None:
-                return {name: float(found[row]) for name, row in rows.items()}
-        return super()._arrival_gradient(lam, wrt)
+    def _slopes_of_arrival(self, state: Any, wrt: Any) -> dict[str, Any] | None:
+        if self.kind != "libration" or not isinstance(derivatives := self._derivatives, FormulaOrbitDerivatives):
+            return None
+        rows = selected(self.problem.formulas.parameters, wrt)
+        if state.v == 0.0 or self._is_turn(state.lam):
+            return None
+        found = arrival_slopes(self, derivatives, state.lam, state.v)
+        return None if found is None else {name: float(found[row]) for name, row in rows.items()}
 
     def _is_turn(self, place: float) -> bool:
         turns = self.turning_points if self.kind == "libration" else ()

@@ -105,11 +105,21 @@ class Derivatives(Positions):
     def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
         """Return the derivatives of the time at which the body is at a place; it is earlier if the body moves on."""
         t = self.time_at(lam)
-        state, changes, f = self.state(t), self._sensitivity(t, wrt), self.problem.functions
+        state, f = self.state(t), self.problem.functions
+        found = self._slopes_of_arrival(state, wrt)
+        if found is not None:
+            return found
+        changes = self._sensitivity(t, wrt)
         if state.v == 0.0 or self._is_turn(state.lam):
             raise SolutionError("gradient: time_at of a place where the body turns has none")
         rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
         return dict(zip(changes.wrt, (-changes.lam / rate).tolist(), strict=True))
+
+    def _slopes_of_arrival(self, _: Any, wrt: Any) -> dict[str, Any] | None:
+        """Return the derivatives of the time of a state at a fixed place, where they do not follow from those at a
+        fixed time without a loss of digits; otherwise None.
+        """
+        return None
 
     def _is_turn(self, _: float) -> bool:
         """Return whether the body turns at a place, as nearly as doubles show it."""
