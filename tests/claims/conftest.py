@@ -20,3 +20,13 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Any, Any],
         return modules[name]
 
     return module
+
+
+@pytest.fixture(scope="module")
+def build_train(built: Callable[[str, Any, Any], ModuleType]) -> Callable[..., ModuleType]:
+    """Build the module of a train along a curve under a force law, once under one name; that of a body for no cars."""
+
+    def module(name: str, curve: Any, law: Any, cars: int = 3) -> ModuleType:
+        return built(name, curve, law + gqm.Train(cars=cars) if cars else law)
+
+    return module

@@ -27,16 +27,11 @@ Build = Callable[..., ModuleType]
 
 
 @pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return the module of a train, built once."""
-    folder, built = tmp_path_factory.mktemp("trains"), {}
+def build(build_train: Build) -> Build:
+    """Build the module of a train under gravity and perhaps another force."""
 
     def module(name: str, curve: gqm.Curve, force: Any = None, cars: int = 3) -> ModuleType:
-        if name not in built:
-            law = gqm.Gravity() + gqm.Train(cars=cars) if cars else gqm.Gravity()
-            model = gqm.derive(curve, law if force is None else law + force)
-            built[name] = gqm.build(model, name=name, folder=folder)
-        return built[name]
+        return build_train(name, curve, gqm.Gravity() if force is None else gqm.Gravity() + force, cars)
 
     return module
 

@@ -20,23 +20,9 @@ Build = Callable[..., ModuleType]
 
 
 @pytest.fixture(scope="module")
-def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """Return the module of a train, built once."""
-    folder, built = tmp_path_factory.mktemp("trains"), {}
-
-    def module(name: str, curve: gqm.Curve, force: Any, cars: int = 3) -> ModuleType:
-        if name not in built:
-            law = force + gqm.Train(cars=cars) if cars else force
-            built[name] = gqm.build(gqm.derive(curve, law), name=name, folder=folder)
-        return built[name]
-
-    return module
-
-
-@pytest.fixture(scope="module")
-def hoop(build: Build) -> ModuleType:
+def hoop(build_train: Build) -> ModuleType:
     """Return a train on a circle that rotates about the vertical through its centre, with a spring."""
-    return build(
+    return build_train(
         "train_on_hoop", gqm.families.circle(), gqm.Gravity() + gqm.RotatingFrame() + gqm.Potential("k*x**2/2")
     )
 
@@ -97,13 +83,13 @@ def test_forces_on_cars_of_a_rotating_hoop(hoop: ModuleType) -> None:
     np.testing.assert_allclose(found.coupling_force, lacking[:-1], rtol=0, atol=2 * SHARE * mass * 9.81)
 
 
-def test_around_a_centre(build: Build) -> None:
+def test_around_a_centre(build_train: Build) -> None:
     """Under the attraction of a centre that parameters place V**2 is that of the mean potential, which mpmath has in 30
     digits; a short train is a body.
     """
     curve = gqm.Curve.graph("c*x**2", parameter="x", domain=(-2, 2), parameters={"c": "0.25"})
     law = gqm.CentralForce(centre=("a", "b"), k=5)
-    module = build("train_around_centre", curve, law + gqm.Gravity())
+    module = build_train("train_around_centre", curve, law + gqm.Gravity())
     length, launch, v0 = mpf(3) / 2, mpf(1), mpf(1)
     where = {"a": "0.25", "b": "0.5", "length": "3/2"}
     with mp.workdps(30):
@@ -134,18 +120,18 @@ def test_around_a_centre(build: Build) -> None:
             assert max(abs(a - b) for a, b in zip(found, truth, strict=True)) <= 1e-14
     short = module.solve(1, "1/2", length="1e-9", a="0.25", b="0.5")
     rail = gqm.Curve.piecewise([curve])
-    body = build("body_around_centre", rail, law + gqm.Gravity(), cars=0).solve(1, "1/2", a="0.25", b="0.5")
+    body = build_train("body_around_centre", rail, law + gqm.Gravity(), cars=0).solve(1, "1/2", a="0.25", b="0.5")
     assert short.kind == body.kind
     assert short.period == pytest.approx(body.period, rel=2 * ROUNDING)
     with pytest.raises(ParameterError, match="potential"):
         module.solve(1, a="1", b="0.25", length=1)
 
 
-def test_helix_in_a_rotating_frame(build: Build) -> None:
+def test_helix_in_a_rotating_frame(build_train: Build) -> None:
     """On a helix about the axis a train falls as a body does, and each car is pressed by the Coriolis force too."""
     radius, rise, length, cars, rate = 2.0, 0.75, 3.0, 5, 0.6
     helix = gqm.families.helix(R="2", c="3/4", domain=(0, 12))
-    module = build("train_on_rotating_helix", helix, gqm.Gravity() + gqm.RotatingFrame(), cars=cars)
+    module = build_train("train_on_rotating_helix", helix, gqm.Gravity() + gqm.RotatingFrame(), cars=cars)
     size, launch, v0 = float(np.hypot(radius, rise)), 12.0, 9.0
     slope = rise / size
     motion = module.solve(launch, v0, length=length, Omega=rate)
@@ -167,9 +153,11 @@ def test_helix_in_a_rotating_frame(build: Build) -> None:
         np.testing.assert_allclose(found.coupling_force, 0, rtol=0, atol=4 * SHARE * 9.81)
 
 
-def test_drag_under_a_potential(build: Build) -> None:
+def test_drag_under_a_potential(build_train: Build) -> None:
     """With drag V**2 is linear in a known solution on a circle, which says where the train turns."""
-    module = build("train_on_spring_with_drag", gqm.families.circle(), gqm.Potential("k*x**2/2") + gqm.QuadraticDrag())
+    module = build_train(
+        "train_on_spring_with_drag", gqm.families.circle(), gqm.Potential("k*x**2/2") + gqm.QuadraticDrag()
+    )
     radius, length, drag, place = 1.0, 1.5, 0.05, 1.2
     legs = module.solve(place, L=radius, length=length, b=drag, k=3, t_max=4).legs
     with mp.workdps(30):
