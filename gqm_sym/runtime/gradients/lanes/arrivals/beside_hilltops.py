@@ -31,6 +31,7 @@ from gqm_sym.runtime.gradients.lanes.arrivals.integrals import (
     SUMS,
     TOTAL,
     VALUE,
+    add_node,
 )
 from gqm_sym.runtime.gradients.lanes.arrivals.programs import SQUARE
 from gqm_sym.runtime.gradients.lanes.arrivals.weights import FLIP, LAUNCH_SIGN, PLACE_SIGN, ROWS
@@ -149,22 +150,17 @@ def integrate_to(program, work, nodes, lanes, sums, found, states):  # type: ign
         Filled with the states of the quadrature.
     """
     (share, rest, error), start = rows_of(work, program[3] * ROW), 0
+    weights, no_terms = np.empty(BLOCK), np.empty(0)
     call_interpreter(program[0], program[1], 0, program[2], work, lanes)
     states[:lanes], found[:, :, :] = OPEN, 0.0
     for count in PANELS:
         sums[:, :, :] = 0.0
         for node in range(start, start + count * RULE):
-            weight = nodes[2, node]
             for i in range(lanes):
                 share[i], rest[i], error[i] = nodes[0, node], nodes[1, node], UNIT * nodes[0, node]
+                weights[i] = nodes[2, node]
             call_interpreter(program[0], program[1], program[2], program[1].shape[0], work, lanes)
-            for j in range(program[4].size):
-                values, _, errors = rows_of(work, program[4][j])
-                total, mass, bound = sums[j, TOTAL], sums[j, MASS], sums[j, ERRORS]
-                for i in range(lanes):
-                    total[i] += weight * values[i]
-                    mass[i] += weight * fabs(values[i])
-                    bound[i] += weight * errors[i]
+            add_node(program, work, (weights, weights, weights), no_terms, lanes, sums)
         start, left = start + count * RULE, 0
         for i in range(lanes):
             if states[i] != OPEN:
