@@ -88,7 +88,7 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     state, values = motion.state(t), problem.p.values.tolist()
     length, _, friction, *_ = (float(number) for number in track.numbers(FLOATS, values))
     chart = formulas.charted(problem.p)
-    mass, count = values[list(formulas.parameters).index("m")], track.cars
+    mass, count = f.mass, track.cars
     middle, v2 = np.atleast_1d(state.lam), np.atleast_1d(state.v2)
     shares = np.arange(2 * count + 1) / (2 * count) - 0.5
     places = middle + length * shares.reshape(-1, *np.ones(middle.ndim, dtype=int))
