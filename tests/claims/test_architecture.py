@@ -219,6 +219,7 @@ TESTED_THROUGH = {
     "sweep/batch/turning_points.py": "runtime/sweep/batch/test_batches.py",
     "sweep/cluster.py": "studies/test_studies.py",
     "sweep/columns.py": "runtime/sweep/test_sweep.py",
+    "sweep/extremes.py": "runtime/sweep/test_leaving.py",
     "sweep/exact_orbits.py": "runtime/sweep/test_separatrices.py",
     "sweep/gradients.py": "runtime/gradients/test_sweep.py",
     "sweep/groups.py": "runtime/sweep/tables/test_times.py",

@@ -1,7 +1,7 @@
 """Groups of launches of a sweep on curves of the same shape, which share a chart and a table."""
 
 from collections.abc import Callable, Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -52,6 +52,9 @@ class Group(NamedTuple):
         The factors of each launch for the parts of potential and load in the table.
     ends : int
         The kind of both ends of the table, or of the curve if there is no table (`SweptCurve`).
+    table_between_ends : callable, optional
+        Makes the table of a curve with formulas that has two ends, which only bodies that leave the curve need, and
+        returns the kind of its ends too.
     """
 
     columns: list[Array]
@@ -62,6 +65,7 @@ class Group(NamedTuple):
     table: CurveTable = NO_TABLE
     factors: list[Array] = _WHOLE
     ends: int = NO_ENDS
+    table_between_ends: Callable[[], tuple[CurveTable, int]] | None = None
 
 
 def groups_of(
@@ -70,14 +74,16 @@ def groups_of(
     """Return the launches grouped by the shape of their curve, with their indices; None instead of indices if all have
     the same shape.
 
-    Launches whose curve cannot be made belong to no group. Curves with formulas are tabulated if bodies may lift off.
+    Launches whose curve cannot be made belong to no group. Curves with formulas are tabulated if bodies may lift off or
+    leave them at an end.
     """
     if formulas.chart is None:
-        may_lift_off = only_sign and not formulas.dissipation
-        table, ends = NO_TABLE, CURVE_ENDS
-        if may_lift_off:
+        table, later, ends = NO_TABLE, None, CURVE_ENDS
+        if only_sign and not formulas.dissipation:
             table, ends = _tabulated_range(formulas, columns, domain, only_sign)
-        yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
+        elif not formulas.dissipation and np.isfinite(domain[0]).all() and np.isfinite(domain[1]).all():
+            later = partial(_tabulated_range, formulas, columns, domain, only_sign)
+        yield Group([*columns[:4], *domain, *columns[4:]], table=table, table_between_ends=later, ends=ends), None
         return
     common, factors = _common_parameters(formulas, len(columns) - 4), _WHOLE
     if formulas.separated is not None and formulas.dissipation is None:
@@ -215,7 +221,8 @@ def tabulated(
         except GQMError:
             true = None  # the table then has the accuracy of the chart
     p_and_chart = np.concatenate([values, chart.block])
-    return CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
+    table = CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
+    return table._replace(least_slope=0.0)  # the functions of a chart have no more digits than its table
 
 
 def _distinct(

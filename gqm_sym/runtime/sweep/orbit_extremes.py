@@ -35,7 +35,9 @@ MAX_REFINEMENTS, MAX_GAIN, MAX_LAST_STEP = 13, 1e-15, 1e-4
 
 # A point of the grid stands for one peak if the second difference at it is proportional to the square of the step, up
 # to this share and up to rounding. Otherwise two peaks and the dip between them may lie within one step, as where a
-# maximum in the middle of a well has just become two beside it.
+# maximum in the middle of a well has just become two beside it. If the second difference is smaller, the peak may also
+# be flat, as that of a force which changes with V**4 beside a turning point: then there is no dip if the second
+# difference keeps its sign while the step shrinks.
 MAX_BEND_CHANGE, BEND_ROUNDING = 0.25, 2e-15
 
 # The square of a length that is only a rounding of the largest length, as a share of the square of the latter.
@@ -86,31 +88,44 @@ def fill_force(curve, function, n, lam, v2, frame, out):  # type: ignore[no-unty
 def is_loop(orbit, sought):  # type: ignore[no-untyped-def]
     """Return whether the function that is sought is searched along a whole lap or period.
 
-    ``sought`` has the function that is searched, and the direction of motion if the force depends on it, otherwise 0.
-    That is so for circulations, and for librations if the force depends on the direction of motion.
+    ``sought`` has the function that is searched, and the direction of motion at launch if the force depends on it,
+    otherwise 0. That is so for circulations, and for librations if the force depends on the direction of motion.
     """
-    return orbit.circulates or sought[1] != 0
+    return orbit.circulates or (sought[1] != 0 and orbit.leaves == 0)
 
 
 @Inlined
-def way_at(orbit, direction, share):  # type: ignore[no-untyped-def]
-    """Return the sign of ds/dt at a share of a lap, or of a period of a libration."""
-    return direction if orbit.circulates else 1 if floor(2.0 * share) % 2.0 == 0.0 else -1
+def moving_at(orbit, direction, share):  # type: ignore[no-untyped-def]
+    """Return a place on an orbit, as a share of the orbit's width from its lower end, and the sign of ds/dt there.
+
+    ``share`` is one of a lap, of a period of a libration, or of the way of a body that leaves the curve. If that body
+    turns on its way, the root of its distance from the turning point, with the sign of ds/dt, grows in equal steps,
+    because the speed is smooth in it.
+    """
+    if orbit.circulates:
+        return share, direction
+    if orbit.leaves == 0:
+        return sin(pi * share) ** 2, 1 if floor(2.0 * share) % 2.0 == 0.0 else -1
+    turn = orbit.low if orbit.leaves > 0 else orbit.high
+    begin = 0.0 if orbit.leaves == direction else -sqrt(fabs(turn) / (orbit.high - orbit.low))
+    root = begin + (1.0 - begin) * share
+    away = share if orbit.leaves == direction and orbit.v2 > 0.0 else root * root
+    return away if orbit.leaves > 0 else 1.0 - away, orbit.leaves if root >= 0.0 else -orbit.leaves
 
 
 @Inner
 def sample_loads(curve, orbit, sought, shares, n, out, frame, with_path):  # type: ignore[no-untyped-def]
     """Fill the function that is sought (`is_loop`) at n shares of an orbit's width from its lower end.
 
-    If a libration is searched along its whole period, they are shares of the period's phase angle. For the contact
-    force, and only then, ``frame`` is filled with the path, unless ``with_path`` is false and it is not needed. V**2 is
-    its value at launch less its decrease from there. Next to a turning point its error is a rounding of the largest
-    V**2 on the orbit, not of the small value itself.
+    If the force depends on the direction of motion, they are the shares of `moving_at`. For the contact force, and only
+    then, ``frame`` is filled with the path, unless ``with_path`` is false and it is not needed. V**2 is its value at
+    launch less its decrease from there. Next to a turning point its error is a rounding of the largest V**2 on the
+    orbit, not of the small value itself.
     """
     offsets, lam, rows, v2 = line_buffer(), line_buffer(), pair_buffer(), line_buffer()
-    width, there_and_back = orbit.high - orbit.low, sought[1] != 0 and not orbit.circulates
+    width = orbit.high - orbit.low
     for i in range(n):
-        share = sin(pi * shares[i]) ** 2 if there_and_back else shares[i]
+        share = moving_at(orbit, sought[1], shares[i])[0] if sought[1] != 0 else shares[i]
         offsets[i] = orbit.low + width * share
         lam[i] = orbit.lam0 + offsets[i]
     call_potential_divdiff1(curve.fns.potential_divdiff1, n, orbit.lam0, lam, offsets, curve.p, rows)
@@ -125,8 +140,8 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame, with_path):  # typ
         call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
     begin = 0
     while begin < n:
-        way, end = way_at(orbit, sought[1], shares[begin]), begin + 1
-        while end < n and way_at(orbit, sought[1], shares[end]) == way:
+        way, end = moving_at(orbit, sought[1], shares[begin])[1], begin + 1
+        while end < n and moving_at(orbit, sought[1], shares[end])[1] == way:
             end += 1
         fill_squares(curve, way, end - begin, lam[begin:end], v2[begin:end], out[begin:end])
         begin = end
@@ -226,10 +241,14 @@ def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-unt
     """
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
-    share, value, expected = peak[1] * step, f1, 0.0
+    share, value, expected, is_flat = peak[1] * step, f1, 0.0, False
     for k in range(MAX_REFINEMENTS):
         tilt, bend, scale = sign * (f0 - f2), sign * (f0 - 2.0 * f1 + f2), resolution(sought[0], f1, size)
         if k == 1 and not fabs(bend - expected) <= MAX_BEND_CHANGE * fabs(expected) + BEND_ROUNDING * scale:
+            is_flat = bend > expected
+            if not is_flat:
+                return np.nan
+        if is_flat and not bend <= BEND_ROUNDING * scale:
             return np.nan
         ratio = FIRST_STEP_RATIO if k == 0 else STEP_RATIO
         expected = bend / ratio**2
@@ -264,14 +283,14 @@ def highest_top(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore
 
 
 @Inner
-def extreme(curve, orbit, sought, sign):  # type: ignore[no-untyped-def]
+def extreme(curve, orbit, sought, sign, max_grids):  # type: ignore[no-untyped-def]
     """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit; `is_loop` explains
     ``sought``.
 
     Parabolas through three points are repeated with smaller and smaller steps. At an extreme the function is flat, so
     its value is accurate to all digits as soon as the place has half of them. The parabolas are fitted to V**2, because
-    V has a kink where the body almost stops. In an even well, V is largest in the middle. The value is NaN if the
-    finest grid is too coarse.
+    V has a kink where the body almost stops. In an even well, V is largest in the middle. The value is NaN if a grid
+    that consists of ``max_grids`` grids of the first size is too coarse.
     """
     force = sought[0] != V2
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
@@ -284,7 +303,7 @@ def extreme(curve, orbit, sought, sign):  # type: ignore[no-untyped-def]
         sample_loads(curve, orbit, sought, points, 1, sums, frame, False)
         return sqrt(sums[0])
     grids = 1
-    while grids <= MAX_GRIDS:
+    while grids <= max_grids:
         find_peaks(curve, orbit, sought, sign, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, force):
             best = highest_top(curve, orbit, sought, sign, grids, sums, peaks)

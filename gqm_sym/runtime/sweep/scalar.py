@@ -30,7 +30,7 @@ from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Arra
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, TURN, SearchArrays, speed_squared
-from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, joints_between
+from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
@@ -40,8 +40,9 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival, refined_end
+from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on, extreme_on_table
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
-from gqm_sym.runtime.sweep.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
+from gqm_sym.runtime.sweep.orbit_extremes import MAX_GRIDS
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -49,9 +50,7 @@ from gqm_sym.runtime.sweep.quantities import (
     END_TIME,
     HALF_PERIOD,
     MAX_FORCE,
-    MAX_SPEED,
     MIN_FORCE,
-    MIN_SPEED,
     NEVER_THERE,
     NOT_FINITE,
     NOT_PERIODIC,
@@ -64,7 +63,6 @@ from gqm_sym.runtime.sweep.quantities import (
     UNDECIDED,
 )
 from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
-from gqm_sym.runtime.sweep.tables.extremes import passage_extreme, stretch_of
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
@@ -72,9 +70,8 @@ from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_half_v
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
-# The quantities that only motions that repeat have, and the extremes.
+# The quantities that only motions that repeat have.
 PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
-EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
 
 class GivenCurve(NamedTuple):
@@ -237,53 +234,25 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
     return value if value > 0.0 else time_by_panels(curve.fns, curve.p, kind, orbit.lam0, orbit.v2, a, b, joints)
 
 
-@Inner
-def extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
-    """Return an extreme of speed or contact force on an orbit up to a loss of contact; NaN if it is not accurate.
-
-    It is computed on the orbit's passage through a table if that has panels.
-    """
-    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-    function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
-    direction = orbit.direction if function == FORCE_SQUARED and curve.directed else 0
-    if direction != 0 and orbit.leaves != 0 and (orbit.leaves != direction or passage.panels == 0):
-        return nan
-    if passage.panels == 0:
-        return extreme(curve, orbit, (function, direction), sign)
-    stretch = stretch_of(curve, orbit, passage, loss)
-    value = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, direction), sign)
-    if direction != 0 and orbit.leaves == 0 and not orbit.circulates:
-        back = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, -direction), sign)
-        value = sign * max(sign * value, sign * back)
-    return value
-
-
-@Inner
-def extreme_on_table(curve, orbit, passage, loss, edges, quantity):  # type: ignore[no-untyped-def]
-    """Return the result of `extreme_on` on a passage through a table; NaN if it is a speed that has lost digits.
-
-    ``edges`` contains V**2/2 at the edges of panels, and whether it keeps enough digits everywhere. The contact force
-    has as many digits as the largest V**2.
-    """
-    half_v2_at_edges, keeps_digits = edges
-    value, peak = extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity), 0.0
-    if not keeps_digits and quantity in (MIN_SPEED, MAX_SPEED) and value > 0.0:
-        for j in range(passage.panels):
-            peak = max(peak, half_v2_at_edges[j])
-        if not 0.5 * value * value >= MIN_CANCELLATION_RATIO * peak:
-            return nan
-    return value
+@Inlined
+def follows_formulas(curve):  # type: ignore[no-untyped-def]
+    """Return whether the formulas of a tabulated curve are as accurate as its table."""
+    return curve.joints.size == 0 and not curve.table.is_exact
 
 
 @Inner
 def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):  # type: ignore[no-untyped-def]
     """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
     low, high, is_extreme = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, quantity in EXTREMES
-    by_itself = orbit.leaves == 0 and (passage.panels <= 2 or is_extreme) and not curve.table.is_exact
-    if by_itself and joints_between(curve.joints, curve.period, low, high).size == 0:
+    stays, is_short = orbit.leaves == 0, passage.panels <= 2
+    by_itself = (stays and is_extreme) or (is_short and (stays or follows_formulas(curve)))
+    if by_itself and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # computed without the table, they are more accurate than on it
     if is_extreme:
-        return extreme_on(curve, orbit, passage, KEPT, half_v2_at_edges, quantity)
+        value = nan
+        if orbit.leaves != 0 and follows_formulas(curve):  # one grid is faster, if it suffices
+            value = extreme_by_itself(curve, orbit, quantity, 1)
+        return value if value == value else extreme_on(curve, orbit, passage, KEPT, half_v2_at_edges, quantity)
     return travel_time(curve, orbit, passage, half_v2_at_edges, target if quantity == ARRIVAL_TIME else nan)
 
 
@@ -297,7 +266,7 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
     inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
     if inside.size:
         return nan
-    return extreme_on(curve, orbit, NOWHERE, KEPT, buffers.half_v2_at_edges, quantity)
+    return extreme_by_itself(curve, orbit, quantity, MAX_GRIDS)
 
 
 @Inner
@@ -325,7 +294,7 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
     value = value_from_table(curve, orbit, passage, quantity, target, buffers.half_v2_at_edges) if tabulated else nan
     if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
         value = time_on_panel_of_both(curve, passage)
-    by_formulas = orbit.leaves == 0 or passage.panels == 0
+    by_formulas = orbit.leaves == 0 or passage.panels == 0 or follows_formulas(curve)
     if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value != value:
@@ -431,7 +400,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     p, joints, side, t_max = borrowed(given.parameters), borrowed(given.joints), given.side, given.t_max
     edges, lows = borrowed(given.table.edges), borrowed(given.table.edge_lows)
     paths, parts = borrowed(given.table.paths), borrowed(given.table.parts)
-    table = CurveTable(edges, lows, paths, parts, given.table.potentials, given.table.is_exact)
+    table = CurveTable(edges, lows, paths, parts, *given.table[4:])
     rows, levels, factors = borrowed(given.rows), borrowed(given.levels), borrowed(given.factors)
     (address, operations, tape_parts, registers), work, exact_p = given.exact
     tape = address, borrowed(operations), tape_parts, registers

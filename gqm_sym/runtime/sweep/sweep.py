@@ -212,6 +212,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
             answer_batches(batches.addresses(), layout, *launches, wanted, found._replace(values=spans))
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue
+        if group.table_between_ends and (found.status == quantities.UNDECIDED).any():
+            table, _ = group.table_between_ends()
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)

@@ -86,6 +86,15 @@ def stretch_of(curve, orbit, passage, loss):  # type: ignore[no-untyped-def]
     return Stretch(low, high, begin, orbit.v2 == 0.0 or not passes_once, orbit.circulates and not lost)
 
 
+@Inner
+def stretch_to_turn(curve, orbit, passage):  # type: ignore[no-untyped-def]
+    """Return the `Stretch` of a body from its launch to the turning point ahead of it."""
+    launch = launch_on(curve, orbit, passage)
+    low, high = (0, passage.low_x), (passage.panels - 1, passage.high_x)
+    low, high = (launch, high) if orbit.direction > 0 else (low, launch)
+    return Stretch(low, high, launch, True, False)
+
+
 @Inlined
 def level_on(passage, half_v2_at_edges, j):  # type: ignore[no-untyped-def]
     """Return V**2/2 at an edge of panel j of a passage, the column of the powers about that edge, and the edge's place

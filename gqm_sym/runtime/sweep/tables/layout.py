@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 from numpy.polynomial.legendre import leggauss, legvander
 
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 
 # The number of Gauss points of a panel, that of the rule for panels far from turning points, and the number of places
 # at which loads are sampled.
@@ -86,6 +86,9 @@ class CurveTable(NamedTuple):
         The number of parts of the potential.
     is_exact : bool
         Whether potential and lengths were rounded from double-double arithmetic.
+    least_slope : float
+        The slope of the potential below which the table of a curve with formulas has fewer digits than these; 0 for
+        charts.
     """
 
     edges: Any
@@ -94,7 +97,8 @@ class CurveTable(NamedTuple):
     parts: Any
     potentials: Any
     is_exact: Any
+    least_slope: Any
 
 
-TABLE = types.NamedTuple((VECTOR, VECTOR, MATRIX, MATRIX, types.int64, types.boolean), CurveTable)
-NO_TABLE = CurveTable(np.empty(0), np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, 0)), 0, False)
+TABLE = types.NamedTuple((VECTOR, VECTOR, MATRIX, MATRIX, types.int64, types.boolean, REAL), CurveTable)
+NO_TABLE = CurveTable(np.empty(0), np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, 0)), 0, False, 0.0)

@@ -169,7 +169,7 @@ def fill_half_v2_at_edges(curve, passage, half_v2_at_edges):  # type: ignore[no-
     """Fill V**2/2 at the left edge of each panel of a passage; return whether all values keep enough digits.
 
     They are computed from the nearer turning point. On a panel with a turning point, the value is that of the potential
-    continued beyond it.
+    continued beyond it. Where a body is slow, the potential must have digits of its own.
     """
     rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
     turns, paths, middle, enough = passage.turns, curve.table.paths, passage.middle, True
@@ -180,9 +180,11 @@ def fill_half_v2_at_edges(curve, passage, half_v2_at_edges):  # type: ignore[no-
         at = neighbour(at, 1, count)
     prepare(curve, k, NEAR)
     prepare(curve, high, NEAR)
-    peak, slope = 0.0, np.inf
+    peak, slope, least = 0.0, np.inf, curve.table.least_slope
     if turns == NEITHER:
         peak = begin = 0.5 * passage.v2
+        start = fabs(difference_on(rows, k, passage.low_x, passage.low_x))
+        enough = max(start, begin) >= least * paths[k, HALF]
     if turns != UPPER:
         half_v2_at_edges[0] = potential_on(rows, k, passage.low_x) + begin
         slack, after = begin + rise_on(rows, k, RIGHT_TERMS, -passage.low_to_edge), neighbour(k, 1, count)
@@ -194,7 +196,7 @@ def fill_half_v2_at_edges(curve, passage, half_v2_at_edges):  # type: ignore[no-
         if last > 0:
             peak = max(peak, slack)
         if turns != NEITHER:
-            slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (2.0 * paths[k, HALF])
+            slope = -difference_on(rows, k, passage.low_x, passage.low_x) / paths[k, HALF]
     if turns in (BOTH, UPPER):
         top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_from_edge)
         at = high
@@ -202,7 +204,7 @@ def fill_half_v2_at_edges(curve, passage, half_v2_at_edges):  # type: ignore[no-
             half_v2_at_edges[j] = slack - rise_between(rows, high, at)
             top, at = max(top, half_v2_at_edges[j]), neighbour(at, -1, count)
             enough &= half_v2_at_edges[j] >= MIN_CANCELLATION_RATIO * top
-        slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (2.0 * paths[high, HALF])
+        slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / paths[high, HALF]
         slope, peak = min(slope, slope_above), max(peak, top)
     # Neither turning point may be next to an equilibrium.
-    return enough and slope * passage.width >= 0.5 * MIN_CANCELLATION_RATIO * peak
+    return enough and slope * passage.width >= MIN_CANCELLATION_RATIO * peak and slope >= least

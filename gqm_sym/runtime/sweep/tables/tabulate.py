@@ -337,7 +337,7 @@ def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
             end = pending[waiting - 1]
             if count == capacity or waiting == pending.size:
                 none = np.empty((0, PATH_ROW)), np.empty((0, width))
-                return CurveTable(np.empty(0), np.empty(0), none[0], none[1], source.potentials, False)
+                return CurveTable(np.empty(0), np.empty(0), none[0], none[1], source.potentials, False, 0.0)
             edges[count], lows[count] = place_on_piece(true, pieces, k, begin)
             edges[count + 1], lows[count + 1] = place_on_piece(true, pieces, k, end)
             panel = edges[count], edges[count + 1], k, (begin, end)
@@ -352,4 +352,4 @@ def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
     parts = parts[:count].copy()
     fill_bases(parts, source.potentials, is_exact)
     edges, lows, paths = edges[: count + 1].copy(), lows[: count + 1].copy(), paths[:count].copy()
-    return CurveTable(edges, lows, paths, parts, source.potentials, is_exact)
+    return CurveTable(edges, lows, paths, parts, source.potentials, is_exact, NEGLIGIBLE * scales[0])

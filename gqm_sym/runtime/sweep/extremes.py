@@ -1,0 +1,73 @@
+"""The smallest and largest speed or contact force of one of many launches, by formulas or on the table of a curve."""
+
+from math import nan
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
+from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
+from gqm_sym.runtime.sweep.quantities import MAX_FORCE, MAX_SPEED, MIN_FORCE, MIN_SPEED
+from gqm_sym.runtime.sweep.tables.extremes import passage_extreme, stretch_of, stretch_to_turn
+
+EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
+
+
+@Inner
+def sought_for(curve, orbit, quantity):  # type: ignore[no-untyped-def]
+    """Return the function whose extreme a quantity is with the direction of launch if it depends on that, as
+    `orbit_extremes.is_loop` takes them; and 1 for the largest value, -1 for the smallest.
+    """
+    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+    function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
+    return (function, orbit.direction if function == FORCE_SQUARED and curve.directed else 0), sign
+
+
+@Inner
+def extreme_by_itself(curve, orbit, quantity, max_grids):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force on an orbit without a table, from up to ``max_grids`` grids; NaN if
+    it is not accurate.
+    """
+    sought, sign = sought_for(curve, orbit, quantity)
+    low, high = orbit.low, orbit.high
+    if orbit.leaves == orbit.direction:  # the body does not come to the turning point behind it
+        low, high = (0.0, high) if orbit.leaves > 0 else (low, 0.0)
+    passed = Orbit(orbit.circulates, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, orbit.leaves)
+    return extreme(curve, passed, sought, sign, max_grids)
+
+
+@Inner
+def extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force on an orbit's passage through a table, up to a loss of contact; NaN
+    if it is not accurate.
+
+    If the force depends on the direction of motion, the body turns, and what it passes in each direction is searched by
+    itself.
+    """
+    (function, direction), sign = sought_for(curve, orbit, quantity)
+    stretch, way = stretch_of(curve, orbit, passage, loss), direction
+    if direction != 0 and orbit.leaves != 0:
+        way = orbit.leaves
+    value = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, way), sign)
+    if direction != 0 and orbit.leaves != direction and not orbit.circulates:
+        if orbit.leaves != 0:
+            stretch = stretch_to_turn(curve, orbit, passage)
+        other = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, -way), sign)
+        value = sign * max(sign * value, sign * other)
+    return value
+
+
+@Inner
+def extreme_on_table(curve, orbit, passage, loss, edges, quantity):  # type: ignore[no-untyped-def]
+    """Return the result of `extreme_on`; NaN if it is a speed that has lost digits.
+
+    ``edges`` contains V**2/2 at the edges of panels, and whether it keeps enough digits everywhere. The contact force
+    has as many digits as the largest V**2.
+    """
+    half_v2_at_edges, keeps_digits = edges
+    value, peak = extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity), 0.0
+    if not keeps_digits and quantity in (MIN_SPEED, MAX_SPEED) and value > 0.0:
+        for j in range(passage.panels):
+            peak = max(peak, half_v2_at_edges[j])
+        if not 0.5 * value * value >= MIN_CANCELLATION_RATIO * peak:
+            return nan
+    return value

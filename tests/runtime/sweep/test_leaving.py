@@ -1,0 +1,99 @@
+"""Sweeps of bodies that leave a curve through one of its ends."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+Build = Callable[..., ModuleType]
+
+G, RISE, TURNS = 9.81, 0.3, 6
+HELIX = gqm.families.helix(R=1, c="-3/10", domain=("0", f"{2 * TURNS}*pi"))
+
+
+def motion_on_helix(lam0: float, v0: float, direction: int, omega: float) -> dict[str, float]:
+    """Return the time until a body leaves the helix, and its extremes of speed and contact force per mass.
+
+    The speed downwards grows by g*sin(alpha) in a second, where alpha is the slope. The centrifugal force does no work,
+    and the contact force holds a body that moves on a circle at the speed u*cos(alpha) + omega in an inertial frame,
+    and carries the weight g*cos(alpha).
+    """
+    ds = np.sqrt(1.0 + RISE**2)
+    fall, level = G * RISE / ds, 1.0 / ds
+    down, up = (2.0 * TURNS * np.pi - lam0) * ds, lam0 * ds
+    begin = direction * v0
+    over = begin < 0.0 and v0 * v0 > 2.0 * fall * up
+    end = -np.sqrt(v0 * v0 - 2.0 * fall * up) if over else np.sqrt(v0 * v0 + 2.0 * fall * down)
+    round_axis = [u * level + omega for u in (begin, end)]
+    slowest = 0.0 if round_axis[0] * round_axis[1] < 0.0 else min(map(abs, round_axis))
+    loads = [np.hypot(w * w, G * level) for w in (slowest, max(map(abs, round_axis)))]
+    speeds = [0.0 if begin <= 0.0 and not over else min(v0, abs(end)), max(v0, abs(end))]
+    names = "t_end", "v_min", "v_max", "normal_force_min", "normal_force_max"
+    return dict(zip(names, ((end - begin) / fall, *speeds, *loads), strict=True))
+
+
+def test_down_a_helix_that_turns(build: Build) -> None:
+    """Bodies that slide down, or up and back, or up and over the upper end, in frames that turn either way or not at
+    all, have the times and the extremes of the closed forms.
+    """
+    module = build("helix_that_turns", HELIX, gqm.RotatingFrame())
+    rng, count = np.random.default_rng(7), 60
+    lam0, direction = rng.uniform(0.5, 30.0, count), rng.choice([-1, 1], count)
+    v0, omega = rng.exponential(5.0, count) * (np.arange(count) % 4 > 0), 0.0
+    for omega in (-0.9, 0.0, 0.7):
+        truths = [motion_on_helix(*launch, omega) for launch in zip(lam0, v0, direction, strict=True)]
+        largest = np.array([truth["normal_force_max"] for truth in truths])
+        for name in truths[0]:
+            swept, truth = module.sweep(name, lam0, v0, direction, Omega=omega), np.array([t[name] for t in truths])
+            assert swept.route_counts() == {"single": count}
+            size = largest if name.startswith("normal") else truth
+            assert (np.abs(swept.values - truth) <= 4e-15 * size).all()
+
+
+def test_up_and_down_a_rail_that_turns(build: Build) -> None:
+    """The force on a body that turns on a rail in a rotating frame has the extremes of the solved motion, which are
+    searched on its panels.
+    """
+    pieces = [gqm.transition(length="3", yaw="0.5"), gqm.transition(length="3", yaw="-0.2", pitch="-0.1")]
+    curve = gqm.Curve.piecewise(pieces, start=("0", "0", "4"), heading=("0", "-1/4"))
+    module = build("rail_that_turns", curve, gqm.RotatingFrame(Omega="7/10"))
+    places, v0 = np.array([1.5, 2.9, 4.0, 5.2]), np.array([1.0, 2.0, 2.5, 3.0])
+    swept = [module.sweep(f"normal_force_{end}", places, v0, -1) for end in ("min", "max")]
+    assert all((sweep.route == 1).all() for sweep in swept)
+    for k in range(places.size):
+        motion = module.solve(float(places[k]), float(v0[k]), -1)
+        assert motion.kind == "transit"
+        largest = motion.normal_force_max.value
+        assert abs(swept[0].values[k] - motion.normal_force_min.value) <= 1e-14 * largest
+        assert abs(swept[1].values[k] - largest) <= 1e-14 * largest
+
+
+def time_down_ramp(lam0: float, end: float) -> Any:
+    """Return the time from rest down the curve z = 3/(1 + exp(2*x)), by quadrature with thirty digits."""
+    with mp.workdps(30):
+        start, width = mpf(lam0), mpf(end) - mpf(lam0)
+
+        def rate(u: Any) -> Any:
+            ahead = width * u * u
+            x = start + ahead
+            fall = 3 * mp.exp(2 * start) * mp.expm1(2 * ahead) / ((1 + mp.exp(2 * start)) * (1 + mp.exp(2 * x)))
+            slope = -6 * mp.exp(2 * x) / (1 + mp.exp(2 * x)) ** 2
+            return 2 * width * u * mp.sqrt((1 + slope**2) / (2 * mpf(G) * fall))
+
+        return mp.quad(rate, np.linspace(0, 1, 9).tolist(), method="gauss-legendre")
+
+
+def test_from_rest_where_a_curve_is_almost_level(build: Build) -> None:
+    """The time keeps its digits where the slope is far smaller than elsewhere on the curve, before and behind the steep
+    part.
+    """
+    curve = gqm.Curve.graph("3/(1+exp(2*x))", parameter="x", domain=("-6", "6"))
+    module, places = build("ramp_between_levels", curve, gqm.Potential("0")), [-4.3, -1.0, 0.2, 2.0, 4.976395596735937]
+    swept = module.sweep("t_end", places)
+    assert (swept.route == 1).all()
+    assert swept.values == pytest.approx([float(time_down_ramp(place, 6.0)) for place in places], rel=1e-15)
