@@ -84,6 +84,7 @@ TESTED_THROUGH = {
     "arithmetic/offsets.py": "claims/test_degenerate.py",
     "charts/arc_length.py": "runtime/charts/test_rail.py",
     "charts/continuation.py": "runtime/charts/test_tracing_ends.py",
+    "charts/differences.py": "runtime/charts/test_chart.py",
     "charts/double_double/offset_path.py": "claims/test_rolling.py",
     "charts/double_double/parts.py": "runtime/sweep/tables/test_times.py",
     "charts/double_double/pieces.py": "runtime/charts/double_double/test_passage.py",

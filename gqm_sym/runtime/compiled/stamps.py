@@ -18,7 +18,14 @@ RUNTIME = "gqm_sym.runtime"
 FOLDER = Path(__file__).parent.parent
 
 # The files whose functions the functions of generated modules call.
-CALLED_BY_MODULES = ("arithmetic", "charts.evaluate", "charts.train_load", "compiled", "interface")
+CALLED_BY_MODULES = (
+    "arithmetic",
+    "charts.differences",
+    "charts.evaluate",
+    "charts.train_load",
+    "compiled",
+    "interface",
+)
 
 
 class Stamps:
