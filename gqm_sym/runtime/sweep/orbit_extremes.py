@@ -35,9 +35,9 @@ MAX_REFINEMENTS, MAX_GAIN, MAX_LAST_STEP = 13, 1e-15, 1e-4
 
 # A point of the grid stands for one peak if the second difference at it is proportional to the square of the step, up
 # to this share and up to rounding. Otherwise two peaks and the dip between them may lie within one step, as where a
-# maximum in the middle of a well has just become two beside it. If the second difference is smaller, the peak may also
-# be flat, as that of a force which changes with V**4 beside a turning point: then there is no dip if the second
-# difference keeps its sign while the step shrinks.
+# maximum in the middle of a well has just become two beside it. If the second difference is smaller, a peak at the
+# end of the grid may also be flat, as that of a force which changes with V**4 beside a turning point: then there is no
+# dip if the second difference keeps its sign while the step shrinks.
 MAX_BEND_CHANGE, BEND_ROUNDING = 0.25, 2e-15
 
 # The square of a length that is only a rounding of the largest length, as a share of the square of the latter.
@@ -241,11 +241,11 @@ def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-unt
     """
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
-    share, value, expected, is_flat = peak[1] * step, f1, 0.0, False
+    share, value, expected, is_flat, grid_step = peak[1] * step, f1, 0.0, False, step
     for k in range(MAX_REFINEMENTS):
         tilt, bend, scale = sign * (f0 - f2), sign * (f0 - 2.0 * f1 + f2), resolution(sought[0], f1, size)
         if k == 1 and not fabs(bend - expected) <= MAX_BEND_CHANGE * fabs(expected) + BEND_ROUNDING * scale:
-            is_flat = bend > expected
+            is_flat = bend > expected and peak[1] * (peak[1] * grid_step - 1.0) == 0.0
             if not is_flat:
                 return np.nan
         if is_flat and not bend <= BEND_ROUNDING * scale:

@@ -67,6 +67,7 @@ from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
 from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_half_v2_at_edges, find_passage, passage_of
+from gqm_sym.runtime.sweep.tables.rests import fill_at_rest, rests_on_level
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
@@ -421,8 +422,10 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)
         status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
-        if status == ANSWERED:
-            target = element(columns, TARGET, k)
+        lam0, target = element(columns, LAM0, k), element(columns, TARGET, k)
+        if status == UNDECIDED and v0 == 0.0 and rests_on_level(curve, lam0):
+            status = fill_at_rest(curve, lam0, (quantity, target, side, t_max), values[k])
+        elif status == ANSWERED:
             status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
         elif status == NOT_PERIODIC and (quantity not in PERIODIC or side != 0):
             status = UNDECIDED

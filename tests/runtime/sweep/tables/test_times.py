@@ -430,3 +430,30 @@ def test_a_launch_from_rest_at_an_edge_of_a_panel(tmp_path: Path) -> None:
     found = module.sweep("time_at", places, 0.0, lam=0.0, contact="above").values
     known = [0.5 * module.solve(place, 0.0).half_period for place in places.tolist()]
     np.testing.assert_allclose(found, known, rtol=2e-15)
+
+
+def test_bodies_that_rest_on_a_level_line(tmp_path: Path) -> None:
+    """A body released on the floor of a half pipe stays: it has a contact force and no period, and is nowhere else."""
+    pieces = [gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4), gqm.arc(radius=3, angle="pi/2")]
+    module, places = (
+        built(tmp_path, "floor", pieces, start=(-5, 4), heading="-pi/2"),
+        1.5 * np.pi + np.array([0.1, 2.0]),
+    )
+    never, not_periodic = (
+        STATUS_SENTENCES.index("the motion is never at the place asked for"),
+        STATUS_SENTENCES.index("the motion is not of a kind that has this quantity"),
+    )
+    for contact in ("bilateral", "above"):
+        values = {"v_max": 0.0, "v_min": 0.0, "normal_force_min": 9.81, "normal_force_max": 9.81}
+        for name, value in values.items():
+            swept = module.sweep(name, places, contact=contact)
+            assert swept.route_counts() == {"single": 2}
+            assert swept.values == pytest.approx(value, rel=2.0 * TWO_ULPS)
+        for name in ("half_period", "period", "turning_points", "t_end"):
+            swept = module.sweep(name, places, contact=contact)
+            assert (swept.route_counts(), swept.status.tolist()) == ({"single": 2}, [not_periodic] * 2)
+            assert np.isnan(swept.values).all()
+        swept = module.sweep("time_at", places, lam=places[0], contact=contact)
+        assert (swept.route_counts(), swept.status.tolist()) == ({"single": 2}, [0, never])
+        assert swept.values[0] == 0.0
+        assert module.sweep("t_end", places, t_max=3, contact=contact).values.tolist() == [3.0, 3.0]
