@@ -37,7 +37,7 @@ from gqm_sym.runtime.gradients.lanes.arrivals.programs import SQUARE
 from gqm_sym.runtime.gradients.lanes.arrivals.weights import FLIP, LAUNCH_SIGN, PLACE_SIGN, ROWS
 from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
 from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
-from gqm_sym.runtime.gradients.panels import fill_shares
+from gqm_sym.runtime.gradients.panels import shares_on
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The numbers of panels with Gauss's rule that are tried in turn, and the largest change of an integral by the last
@@ -52,9 +52,8 @@ def gauss_nodes() -> Array:
     """Return the nodes of all numbers of panels: shares as two doubles, and weights."""
     parts = []
     for count in PANELS:
-        panels, shares = np.empty((count, 2)), np.empty((2, count * RULE))
-        panels[:, 0], panels[:, 1] = np.pi * np.arange(count) / count, np.pi / count
-        fill_shares(LIBRATION, panels, panel_rule(), shares)
+        edges = np.pi * np.arange(count + 1) / count
+        shares = shares_on(LIBRATION, edges[:-1], edges[1:])
         parts.append(np.vstack([shares, np.tile(panel_rule()[2] * (np.pi / count), count)]))
     found: Array = np.ascontiguousarray(np.hstack(parts))
     return found
