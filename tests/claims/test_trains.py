@@ -323,12 +323,13 @@ def test_friction_on_a_helix(build: Build) -> None:
 @pytest.mark.parametrize("in_space", [True, False])
 def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     """Friction acts on each car by its own contact force, as in Newton's law for all cars by DOP853; couplings add
-    up.
+    up. In space another potential acts too.
     """
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
-    name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
-    module = build(name, curve, gqm.CoulombFriction(), cars=4)
+    field = gqm.Potential("x**2/40 + y*z/8") if in_space else None
+    name = "rubbing_train_in_a_field" if in_space else "rubbing_train_in_plane"
+    module = build(name, curve, field + gqm.CoulombFriction() if field else gqm.CoulombFriction(), cars=4)
     length, mu, v0, launch = 8.0, 0.05, 12.0, 30.0
     motion = module.solve(launch, v0, length=length, mu=mu)
     shares = (np.arange(4) + 0.5) / 4 - 0.5
@@ -341,7 +342,14 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
         size = np.linalg.norm(first, axis=0)
         t = first / size
         bend = (second - t * (t * second).sum(axis=0)) / size**2
-        return np.linalg.norm(w * bend + 9.81 * (np.array([[0], [0], [1]]) - t * t[2]), axis=0)
+        x, y, z = 20 * u, 5 * np.sin(u), 3 * np.cos(u)
+        pull = np.array([x / 20, z / 8, y / 8]) * in_space + 9.81 * np.array([[0], [0], [1]])
+        return np.linalg.norm(w * bend + pull - t * (t * pull).sum(axis=0), axis=0)
+
+    def energy(s: Any) -> Any:
+        """Return the potential energy per unit mass of a body."""
+        u = places(s)
+        return 9.81 * 3 * np.cos(u) + (10 * u**2 + 15 * np.sin(u) * np.cos(u) / 8) * in_space
 
     nodes, weights = np.polynomial.legendre.leggauss(40)
 
@@ -357,15 +365,11 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
             u = u - (arc(u) - s) / rate
         return u
 
-    def ends(s: float) -> Any:
-        u = places(s + length * np.array([-0.5, 0.5]))
-        return 3 * np.cos(u)
-
     def slopes(_: float, y: Any) -> Any:
         s, v, _ = y
-        low, high = ends(s)
+        low, high = energy(s + length * np.array([-0.5, 0.5]))
         rubbing = mu * pressed(s, v * v).mean()
-        return [v, -9.81 * (high - low) / length - np.sign(v) * rubbing, rubbing * abs(v)]
+        return [v, -(high - low) / length - np.sign(v) * rubbing, rubbing * abs(v)]
 
     times = [0.5, 1.5, 3.0]
     truth = solve_ivp(slopes, (0.0, 3.0), [launch, v0, 0.0], "DOP853", times, rtol=1e-12, atol=1e-12).y
@@ -376,11 +380,10 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     cars = motion.cars(1.5)
     force = pressed(truth[0][1], truth[1][1] ** 2)
     assert np.abs(cars.normal_force) == pytest.approx(force / 4, rel=1e-10)
-    low, high = ends(truth[0][1])
-    acceleration = -9.81 * (high - low) / length - mu * force.mean()
-    # A coupling balances what the cars behind it lack, which is gravity over their own part of the track.
-    edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
-    lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
+    edges = energy(truth[0][1] + length * (np.arange(5) / 4 - 0.5))
+    acceleration = -(edges[-1] - edges[0]) / length - mu * force.mean()
+    # A coupling balances what the cars behind it lack, which is the potential's force over their part of the track.
+    lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
 
 

@@ -49,8 +49,10 @@ class TrackOfTrain:
     length : int
         The index of the length among the run-time parameters.
     parts, optional
-        ``f(op, ..., p)``: these parts at a place, each with its first two derivatives by arc length. In a plane the
-        place is given by x, z, dx/ds, dz/ds and the curvature, in space by x, y and z and their first two derivatives.
+        ``f(op, ..., p)``: these parts at a place, each with its first two derivatives by arc length; with friction
+        also, for each component of the load across the track under them, their sum, the component and its derivative.
+        In a plane the place is given by x, z, dx/ds, dz/ds and the curvature, in space by x, y and z and their first
+        two derivatives.
     held : tuple of int
         The indices of the run-time parameters that they depend on.
     """
@@ -86,7 +88,8 @@ class TrackOfTrain:
             )
         size = int(track.block[0])
         height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
-        charted = (height, *self._charted_parts(track, p))
+        others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 3
+        charted, loads = (height, *others[:count]), others[count:]
         edges = _graded(_edges(track, charted[-1].edges, length), track.period > 0.0)
         block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
         joints = _merged(np.concatenate([edges, _inside(track.edges, edges)]), whole)
@@ -94,7 +97,7 @@ class TrackOfTrain:
         breaks = joints[np.unique(np.abs(joints[:, None] - kinks).argmin(axis=0))] if kinks.size else kinks
         return replace(
             track,
-            block=np.concatenate([track.block, block]),
+            block=np.concatenate([track.block, block, *(load.block for load in loads)]),
             low=float(edges[0]),
             high=float(edges[-1]),
             ends=("domain-end", "domain-end"),
@@ -104,7 +107,9 @@ class TrackOfTrain:
         )
 
     def _along(self, track: Chart, p: Sequence[float], s: Array) -> Array:
-        """Return the parts of the potential besides the height at arc lengths, each with two derivatives, as rows."""
+        """Return the parts of the potential besides the height at arc lengths, each with two derivatives, and what
+        follows them, as rows.
+        """
         if self.parts is None:
             return np.empty((0, s.size))
         if isinstance(track, SpaceChart):
@@ -119,7 +124,9 @@ class TrackOfTrain:
         return rows
 
     def _charted_parts(self, track: Chart, p: tuple[float, ...]) -> "list[_Charted]":
-        """Return the charts of these parts along the track."""
+        """Return the charts of these parts along the track, and of the load across it. The angle of such a chart is the
+        derivative of the part, or the component of the load.
+        """
         if self.parts is None:
             return []
         edges = track.edges
@@ -160,7 +167,7 @@ class TrackOfTrain:
         height, slope = chart.points(places)[1:3]
         if not isinstance(chart, SpaceChart):  # there it is an angle
             slope = np.sin(slope)
-        rows = self._along(chart, p, places)
+        rows = self._along(chart, p, places)[: 3 * len(factors)]
         energy = gravity * height + sum(factor * row for factor, row in zip(factors, rows[::3], strict=True))
         change = gravity * slope + sum(factor * row for factor, row in zip(factors, rows[1::3], strict=True))
         return energy.reshape(s.shape), change.reshape(s.shape)
