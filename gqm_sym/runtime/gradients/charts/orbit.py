@@ -282,14 +282,13 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     def series(self) -> tuple[SeriesOf, Array]:
         """As `OrbitDerivatives.series`."""
         panels, n = self._panels, self.source.variables
-        edges, samples = panels.edges, panels.samples
+        whole, samples = 1.0 if self.direction else 2.0 * np.pi, panels.samples
         arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
         if self.direction:
             arcs *= self.width
         else:
             arcs *= 0.5 * self.width * np.sin(panels.phases)
-            edges = edges / (2.0 * np.pi)
-        return PanelSeries(edges, np.concatenate([samples[: 1 + n], arcs])), np.zeros(n)
+        return PanelSeries(panels.edges, np.concatenate([samples[: 1 + n], arcs]), whole), np.zeros(n)
 
     @property
     def width(self) -> float:
