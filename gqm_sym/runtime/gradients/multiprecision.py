@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.budgets import budget
+from gqm_sym.budgets import budget, check_budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
@@ -37,6 +37,11 @@ NODES_BEFORE_CHECK, MAX_CHANGE = 256, 1e-2
 # On a panel the results are found to two numbers of digits at every node whose number is a multiple of this one.
 CHECKED = 5
 
+# This limits the time that the quadrature of an orbit takes.
+limited = budget(
+    "quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places"
+)
+
 # A number counts as zero if it vanishes to this share of the digits.
 ZERO_DIGITS = 0.6
 
@@ -58,6 +63,7 @@ def executed(context: Any, program: Program, inputs: Sequence[Any], places: Sequ
     rows = program.operations.tolist()
     _execute(context, rows[: program.first], registers)
     for place in places:
+        check_budget()
         registers[program.inputs] = place
         _execute(context, rows[program.first :], registers)
         yield [registers[output // ROW] for output in program.outputs]
@@ -192,7 +198,7 @@ class MultiprecisionOrbit:
         """What `means_over_steps` is; with 0 as the number of steps if the means are found on panels."""
         return self.means_over_steps or self._decided(self._over_panels)
 
-    @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
+    @limited
     def _decided(self, find: Callable[[], Any]) -> Any:
         try:
             return find()
@@ -229,6 +235,7 @@ class MultiprecisionOrbit:
         low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
         return np.stack([high, low, np.full_like(sizes, error), sizes], axis=1)
 
+    @limited
     def panels(self, *, everywhere: bool) -> tuple[Panels, list[Any]]:
         """Return the results on panels of the phase that resolve them (`panels.resolved`), and the inputs."""
         kind, wanted = CIRCULATION if self._direction else LIBRATION, np.arange(self._program.outputs.size)
