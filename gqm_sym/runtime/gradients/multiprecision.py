@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.budgets import budget
+from gqm_sym.budgets import budget, check_budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
@@ -26,6 +26,9 @@ from gqm_sym.runtime.gradients.panels import UNDECIDED, Panels, resolved
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
+# The codes of sums, differences, products and quotients.
+ARITHMETIC = interpreter.ADD, interpreter.SUBTRACT, interpreter.MULTIPLY, interpreter.DIVIDE
+
 # The number of digits, and the factors by which it is multiplied until two precisions agree to the share AGREEMENT of
 # the means of absolute values. On a small orbit V**2 loses as many digits as the square of the orbit's width, and its
 # derivatives lose as many again.
@@ -36,6 +39,11 @@ NODES_BEFORE_CHECK, MAX_CHANGE = 256, 1e-2
 
 # On a panel the results are found to two numbers of digits at every node whose number is a multiple of this one.
 CHECKED = 5
+
+# This limits the time that the quadrature of an orbit takes.
+limited = budget(
+    "quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places"
+)
 
 # A number counts as zero if it vanishes to this share of the digits.
 ZERO_DIGITS = 0.6
@@ -55,35 +63,46 @@ def executed(context: Any, program: Program, inputs: Sequence[Any], places: Sequ
         given = getattr(context, value) if isinstance(value, str) else context.mpf(value.numerator) / value.denominator
         registers[slot] = +given
     registers[: len(inputs)] = inputs
-    rows = program.operations.tolist()
-    _execute(context, rows[: program.first], registers)
+    rows, others = program.operations.copy(), _functions(context)
+    rows[:, 1:] //= ROW
+    operations = rows.tolist()
+    before, at_places = operations[: program.first], operations[program.first :]
+    _execute(context, before, others, registers)
+    outputs = (program.outputs // ROW).tolist()
     for place in places:
+        check_budget()
         registers[program.inputs] = place
-        _execute(context, rows[program.first :], registers)
-        yield [registers[output // ROW] for output in program.outputs]
+        _execute(context, at_places, others, registers)
+        yield [registers[output] for output in outputs]
 
 
-def _execute(context: Any, rows: list[list[int]], registers: list[Any]) -> None:
-    """Carry out operations."""
-    functions = {
+def _functions(context: Any) -> dict[int, Callable[[Any], Any]]:
+    """Return the functions of one number in a context, by the codes of their operations."""
+    return {
         interpreter.SQUARE_ROOT: context.sqrt,
         interpreter.EXPONENTIAL: context.exp,
         interpreter.LOGARITHM: context.log,
         interpreter.ARC_TANGENT: context.atan,
         interpreter.ABSOLUTE: abs,
     }
-    for code, *slots in rows:
-        out, left, right = (slot // ROW for slot in slots)
-        if code == interpreter.ADD:
-            registers[out] = registers[left] + registers[right]
-        elif code == interpreter.SUBTRACT:
-            registers[out] = registers[left] - registers[right]
-        elif code == interpreter.MULTIPLY:
+
+
+def _execute(
+    context: Any, rows: list[list[int]], functions: dict[int, Callable[[Any], Any]], registers: list[Any]
+) -> None:
+    """Carry out operations, each given as its code and the numbers of its registers."""
+    add, subtract, multiply, divide = ARITHMETIC
+    for code, out, left, right in rows:
+        if code == multiply:
             registers[out] = registers[left] * registers[right]
-        elif code == interpreter.DIVIDE:
+        elif code == add:
+            registers[out] = registers[left] + registers[right]
+        elif code == subtract:
+            registers[out] = registers[left] - registers[right]
+        elif code == divide:
             registers[out] = registers[left] / registers[right]
         elif code == interpreter.SINE_COSINE:
-            registers[out], registers[out + 1] = context.sin(registers[left]), context.cos(registers[left])
+            registers[out + 1], registers[out] = context.cos_sin(registers[left])
         else:
             registers[out] = functions[code](registers[left])
 
@@ -192,7 +211,7 @@ class MultiprecisionOrbit:
         """What `means_over_steps` is; with 0 as the number of steps if the means are found on panels."""
         return self.means_over_steps or self._decided(self._over_panels)
 
-    @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
+    @limited
     def _decided(self, find: Callable[[], Any]) -> Any:
         try:
             return find()
@@ -229,6 +248,7 @@ class MultiprecisionOrbit:
         low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
         return np.stack([high, low, np.full_like(sizes, error), sizes], axis=1)
 
+    @limited
     def panels(self, *, everywhere: bool) -> tuple[Panels, list[Any]]:
         """Return the results on panels of the phase that resolve them (`panels.resolved`), and the inputs."""
         kind, wanted = CIRCULATION if self._direction else LIBRATION, np.arange(self._program.outputs.size)

@@ -9,7 +9,8 @@ from mpmath import mp, mpf
 from orbits import by_differences
 from paths import ROOT
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.budgets import budget
+from gqm_sym.errors import BudgetError, SolutionError
 from gqm_sym.loading import load
 from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
@@ -85,6 +86,15 @@ def test_beside_the_separatrix(launch: dict[str, Any]) -> None:
         for name, found in motion.gradient(quantity, tuple(given)[: 3 if not given["v0"] else 4]).items():
             wanted = by_differences(duration, given, name, 40)[0]
             assert abs(found - wanted) <= 2 * ULP * abs(wanted), name
+
+
+def test_the_time_is_limited() -> None:
+    """Means in mpmath end when the time of a stage is used up."""
+    motion = generated("circle").solve(lam0="pi - 1/10**12", L=1)
+    assert motion.half_period > 0.0
+    motion._segment.edges  # noqa: B018
+    with pytest.raises(BudgetError, match="fitting: not done after"), budget("fitting", 0.05, "fit fewer numbers"):
+        motion.gradient("half_period")
 
 
 def test_a_swing_that_comes_too_near_to_the_top() -> None:
