@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 17, input 761b603021f8, body c8d34f0fde0f
+# interface 17, input 761b603021f8, body 5301255d5e1b
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -36,8 +36,8 @@ compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, FIELD, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, Pass1, SeparatedTerms, Traced, chart_of, chart_rows, cos,
-    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, SeparatedTerms, Traced, chart_differences, chart_of,
+    chart_rows, cos, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -82,9 +82,10 @@ def potential_divdiff1(n, _a, places, offsets, p, out):
     chart = chart_of(p, 3)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
     g = p[1]
+    chart_differences(chart, (1,), _a, places, offsets, out)
     for i in range(n):
-        s, d = places[i], offsets[i]
-        out[0, i] = g*divdiff1_chart_z(chart, _a, s, d)
+        _divdiff1_chart_z = out[1, i]
+        out[0, i] = _divdiff1_chart_z*g
         out[1, i] = 1
 
 
@@ -267,10 +268,11 @@ def separated_terms(n, _a, places, offsets, p, out):
     """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
     chart = chart_of(p, 3)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (4, n))
-    chart_rows(chart, (2, 3), places, out)
+    chart_rows(chart, (2, 3), places, out[:3])
+    chart_differences(chart, (1,), _a, places, offsets, out)
     for i in range(n):
-        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
-        out[0, i] = divdiff1_chart_z(chart, _a, s, d)
+        _chart_alpha, _chart_kappa, _divdiff1_chart_z = out[1, i], out[2, i], out[3, i]
+        out[0, i] = _divdiff1_chart_z
         out[1, i] = 1
         out[2, i] = _chart_kappa
         out[3, i] = cos(_chart_alpha)

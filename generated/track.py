@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 17, input e49691f04fda, body 1df646d7fba2
+# interface 17, input e49691f04fda, body 6b9599778484
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -28,8 +28,8 @@ compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, ExactPotential, Pass1, Sampled, SeparatedTerms, chart_of, chart_rows, cos,
-    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, Sampled, SeparatedTerms, chart_differences, chart_of,
+    chart_rows, cos, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -138,9 +138,10 @@ def potential_divdiff1(n, a, places, offsets, p, out):
     chart = chart_of(p, 2)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
+    chart_differences(chart, (1,), a, places, offsets, out)
     for i in range(n):
-        s, d = places[i], offsets[i]
-        out[0, i] = g*divdiff1_chart_z(chart, a, s, d)
+        _divdiff1_chart_z = out[1, i]
+        out[0, i] = _divdiff1_chart_z*g
         out[1, i] = 1
 
 
@@ -286,10 +287,11 @@ def separated_terms(n, a, places, offsets, p, out):
     """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
     chart = chart_of(p, 2)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (4, n))
-    chart_rows(chart, (2, 3), places, out)
+    chart_rows(chart, (2, 3), places, out[:3])
+    chart_differences(chart, (1,), a, places, offsets, out)
     for i in range(n):
-        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
-        out[0, i] = divdiff1_chart_z(chart, a, s, d)
+        _chart_alpha, _chart_kappa, _divdiff1_chart_z = out[1, i], out[2, i], out[3, i]
+        out[0, i] = _divdiff1_chart_z
         out[1, i] = 1
         out[2, i] = _chart_kappa
         out[3, i] = cos(_chart_alpha)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 17, input b87305fcd75e, body ae382929f92c
+# interface 17, input b87305fcd75e, body c52d9201e4c7
 """A train of five cars on hills
 
 x              = x(s)
@@ -28,8 +28,8 @@ compiled = compiler(__file__, interface=17)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, Pass1, Sampled, SeparatedTerms, TrackOfTrain, chart_of, chart_rows, cos,
-    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, place_from_ends,
+    CompiledFunctions, CompiledModel, Pass1, Sampled, SeparatedTerms, TrackOfTrain, chart_differences, chart_of,
+    chart_rows, cos, divdiff2_chart_z, ichart_alpha, iconst, imul, place_from_ends,
 )
 
 if TYPE_CHECKING:
@@ -140,9 +140,10 @@ def potential_divdiff1(n, a, places, offsets, p, out):
     along_h = chart_of(p, 3 + 1 * chart.size)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
     g = p[1]
+    chart_differences(along_h, (1,), a, places, offsets, out)
     for i in range(n):
-        s, d = places[i], offsets[i]
-        out[0, i] = g*divdiff1_chart_z(along_h, a, s, d)
+        _divdiff1_space_h = out[1, i]
+        out[0, i] = _divdiff1_space_h*g
         out[1, i] = 1
 
 
@@ -288,10 +289,11 @@ def separated_terms(n, a, places, offsets, p, out):
     chart = chart_of(p, 3)
     along_h = chart_of(p, 3 + 1 * chart.size)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (4, n))
-    chart_rows(chart, (2, 3), places, out)
+    chart_rows(chart, (2, 3), places, out[:3])
+    chart_differences(along_h, (1,), a, places, offsets, out)
     for i in range(n):
-        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
-        out[0, i] = divdiff1_chart_z(along_h, a, s, d)
+        _chart_alpha, _chart_kappa, _divdiff1_space_h = out[1, i], out[2, i], out[3, i]
+        out[0, i] = _divdiff1_space_h
         out[1, i] = 1
         out[2, i] = _chart_kappa
         out[3, i] = cos(_chart_alpha)

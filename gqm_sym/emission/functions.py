@@ -4,6 +4,7 @@ call.
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from sympy import Expr, Function, Symbol
@@ -78,6 +79,8 @@ class _ChartReading(NamedTuple):
         The lines that fill the rows; none if the function reads no chart.
     charts
         The names of the charts that these lines read.
+    calls
+        The names that these lines call.
     in_out
         Whether the rows are those of ``out``. Otherwise they are those of a buffer, because ``out`` has too few.
     """
@@ -85,14 +88,28 @@ class _ChartReading(NamedTuple):
     function: FunctionIR
     lines: Sequence[str] = ()
     charts: Collection[str] = ()
+    calls: Collection[str] = ()
     in_out: bool = False
 
-    @property
-    def calls(self) -> set[str]:
-        """The names that the lines call."""
-        if not self.lines:
-            return set()
-        return {"chart_rows"} if self.in_out else {"chart_rows", "spare_rows"}
+
+class _ChartCall(NamedTuple):
+    """A row of a chart at the places of a function, or its divided difference over a fixed place and these.
+
+    Attributes
+    ----------
+    row, chart
+        The row's number and the name of the chart.
+    place
+        The name of the place.
+    start, offset
+        The names of the fixed place and of the distance of the other from it; empty for the row itself.
+    """
+
+    row: int
+    chart: str
+    place: str = ""
+    start: str = ""
+    offset: str = ""
 
 
 def _read_together(function: FunctionIR) -> _ChartReading:
@@ -100,38 +117,68 @@ def _read_together(function: FunctionIR) -> _ChartReading:
 
     Neighbouring places often share a piece of the chart, which is then searched for only once.
     """
-    values = [*(a.value for a in function.inside), *function.outputs]
-    given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
-    heads = {head: (chart, row) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
-    places = {c.args[0].name for v in values for c in v.atoms(*heads) if c.args[0].is_Symbol}
-    if len(places) != 1 or not places <= given.keys():
+    given = {a.name: str(a.value.args[0]) for a in function.inside if _is_element(a.value)}
+    calls = _calls_of_charts(function, given)
+    if len({call.place for call in calls.values()}) != 1:
         return _ChartReading(function)
-    place = Symbol(places.pop(), real=True)
-    used = [head for head in heads if any(v.has(head(place)) for v in values)]
     out, last, lines = function.arguments[-1], len(function.outputs), []
-    in_out = len(used) <= last
+    in_out = len(calls) <= last
     if not in_out:
-        out, last = "_spare", len(used)
+        out, last = "_spare", len(calls)
         lines.append(f"{out} = spare_rows({last}, {function.arguments[0]})")
-    first = last - len(used)
+    first = last - len(calls)
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
-    read: dict[Expr, Symbol] = {}
-    for head in used:
-        call = head(place)
-        read[call] = names.get(call, Symbol(f"_{head.__name__}", real=True))
+    read = {call: names.get(call, Symbol(f"_{call.func.__name__}", real=True)) for call in calls}
     rows = [Assignment(name=name.name, value=at(out, first + j)) for j, name in enumerate(read.values())]
     inside = [Assignment(name=a.name, value=a.value.xreplace(read)) for a in function.inside if a.value not in read]
     outputs = tuple(value.xreplace(read) for value in function.outputs)
     needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
     kept = [a for a in inside if a.name in needed]
-    end = first
-    charts = dict.fromkeys(heads[head][0] for head in used)
-    for chart in charts:
-        found = tuple(heads[head][1] for head in used if heads[head][0] == chart)
+    end, used = first, set()
+    for (chart, place, start, offset), group in groupby(calls.values(), lambda call: call[1:]):
+        found = tuple(call.row for call in group)
         end += len(found)
         filled = out if end == last else f"{out}[:{end}]"
-        lines.append(f"chart_rows({chart}, {found}, {given[place.name].args[0]}, {filled})")
-    return _ChartReading(replace(function, inside=(*rows, *kept), outputs=outputs), lines, charts, in_out)
+        if offset:
+            used.add("chart_differences")
+            lines.append(f"chart_differences({chart}, {found}, {start}, {given[place]}, {given[offset]}, {filled})")
+        else:
+            used.add("chart_rows")
+            lines.append(f"chart_rows({chart}, {found}, {given[place]}, {filled})")
+    used |= set() if in_out else {"spare_rows"}
+    charts = {call.chart for call in calls.values()}
+    return _ChartReading(replace(function, inside=(*rows, *kept), outputs=outputs), lines, charts, used, in_out)
+
+
+def _is_element(value: Expr) -> bool:
+    """Return whether a value is the element of an array that has one for each place."""
+    return type(value).__name__ == "at" and len(value.args) == 1
+
+
+def _calls_of_charts(function: FunctionIR, given: Collection[str]) -> dict[Expr, _ChartCall]:
+    """Return the rows of charts, and then their differences over a fixed place, that a function takes at its places.
+
+    ``given`` are the names of the elements of its arrays.
+    """
+    values = [*(a.value for a in function.inside), *function.outputs]
+    heads = {head.__name__: _ChartCall(row, chart) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
+    assigned = {a.name for a in function.inside}
+    plain: dict[Expr, _ChartCall] = {}
+    gaps: dict[Expr, _ChartCall] = {}
+    for call in {call for value in values for call in value.atoms(Function)}:
+        name, arguments = call.func.__name__, [str(argument) for argument in call.args]
+        if name in heads and arguments[0] in given:
+            plain[call] = heads[name]._replace(place=arguments[0])
+        elif (head := heads.get(name.removeprefix("divdiff1_"))) and name not in heads:
+            start, place, offset = arguments
+            if start not in assigned and place in given and offset in given:
+                gaps[call] = head._replace(place=place, start=start, offset=offset)
+    order = list(heads)
+    return {
+        call: found[call]
+        for found, prefix in ((plain, ""), (gaps, "divdiff1_"))
+        for call in sorted(found, key=lambda call: order.index(call.func.__name__.removeprefix(prefix)))
+    }
 
 
 def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:
@@ -179,7 +226,7 @@ def loop(function: FunctionIR, charts: Charts = ()) -> tuple[dict[str, Any], set
     for rows, assignments in one_loop if reading.in_out else _divided(function):
         lines = _statements(assignments, printer)
         loops.append([*lines, *(f"{out}[{k}, {index}] = {printer.doprint(function.outputs[k])}" for k in rows)])
-    printer.used |= reading.calls
+    printer.used |= set(reading.calls)
     printer.charts |= set(reading.charts)
     before = [*_chart_view(function, printer, charts), *before, *reading.lines]
     fields = {

@@ -20,7 +20,7 @@ from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind, bind_all
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
-from gqm_sym.runtime.launch.rider import rider_loads
+from gqm_sym.runtime.launch.rider import fill_rows as fill_rider_rows
 from gqm_sym.runtime.launch.speed import (
     MAP_ROWS,
     MAP_ROWS_IN_SPACE,
@@ -183,25 +183,28 @@ class CompiledModel(Formulas):
         """Fill the rows that only the load map of a space curve has, but for those that are filled already."""
         if self.path_in_space is None or filled == len(arrays):
             return
-        v2 = arrays.v2.reshape(-1)
-        rows, force = [array.reshape(-1) for array in arrays[filled:]], arrays.normal_force.reshape(-1)
+        v2, force = arrays.v2.reshape(-1), arrays.normal_force.reshape(-1)
+        rows = [array.reshape(-1) for array in arrays[filled:]]
+        directions = np.array([float(launch.direction)])
+        if launch.v0.value == 0.0 and (filled == MAP_ROWS or self.rider_loads is not None):
+            # From rest the body may move to either side of the launch.
+            side = np.sign(places - launch.lam0.value)
+            directions = np.where(side != 0.0, side, float(launch.direction))
+        in_space = rows[: MAP_ROWS_IN_SPACE - filled]
+        of_rider, large = tuple(rows[len(in_space) :]), arrays.v2.nbytes * len(rows) >= LARGE
 
         def fill_block(part: slice) -> None:
-            # From rest the body may move to either side of the launch.
-            side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
-            ahead = np.where(side != 0.0, side, float(launch.direction))
-            found: list[Array] = []
-            if filled == MAP_ROWS:
-                found.extend(path_in_space(self, p, places[part], v2[part], ahead))
-                force[part] = length(np.array(found[1:])) if self.directed else force[part]
-            if self.rider_loads is not None:
-                found.extend(rider_loads(self, p, places[part], v2[part], ahead, force[part]))
-            for row, values in zip(rows, found, strict=True):
+            ahead = directions[part] if directions.size > 1 else np.broadcast_to(directions, (part.stop - part.start,))
+            found = path_in_space(self, p, places[part], v2[part], ahead)
+            force[part] = length(found[1:]) if self.directed else force[part]
+            for row, values in zip(in_space, found, strict=True):
                 row[part] = values
 
         def fill(part: slice) -> None:
-            for begin in range(part.start, part.stop, PLACES_IN_CACHE):
+            for begin in range(part.start, part.stop if in_space else part.start, PLACES_IN_CACHE):
                 fill_block(slice(begin, min(begin + PLACES_IN_CACHE, part.stop)))
+            if of_rider:
+                fill_rider_rows(self, p, (places, v2, directions, force), of_rider, part, large=large)
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
 

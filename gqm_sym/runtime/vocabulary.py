@@ -28,10 +28,13 @@ _NAMES_BY_HOME = {
         "ipoint ipow irpow isin isinh isqrt itan itanh"
     ),
     "arithmetic.offsets": "place_from_ends speed_squared_from_potential",
+    "charts.differences": (
+        "chart_differences divdiff1_chart_alpha divdiff1_chart_x divdiff1_chart_z divdiff2_chart_alpha "
+        "divdiff2_chart_x divdiff2_chart_z"
+    ),
     "charts.evaluate": (
-        "chart_alpha chart_kappa chart_of chart_rows chart_x chart_z divdiff1_chart_alpha divdiff1_chart_x "
-        "divdiff1_chart_z divdiff2_chart_alpha divdiff2_chart_x divdiff2_chart_z ichart_alpha ichart_kappa "
-        "ichart_slope ichart_x ichart_z spare_rows"
+        "chart_alpha chart_kappa chart_of chart_rows chart_x chart_z ichart_alpha ichart_kappa ichart_slope ichart_x "
+        "ichart_z spare_rows"
     ),
     "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",

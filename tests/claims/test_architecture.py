@@ -84,6 +84,7 @@ TESTED_THROUGH = {
     "arithmetic/offsets.py": "claims/test_degenerate.py",
     "charts/arc_length.py": "runtime/charts/test_rail.py",
     "charts/continuation.py": "runtime/charts/test_tracing_ends.py",
+    "charts/differences.py": "runtime/charts/test_chart.py",
     "charts/double_double/offset_path.py": "claims/test_rolling.py",
     "charts/double_double/parts.py": "runtime/sweep/tables/test_times.py",
     "charts/double_double/pieces.py": "runtime/charts/double_double/test_passage.py",
@@ -324,6 +325,15 @@ def _waits(node: ast.AST) -> bool:
     return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
 
 
+def _statements(inside: ast.AST, waits: bool = False) -> Iterator[tuple[ast.stmt, bool]]:
+    """Return the statements inside, at any depth, and whether each of them waits."""
+    for node in ast.iter_child_nodes(inside):
+        if isinstance(node, ast.stmt):
+            yield node, waits
+        if isinstance(node, ast.stmt | ast.ExceptHandler | ast.match_case):
+            yield from _statements(node, waits or _waits(node))
+
+
 LEVEL = {unit: level for level, layer in enumerate(LAYERS) for unit in layer}
 FILES = {
     _parts(path): path for path in sorted(PACKAGE.rglob("*.py")) if not {"_templates", "__pycache__"} & set(path.parts)
@@ -348,14 +358,12 @@ def _imports() -> tuple[Import, ...]:
 def _read_imports() -> Iterator[Import]:
     for parts, path in FILES.items():
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        inside = {id(node) for outer in ast.walk(tree) if _waits(outer) for node in ast.walk(outer)}
-        for node in ast.walk(tree):
-            if isinstance(node, ast.stmt):
-                names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
-                for target in _targets(node):
-                    for module in _modules(target, names):
-                        file = path.relative_to(PACKAGE).as_posix()
-                        yield Import(file, _unit(parts) if parts else "", module, id(node) in inside)
+        for node, waits in _statements(tree):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+            for target in _targets(node):
+                for module in _modules(target, names):
+                    file = path.relative_to(PACKAGE).as_posix()
+                    yield Import(file, _unit(parts) if parts else "", module, waits)
 
 
 def _upward(rows: Iterable[Import]) -> list[str]:

@@ -206,6 +206,20 @@ def atan(x):  # type: ignore[no-untyped-def]
 
 
 @Inlined
+def atan2(y, x):  # type: ignore[no-untyped-def]
+    """Return the angle from the first axis to the direction (x, y), between -pi and pi; 0 if both are 0.
+
+    Its error is below two units in the last place.
+    """
+    steep = fabs(y) > fabs(x)
+    below = choose(steep, y, x)
+    ratio = choose(steep, -x, y) / choose(below == 0.0, 1.0, below)
+    turns = choose(steep, 1.0, choose(x < 0.0, 2.0, 0.0))
+    turns = choose(y < 0.0, -turns, turns)
+    return turns * HALF_PI[0] + (atan(ratio) + turns * HALF_PI[1])
+
+
+@Inlined
 def scaled_exp(x):  # type: ignore[no-untyped-def]
     """exp(x) = (lead + low)*2**k for ``|x| <= MAX_EXPONENT``; the bits of k are those that `power_of_two` takes."""
     shifted = fma(x, ONE_OVER_LOG2, ROUND)

@@ -1,4 +1,4 @@
-"""Evaluation of a chart in compiled code: its rows, their divided differences, and enclosures.
+"""Evaluation of a chart in compiled code: its rows and enclosures of them.
 
 The flat array of a chart (`chart.Chart.block`) contains, one after the other::
 
@@ -8,9 +8,6 @@ The flat array of a chart (`chart.Chart.block`) contains, one after the other::
     most (n)                                  bound of |kappa| on each piece
     records (n, RECORD)                       middle, one over the half length, x and z at the middle as two doubles
                                               each, then powers of u in [-1, 1] for x, z, alpha and kappa
-
-Divided differences on one piece, or on two neighbours, subtract no coordinates. Between other pieces they subtract
-coordinates that are two doubles each.
 """
 
 from math import fabs, floor, inf
@@ -21,7 +18,7 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.compiled.intrinsics import item_at, polynomial
+from gqm_sym.runtime.compiled.intrinsics import polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, broadcast, line_of, operation, register
 from gqm_sym.runtime.compiled.uncompiled import fma, in_python
@@ -33,10 +30,6 @@ RECORD = 6 + ROWS * TERMS
 
 # The number by which `chart_rows` is asked for the size of the terms of a coordinate in space whose slope is at most 1.
 SIZES = 4
-
-# A jump of a derivative between neighbouring pieces that is smaller than this share of the derivative is due to
-# rounding.
-MAX_ROUNDING_JUMP = 1e-11
 
 
 @Inner
@@ -90,7 +83,7 @@ def find(chart, s):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def _powers(chart, start, row):  # type: ignore[no-untyped-def]
+def powers_of(chart, start, row):  # type: ignore[no-untyped-def]
     """Return the coefficients of a row on the piece whose record begins at ``start``, highest power first."""
     c, at = chart, start + 6 + row * TERMS
     high = c[at + 15], c[at + 14], c[at + 13], c[at + 12], c[at + 11], c[at + 10], c[at + 9], c[at + 8]
@@ -98,7 +91,7 @@ def _powers(chart, start, row):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def _constant(chart, start, row, laps):  # type: ignore[no-untyped-def]
+def constant_of(chart, start, row, laps):  # type: ignore[no-untyped-def]
     """Return the constant that is added to the polynomial of a row, as two numbers."""
     if row < 2:
         return chart[start + 2 + 2 * row], chart[start + 3 + 2 * row]
@@ -110,8 +103,8 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
     """Return one row of the chart: 0 is x, 1 is z, 2 is alpha, 3 is kappa."""
     k, u, laps = find(chart, s)
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
-    high, low = _constant(chart, start, row, laps)
-    return high + (low + polynomial(_powers(chart, start, row), u))
+    high, low = constant_of(chart, start, row, laps)
+    return high + (low + polynomial(powers_of(chart, start, row), u))
 
 
 def _filling(count: int) -> Any:
@@ -174,6 +167,47 @@ fill_lanes, fill_several = _filling(1), _filling(SEVERAL)
 
 
 @Inner
+def run_of_places(chart, places, begin, piece):  # type: ignore[no-untyped-def]
+    """Return the piece on which the place number ``begin`` lies, which is probably ``piece`` or one next to it; the
+    number of laps before it; and the number of the first place after it that lies elsewhere.
+    """
+    count, closed = int(chart[1]), chart[4] > 0.0
+    s, laps = _reduced(chart, places[begin])
+    piece, lap = _piece_near(chart, s, piece), laps * chart[4]
+    low = chart[EDGES + piece] if piece > 0 or closed else -inf
+    high = chart[EDGES + piece + 1] if piece < count - 1 or closed else inf
+    end = begin + 1
+    while end < places.size and low <= places[end] - lap < high:
+        end += 1
+    return piece, laps, end
+
+
+@Inner
+def fill_run(powers, terms, numbers, places, run, out, to):  # type: ignore[no-untyped-def]
+    """Fill a row of ``out``, which begins at ``to``, at places that lie on the same piece.
+
+    Parameters
+    ----------
+    powers, terms
+        An array, and where in it the powers of u begin.
+    numbers : (lap, middle, scale, limit, whole, low)
+        As in `_filling`.
+    places : (n,) array
+    run : (begin, end)
+        The places to fill; n is at least the number of lanes.
+    """
+    begin, end = run
+    filled, last = begin, places.size - LANES
+    while filled + SEVERAL * LANES <= end:
+        fill_several(powers, terms, places, filled, out, to + filled, 0, numbers)
+        filled += SEVERAL * LANES
+    # A register at the end of the places also takes places before the first one, whose values it does not store.
+    for j in range(filled, end, LANES):
+        at = min(j, last)
+        fill_lanes(powers, terms, places, at, out, to + at, begin - at, numbers)
+
+
+@Inner
 def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
     """Fill the last rows of ``out`` with these rows of the chart at many places, of which neighbours often lie on the
     same piece.
@@ -186,39 +220,26 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
     out : (m, n) array
         Has at least as many rows as ``rows`` names.
     """
-    count, closed = int(chart[1]), chart[4] > 0.0
-    limit = 1.0 if closed else inf
-    i, n, first, piece = 0, places.size, out.shape[0] - len(rows), count // 2
-    while i < n:
-        s, laps = _reduced(chart, places[i])
-        piece, begin = _piece_near(chart, s, piece), i
+    count, limit = int(chart[1]), 1.0 if chart[4] > 0.0 else inf
+    end, n, first, piece = 0, places.size, out.shape[0] - len(rows), count // 2
+    while end < n:
+        begin = end
+        piece, laps, end = run_of_places(chart, places, begin, piece)
         start = EDGES + 3 * count + 2 + piece * RECORD
         middle, scale, lap = chart[start], chart[start + 1], laps * chart[4]
-        low = chart[EDGES + piece] if piece > 0 or closed else -inf
-        high = chart[EDGES + piece + 1] if piece < count - 1 or closed else inf
-        i += 1
-        while i < n and low <= places[i] - lap < high:
-            i += 1
         for k in range(len(rows)):
             row = rows[k]
             if row == SIZES:
-                out[first + k, begin:i] = fabs(chart[start + 4]) + 1.0 / scale
+                out[first + k, begin:end] = fabs(chart[start + 4]) + 1.0 / scale
                 continue
-            terms, (whole, constant_low) = start + 6 + row * TERMS, _constant(chart, start, row, laps)
+            terms, (whole, low) = start + 6 + row * TERMS, constant_of(chart, start, row, laps)
             if n < LANES:
-                for j in range(begin, i):
+                for j in range(begin, end):
                     u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
-                    out[first + k, j] = whole + (constant_low + polynomial(_powers(chart, start, row), u))
+                    out[first + k, j] = whole + (low + polynomial(powers_of(chart, start, row), u))
                 continue
-            numbers, filled = (lap, middle, scale, limit, whole, constant_low), begin
-            while filled + SEVERAL * LANES <= i:
-                fill_several(chart, terms, places, filled, out, (first + k) * n + filled, 0, numbers)
-                filled += SEVERAL * LANES
-            # A register at the end of the places also takes places before the first one, whose values it does not
-            # store.
-            for j in range(filled, i, LANES):
-                at = min(j, n - LANES)
-                fill_lanes(chart, terms, places, at, out, (first + k) * n + at, begin - at, numbers)
+            numbers = lap, middle, scale, limit, whole, low
+            fill_run(chart, terms, numbers, places, (begin, end), out, (first + k) * n)
 
 
 @Inner
@@ -257,162 +278,9 @@ def derivatives_at(chart, k, u, laps):  # type: ignore[no-untyped-def]
     coordinate.
     """
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
-    first = laps * chart[5] + polynomial(_powers(chart, start, 2), u)
-    high, low = _constant(chart, start, 0, laps)
-    return first, polynomial(_powers(chart, start, 3), u), high + (low + polynomial(_powers(chart, start, 0), u))
-
-
-@Inner
-def _power(chart, row, start, j):  # type: ignore[no-untyped-def]
-    """Return a coefficient of a row up to its constant; the angle is the integral of the curvature."""
-    if row < 2:
-        return item_at(chart, start + 6 + row * TERMS + j)
-    return item_at(chart, start + 5 + 3 * TERMS + j) / (j * chart[start + 1]) if j > 0 else 0.0
-
-
-@Inner
-def _divdiff1_on_piece(chart, row, k, u, v):  # type: ignore[no-untyped-def]
-    """Return the first divided difference of a row over two places of one piece."""
-    start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
-    value, first = 0.0, 0.0
-    for j in range(TERMS - 1, -1, -1):
-        first = first * v + value
-        value = value * u + _power(chart, row, start, j)
-    return first * chart[start + 1]
-
-
-@Inner
-def _divdiff2_on_piece(chart, row, k, u, v, w):  # type: ignore[no-untyped-def]
-    """Return the second divided difference of a row over three places of one piece."""
-    start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
-    value, first, second = 0.0, 0.0, 0.0
-    for j in range(TERMS - 1, -1, -1):
-        second = second * w + first
-        first = first * v + value
-        value = value * u + _power(chart, row, start, j)
-    return second * chart[start + 1] * chart[start + 1]
-
-
-@Inner
-def _divdiff1(chart, row, s, t, h):  # type: ignore[no-untyped-def]
-    """Return the first divided difference over places s and t = s + h, in any order."""
-    if h < 0.0:
-        s, t, h = t, s, -h
-    return _divdiff1_between(chart, row, find(chart, s), find(chart, t), h)
-
-
-@Inner
-def _divdiff1_between(chart, row, lower, upper, h):  # type: ignore[no-untyped-def]
-    """Return the first divided difference over places that `find` has found, the upper one ``h`` above the lower."""
-    (ks, us, laps_s), (kt, ut, laps_t) = lower, upper
-    apart = (kt - ks) + (laps_t - laps_s) * chart[1]
-    if apart == 0.0:
-        return _divdiff1_on_piece(chart, row, ks, us, ut)
-    base = EDGES + 3 * int(chart[1]) + 2
-    from_s, from_t = base + ks * RECORD, base + kt * RECORD
-    if apart == 1.0:  # neighbours: the mean of the differences on both sides of the common edge
-        before, after = (1.0 - us) / chart[from_s + 1], (ut + 1.0) / chart[from_t + 1]
-        if not before + after > 0.0:  # both places are at the joint, up to rounding
-            return _divdiff1_on_piece(chart, row, kt, -1.0, ut)
-        gained = before * _divdiff1_on_piece(chart, row, ks, us, 1.0) + after * _divdiff1_on_piece(
-            chart, row, kt, -1.0, ut
-        )
-        return gained / (before + after)
-    one, two = polynomial(_powers(chart, from_s, row), us), polynomial(_powers(chart, from_t, row), ut)
-    if row >= 2:  # the angle increases with each lap
-        return ((laps_t - laps_s) * chart[5] + (two - one)) / h
-    whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]
-    difference = (chart[from_t + 3 + 2 * row] - chart[from_s + 3 + 2 * row]) + (two - one)
-    return (whole + difference) / h
-
-
-@Inner
-def _divdiff2(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
-    """Return the second divided difference over r, s = r + h1 and t = s + h2, in any order."""
-    if h1 < 0.0:
-        r, s, h1, h2 = s, r, -h1, h1 + h2
-    if h2 < 0.0:
-        s, t, h1, h2 = t, s, h1 + h2, -h2
-    if h1 < 0.0:
-        r, s, h1, h2 = s, r, -h1, h1 + h2
-    lower, inner, upper = find(chart, r), find(chart, s), find(chart, t)
-    (kr, ur, laps_r), (ks, us, laps_s), (kt, ut, laps_t) = lower, inner, upper
-    span = (kt - kr) + (laps_t - laps_r) * chart[1]
-    if span == 0.0:
-        return _divdiff2_on_piece(chart, row, kr, ur, us, ut)
-    if span == 1.0:
-        count = int(chart[1])
-        base = EDGES + 3 * count + 2
-        before, after = (1.0 - ur) / chart[base + kr * RECORD + 1], (ut + 1.0) / chart[base + kt * RECORD + 1]
-        left, right = _divdiff1_on_piece(chart, row, kr, 1.0, 1.0), _divdiff1_on_piece(chart, row, kt, -1.0, -1.0)
-        jump = right - left
-        # The slope of a coordinate is at most one, that of the angle the curvature.
-        largest = (
-            max(1.0, fabs(left), fabs(right))
-            if row < 2
-            else max(chart[EDGES + 2 * (count + 1) + kr], chart[EDGES + 2 * (count + 1) + kt])
-        )
-        if fabs(jump) <= MAX_ROUNDING_JUMP * largest:
-            jump = 0.0
-        # The difference over all three is a weighted mean of those in which the common edge replaces an outer place.
-        if ks == kr and laps_s == laps_r:
-            near = (1.0 - us) / chart[base + ks * RECORD + 1]
-            over = (
-                after * _divdiff2_on_piece(chart, row, kt, -1.0, -1.0, ut)
-                + near * _divdiff2_on_piece(chart, row, kr, us, 1.0, 1.0)
-                + jump
-            )
-            if near + after > 0.0:
-                over /= near + after
-                return (before * _divdiff2_on_piece(chart, row, kr, ur, us, 1.0) + after * over) / (before + after)
-        else:
-            near = (us + 1.0) / chart[base + ks * RECORD + 1]
-            over = (
-                near * _divdiff2_on_piece(chart, row, kt, -1.0, -1.0, us)
-                + before * _divdiff2_on_piece(chart, row, kr, ur, 1.0, 1.0)
-                + jump
-            )
-            if near + before > 0.0:
-                over /= near + before
-                return (before * over + after * _divdiff2_on_piece(chart, row, kt, -1.0, us, ut)) / (before + after)
-    upward, downward = _divdiff1_between(chart, row, inner, upper, h2), _divdiff1_between(chart, row, lower, inner, h1)
-    return (upward - downward) / (h1 + h2)
-
-
-@Inner
-def divdiff1_chart_x(chart, s, t, h):  # type: ignore[no-untyped-def]
-    """x[s, t] with h = t - s."""
-    return _divdiff1(chart, 0, s, t, h)
-
-
-@Inner
-def divdiff1_chart_z(chart, s, t, h):  # type: ignore[no-untyped-def]
-    """z[s, t] with h = t - s."""
-    return _divdiff1(chart, 1, s, t, h)
-
-
-@Inner
-def divdiff1_chart_alpha(chart, s, t, h):  # type: ignore[no-untyped-def]
-    """alpha[s, t] with h = t - s."""
-    return _divdiff1(chart, 2, s, t, h)
-
-
-@Inner
-def divdiff2_chart_x(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
-    """x[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _divdiff2(chart, 0, r, s, t, h1, h2)
-
-
-@Inner
-def divdiff2_chart_z(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
-    """z[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _divdiff2(chart, 1, r, s, t, h1, h2)
-
-
-@Inner
-def divdiff2_chart_alpha(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
-    """alpha[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _divdiff2(chart, 2, r, s, t, h1, h2)
+    first = laps * chart[5] + polynomial(powers_of(chart, start, 2), u)
+    high, low = constant_of(chart, start, 0, laps)
+    return first, polynomial(powers_of(chart, start, 3), u), high + (low + polynomial(powers_of(chart, start, 0), u))
 
 
 @Inner

@@ -18,7 +18,8 @@ from gqm_sym.errors import ParameterError
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
-from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows, divdiff1_chart_alpha, divdiff1_chart_z
+from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_chart_z
+from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 

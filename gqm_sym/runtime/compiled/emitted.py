@@ -3,6 +3,7 @@
 import builtins
 import ctypes
 import hashlib
+import math
 import re
 import sys
 import threading
@@ -201,7 +202,7 @@ def _is_known(function: Any, name: str) -> bool:
     """
     found = vars(builtins).get(name, function.__globals__.get(name))
     home = getattr(getattr(found, "py_func", found), "__module__", None)
-    return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
+    return found is math.pi or (isinstance(home, str) and f"{home}.".startswith(_KNOWN))
 
 
 def _uses_its_module(function: Any, lines: list[str]) -> bool:

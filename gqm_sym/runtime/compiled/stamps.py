@@ -18,7 +18,14 @@ RUNTIME = "gqm_sym.runtime"
 FOLDER = Path(__file__).parent.parent
 
 # The files whose functions the functions of generated modules call.
-CALLED_BY_MODULES = ("arithmetic", "charts.evaluate", "charts.train_load", "compiled", "interface")
+CALLED_BY_MODULES = (
+    "arithmetic",
+    "charts.differences",
+    "charts.evaluate",
+    "charts.train_load",
+    "compiled",
+    "interface",
+)
 
 
 class Stamps:
@@ -35,6 +42,7 @@ class Stamps:
         # Times of change do not count: those of an installed wheel are all the same.
         self._digests = {name: hashlib.sha256(text).hexdigest() for name, text in files}
         self._imports = {name: {(a or b).decode() for a, b in _IMPORT.findall(text)} for name, text in files}
+        self._meant: dict[str, set[str]] = {}
         self._known: dict[str, str] = {}
         self.of_all = self._joined(self._digests)
 
@@ -54,15 +62,19 @@ class Stamps:
     def files(self, begin: tuple[str, ...]) -> set[str]:
         """Return the given files and all files that they import, directly or through others."""
         found: set[str] = set()
-        waiting = list(begin)
+        waiting = set(begin)
         while waiting:
-            name = waiting.pop()
-            # The name of a room stands for all files in it.
-            for here in {name} & self._digests.keys() or {n for n in self._digests if n.startswith(f"{name}.")}:
-                if here not in found:
-                    found.add(here)
-                    waiting += self._imports[here]
+            new = set().union(*map(self._files_of, waiting)) - found
+            found |= new
+            waiting = set().union(*(self._imports[name] for name in new))
         return found
+
+    def _files_of(self, name: str) -> set[str]:
+        """Return the file of a name, or all files in the room of that name."""
+        if name not in self._meant:
+            inside = (file for file in self._digests if file.startswith(f"{name}."))
+            self._meant[name] = {name} if name in self._digests else set(inside)
+        return self._meant[name]
 
     def _joined(self, names: Iterable[str]) -> str:
         return hashlib.sha256("\n".join(f"{name} {self._digests[name]}" for name in sorted(names)).encode()).hexdigest()

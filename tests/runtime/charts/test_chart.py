@@ -15,7 +15,7 @@ from gqm_sym.emission import charts
 from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import vocabulary
-from gqm_sym.runtime.charts import evaluate
+from gqm_sym.runtime.charts import differences, evaluate
 from gqm_sym.runtime.charts.chart import MAGNIFIED, NODES, Chart, PieceData, assemble
 from gqm_sym.sympy_charts import chart_x, chart_z
 
@@ -129,11 +129,33 @@ def test_divided_differences(size: float) -> None:
             c = b + size * rng.uniform()
             first = (height(mpf(b)) - height(mpf(a))) / (mpf(b) - mpf(a))
             second = ((height(mpf(c)) - height(mpf(b))) / (mpf(c) - mpf(b)) - first) / (mpf(c) - mpf(a))
-            assert abs(evaluate.divdiff1_chart_z(chart.block, a, b, b - a) - first) <= 16 * ULP
+            assert abs(differences.divdiff1_chart_z(chart.block, a, b, b - a) - first) <= 16 * ULP
             # Next to a joint a second difference is a derivative of the fit, which with 16 nodes loses three digits.
-            assert abs(evaluate.divdiff2_chart_z(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
-            swapped = evaluate.divdiff2_chart_z(chart.block, c, a, b, a - c, b - a)
+            assert abs(differences.divdiff2_chart_z(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
+            swapped = differences.divdiff2_chart_z(chart.block, c, a, b, a - c, b - a)
             assert abs(swapped - second) <= 4e-13
+
+
+@pytest.mark.parametrize("ring_", [Ring(3), Ring(9), Ring(9, closed=False)])
+def test_differences_over_one_place_and_many(ring_: Ring) -> None:
+    """The differences of height, x and angle over a place and many others, in any order, are those of the circle."""
+    chart, rng = ring_.chart((RADIUS,)), np.random.default_rng(11)
+    whole = float(chart.edges[-1])
+    low, high = (-whole, 2.0 * whole) if ring_.closed else (0.0, whole)
+    for start in (0.3 * whole, float(chart.edges[1]), 0.0):
+        places = np.concatenate([rng.uniform(low, high, 60), np.sort(start + rng.uniform(0.0, 1e-6, 30))])
+        places = places[(places >= low) & (places <= high) & (places != start)]
+        gaps, out = places - start, np.zeros((4, places.size))
+        differences.chart_differences(chart.block, (1, 0, 2), start, places, gaps, out)
+        few = np.zeros((1, 3))
+        differences.chart_differences(chart.block, (1,), start, places[-3:], gaps[-3:], few)
+        mean, half = (places + start) / (2.0 * RADIUS), gaps / (2.0 * RADIUS)
+        sinc = np.sinc(half / np.pi)
+        truth = np.stack([np.sin(mean) * sinc, np.cos(mean) * sinc, np.full_like(mean, 1.0 / RADIUS)])
+        # A place that is reduced by laps has an error of an ulp of the original place.
+        assert np.abs(out[1:] - truth).max() <= 32.0 * ULP
+        assert np.abs(few[0] - truth[0, -3:]).max() <= 32.0 * ULP
+        assert not out[0].any()
 
 
 def test_differences_far_from_the_origin() -> None:
@@ -161,7 +183,8 @@ def test_differences_far_from_the_origin() -> None:
         for k in range(6):
             a, b = float(edges[k] + 0.3), float(edges[k + 3] - 0.2)
             assert (
-                abs(evaluate.divdiff1_chart_x(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
+                abs(differences.divdiff1_chart_x(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a)))
+                <= 16 * ULP
             )
 
 
@@ -170,7 +193,7 @@ def test_two_places_at_one_joint() -> None:
     chart = Ring().chart((RADIUS,))
     for edge in map(float, chart.edges[1:-1]):
         beside = np.nextafter(edge, 0.0)
-        slope = evaluate.divdiff1_chart_z(chart.block, beside, edge, 0.1 * (edge - beside))
+        slope = differences.divdiff1_chart_z(chart.block, beside, edge, 0.1 * (edge - beside))
         assert abs(slope - np.sin(edge / RADIUS)) <= 1e-14
 
 
@@ -203,7 +226,7 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
             a, b, c = (float(joint) + size * share for share in shares)
             u, v, w = map(Fraction, (a, b, c))
             truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
-            found = evaluate.divdiff2_chart_alpha(chart.block, a, b, c, b - a, c - b)
+            found = differences.divdiff2_chart_alpha(chart.block, a, b, c, b - a, c - b)
             # The tangent is a derivative of the fit, which costs short pieces five digits; distances from the joint
             # count too, with errors of an ulp of the place.
             assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size

@@ -19,7 +19,9 @@ from gqm_sym.runtime.interface import INTERFACE
 # The launches in which Python may run a function; the suite as a whole allows more.
 MAX_LAUNCHES = 2
 
-MODULE = f"""from numba import carray
+MODULE = f"""from math import pi
+
+from numba import carray
 
 from gqm_sym.runtime import compiler
 from gqm_sym.runtime.vocabulary import EFFECTIVE_POTENTIAL, sin
@@ -60,11 +62,11 @@ def test_equal_functions_of_modules_are_compiled_once(
     keep: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Equal functions are compiled once, whatever else their modules contain, in any folder, and also if none is in
-    use; attributes of arrays are nothing of the module.
+    use; pi and attributes of arrays are nothing of the module.
     """
     cache = tmp_path / "cache"
     monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
-    text = MODULE.replace("TERM", f"{41.0 + keep}*places.size")
+    text = MODULE.replace("TERM", f"{41.0 + keep}*pi*places.size")
     assert _compilations(text, tmp_path / "a" / "one.py", cache) == 1
     others = [f'"""A title."""\n{text}', text.replace("LAST = 1", "LAST = 2"), text.replace("FACTOR = 2.0", "")]
     for k, other in enumerate(others):

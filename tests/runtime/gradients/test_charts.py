@@ -243,6 +243,9 @@ def test_an_exponent_of_negative_numbers(oval: ModuleType) -> None:
             motion.gradient("half_period", wrt)
         with pytest.raises(gqm.errors.SolutionError, match="sensitivity: there is no derivative with respect to n,"):
             motion.sensitivity(0.3, wrt)
+    a, g = motion.gradient("half_period", ("a", "g")).values()
+    swept = oval.sweep("half_period", 0.9, gradient=("a", "n", "g")).gradient
+    np.testing.assert_allclose(swept, [a, np.nan, g], rtol=1e-15, atol=0.0)
 
 
 def test_an_arc_between_cusps(generated_folder: Path) -> None:
@@ -284,6 +287,10 @@ def test_an_exponent_with_losses(generated_folder: Path) -> None:
         assert found[name] == pytest.approx(row, rel=1e-12, abs=1e-13)
     with pytest.raises(gqm.errors.SolutionError, match="no derivative with respect to n, because"):
         one.solve(lam0="9/10").gradient("turning_points")
+    swept = one.sweep("v_max", 0.9, gradient=("a", "n", "mu")).gradient
+    wanted = other.solve(lam0=0.9).gradient("v_max", "mu")["mu"]
+    np.testing.assert_array_equal(np.isfinite(swept), [True, False, True])
+    assert swept[2] == pytest.approx(wanted, rel=1e-12)
 
 
 def test_an_exponent_of_positive_numbers(generated_folder: Path) -> None:

@@ -61,6 +61,18 @@ class Derivatives(Positions):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
+        found = self.known_gradient(quantity, wrt, lam)
+        self._check_known(f"gradient of {quantity}", found, found.values())
+        return found
+
+    def known_gradient(self, quantity: str, wrt: Any, lam: Any = None) -> dict[str, Any]:
+        """Return `gradient`, with NaN for names with respect to which there is no derivative although others exist.
+
+        Parameters
+        ----------
+        quantity, wrt, lam
+            As for `gradient`, whose other errors are raised.
+        """
         check_force(self.problem.formulas, quantity)
         if quantity in EXTREMES:
             selected(self.problem.formulas.parameters, wrt)  # names are checked before anything is computed
@@ -69,10 +81,7 @@ class Derivatives(Positions):
                     f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
                     "which this motion ends"
                 )
-        found = self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
-        if self.problem.formulas.chart is not None:
-            self._check_known(f"gradient of {quantity}", found, found.values())
-        return found
+        return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
     def _check_known(self, what: str, names: Iterable[str], values: Iterable[Any]) -> None:
         """Refuse derivatives along a charted curve with respect to parameters near which there is no such curve.
