@@ -155,14 +155,14 @@ def answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers):  # 
 
     ``moved`` stores the orbits with moved ends meanwhile.
     """
-    n, count, ends = orbits.size, scratch.param_count, scratch.ends
-    lows, highs, shares, indices, times = ends[0, :n], ends[1, :n], ends[2, :n], ends[3, :n], ends[4, :n]
-    find_exact_ends(scratch.exact, count, orbits, kind.mirrored, lows, highs)
+    n, count, lacks = orbits.size, scratch.param_count, scratch.ends
+    shares, indices, times = lacks[4, :n], lacks[5, :n], lacks[6, :n]
+    find_exact_ends(scratch.exact, count, orbits, lacks)
     for j in range(n):
         scratch.others[j] = j
     gather(orbits, count, scratch.others, n, moved, TIME_ROWS)
     others = Orbits(n, moved.rows, moved.params)
-    move_ends(n, others.rows, lows, highs, shares, indices)
+    move_ends(n, others.rows, lacks, shares, indices)
     answer_times(fns, kind, others, scratch, quantity, answers)
     for j in range(n):
         times[j] = answers.values[int(indices[j]), 0]
@@ -292,16 +292,40 @@ def kind_of_librations(fns, orbits, monotone, wells):  # type: ignore[no-untyped
 
 
 @Inner
+def answer_librations(fns, orbits, buffers, monotone, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Answer orbits about an axis of symmetry, other even orbits, and the rest, each by its own method, so that no
+    answer depends on the other orbits of a batch.
+    """
+    rest, spares = buffers
+    for even, about_axis in ((FOUND, FOUND), (FOUND, NOWHERE), (NOWHERE, NOWHERE)):
+        n, rows, count = orbits.size, orbits.rows, scratch.param_count
+        if n == 0:
+            return
+        wanted = scratch.work[0, :n]
+        for j in range(n):
+            axis = choose(rows[STATE, j] == FOUND, rows[TRIAL, j], NOWHERE)
+            wanted[j] = choose((rows[STATE, j] == even) & (axis == about_axis), FOUND, NOWHERE)
+        number, others = partition(wanted, scratch.chosen, scratch.others)
+        waiting = gather(orbits, count, scratch.others, others, rest, ROWS)
+        orbits = shrink(orbits, count, scratch.chosen, number, ROWS)
+        if number > 0:
+            kind = kind_of_librations(fns, orbits, monotone, wells)
+            answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers)
+        orbits, rest = Orbits(waiting, rest.rows, rest.params), orbits
+
+
+@Inner
 def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ignore[no-untyped-def]
     """Answer batch after batch; the first four arguments and the last but one are those of `answer_batches`.
 
     The buffers belong to the caller. Otherwise numba would count references to arrays at each call, by instructions
     that wait for memory.
     """
-    (first, spare, laps), scratch, domain, wells = buffers
+    (first, spare, laps, rest), scratch, domain, wells = buffers
     columns, domain = borrowed(columns), borrowed(domain)
     answers = Answers(borrowed(answers.values), borrowed(answers.status), borrowed(answers.route))
     first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
+    rest = borrowed_orbits(rest)
     chosen, others, work = borrowed(scratch.chosen), borrowed(scratch.others), borrowed(scratch.work)
     (address, operations, parts, registers), registers_of_places, p = scratch.exact
     tape = address, borrowed(operations), parts, registers
@@ -321,9 +345,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
             laps_found = Orbits(lap_count, laps.rows, laps.params)
             kind = OrbitKind(CIRCULATION, False, False, False, False)
             answer_orbits(fns, kind, laps_found, (spare, laps), wells, scratch, quantity, answers)
-        if orbits.size:
-            kind = kind_of_librations(fns, orbits, monotone, wells)
-            answer_orbits(fns, kind, orbits, (spare, laps), wells, scratch, quantity, answers)
+        answer_librations(fns, orbits, (rest, (spare, laps)), monotone, wells, scratch, quantity, answers)
 
 
 @entry(
@@ -365,9 +387,10 @@ def answer_batches(fns, layout, columns, monotone, quantity, exact, answers):  #
     size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)), np.empty((5, BATCH)), exact)
+    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)), np.empty((7, BATCH)), exact)
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
-    buffers = (first, spare, laps), scratch, domain, wells_of(columns)
+    rest = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    buffers = (first, spare, laps, rest), scratch, domain, wells_of(columns)
     answer_all(fns, columns, monotone, quantity, answers, buffers)

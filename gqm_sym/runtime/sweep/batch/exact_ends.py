@@ -28,8 +28,9 @@ from gqm_sym.runtime.sweep.batch.rows import (
 )
 from gqm_sym.runtime.sweep.quantities import UNDECIDED
 
-# The share of an orbit's width by which its ends are moved for the derivative of its time.
-SHIFT = 2.0**-12
+# The share of an orbit's width by which its ends are moved for the derivative of its time. It is so small that the
+# trapezoidal rule converges on an even orbit of which only one half is evaluated, though it is not even then.
+SHIFT = 2.0**-28
 
 stacked_levels = on_stack(2 * BLOCK)
 
@@ -42,17 +43,17 @@ def fill_places(begin, n, start, offsets, place):  # type: ignore[no-untyped-def
 
 
 @Inner
-def find_exact_ends(exact, count, orbits, mirrored, lows, highs):  # type: ignore[no-untyped-def]
+def find_exact_ends(exact, count, orbits, lacks):  # type: ignore[no-untyped-def]
     """Improve both ends of all orbits by a step of Newton's method in double-double arithmetic.
 
-    The ends become doubles again, and ``lows`` and ``highs`` are filled with what they lack. For orbits that are
-    ``mirrored`` this is what half of the width lacks on either side.
+    The ends become doubles again. The rows of ``lacks`` are filled with what is lacking from the offsets of the lower
+    and the upper end, and from the ends as values of the curve's parameter.
     """
     (address, operations, parts, registers), work, p = exact
     first, at, u, _, slope, _ = registers
     n, rows, params, levels = orbits.size, orbits.rows, orbits.params, stacked_levels()
     start, v2, rests = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[V2_REST, :n]
-    below, above = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n]
+    below, above, lows, highs = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], lacks[0, :n], lacks[1, :n]
     for begin in range(0, n, BLOCK):
         size = min(BLOCK, n - begin)
         for k in range(count):
@@ -76,40 +77,40 @@ def find_exact_ends(exact, count, orbits, mirrored, lows, highs):  # type: ignor
                 move, _ = divide(half, low, work[up], work[up + LOW])
                 exact_launch = (v2[begin + i] == 0.0) & (offsets[begin + i] == 0.0)
                 moves[begin + i] = choose(exact_launch, 0.0, move)
-    for j in range(n):
-        below[j], lows[j] = two_sum(below[j], lows[j])
-        above[j], highs[j] = two_sum(above[j], highs[j])
-        width = above[j] - below[j]
-        total, lost = two_sum(above[j], -below[j])
-        rows[HALF_WIDTH, j] = 0.5 * width
-        rest = 0.5 * ((total - width) + lost)
-        lows[j], highs[j] = lows[j] - rest, highs[j] + rest
-        half = 0.5 * (highs[j] - lows[j])
-        lows[j], highs[j] = choose(mirrored, -half, lows[j]), choose(mirrored, half, highs[j])
-        rows[END_LOW, j], rows[END_HIGH, j] = start[j] + below[j], start[j] + above[j]
+    for side in range(2):
+        offsets, lost, ends = below if side == 0 else above, lacks[side, :n], rows[END_LOW + side, :n]
+        for j in range(n):
+            offsets[j], lost[j] = two_sum(offsets[j], lost[j])
+            place, rounding = two_sum(start[j], offsets[j])
+            ends[j] = place + (rounding + lost[j])
+            lacks[2 + side, j] = (place - ends[j]) + (rounding + lost[j])
+    for j in range(n):  # the width is rounded too
+        width, rounding = two_sum(above[j], -below[j])
+        rows[HALF_WIDTH, j], lows[j], highs[j] = 0.5 * width, lows[j] - 0.5 * rounding, highs[j] + 0.5 * rounding
 
 
 @Inner
-def move_ends(n, rows, lows, highs, shares, indices):  # type: ignore[no-untyped-def]
-    """Move both ends by multiples of what they lack. Fill ``shares`` with what of that is lacking, and ``indices`` with
-    the indices of the launches.
+def move_ends(n, rows, lacks, shares, indices):  # type: ignore[no-untyped-def]
+    """Move both ends by a multiple of what they lack. Fill ``shares`` with the inverse of this number, and ``indices``
+    with the indices of the launches.
     """
-    start, below, above = rows[LAUNCH_PLACE, :n], rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n]
+    below, above, low, high = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[END_LOW, :n], rows[END_HIGH, :n]
     for j in range(n):
-        most = choose(fabs(lows[j]) > fabs(highs[j]), fabs(lows[j]), fabs(highs[j]))
+        most = fabs(lacks[0, j]) + fabs(lacks[1, j]) + fabs(lacks[2, j]) + fabs(lacks[3, j])
         factor = choose(most > 0.0, SHIFT * (above[j] - below[j]) / choose(most > 0.0, most, 1.0), 0.0)
-        below[j], above[j] = below[j] + factor * lows[j], above[j] + factor * highs[j]
+        below[j], above[j] = below[j] + factor * lacks[0, j], above[j] + factor * lacks[1, j]
+        low[j], high[j] = low[j] + factor * lacks[2, j], high[j] + factor * lacks[3, j]
         rows[HALF_WIDTH, j] = 0.5 * (above[j] - below[j])
-        rows[END_LOW, j], rows[END_HIGH, j] = start[j] + below[j], start[j] + above[j]
         shares[j], indices[j] = choose(factor > 0.0, 1.0 / choose(factor > 0.0, factor, 1.0), 0.0), rows[INDEX, j]
 
 
 @Inner
 def add_what_ends_lack(n, shares, indices, moved, answers):  # type: ignore[no-untyped-def]
     """Add to the times what the ends of the orbits lack, from the times with moved ends."""
+    values, status = answers.values, answers.status
     for j in range(n):  # the last orbit is repeated
-        moved[j] = answers.values[int(indices[j]), 0] + shares[j] * (moved[j] - answers.values[int(indices[j]), 0])
+        time = values[int(indices[j]), 0]
+        moved[j] = time + shares[j] * (moved[j] - time)
     for j in range(n):
         k = int(indices[j])
-        answers.values[k, 0] = moved[j]
-        answers.status[k] = answers.status[k] if moved[j] == moved[j] else UNDECIDED
+        values[k, 0], status[k] = moved[j], choose(moved[j] == moved[j], status[k], UNDECIDED)

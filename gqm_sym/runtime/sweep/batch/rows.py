@@ -98,7 +98,7 @@ class Scratch(NamedTuple):
         Lists of columns.
     work : (13, BATCH) array
         Rows for intermediate results.
-    ends : (5, BATCH) array
+    ends : (7, BATCH) array
         Rows for orbits whose ends are found in double-double arithmetic.
     exact : RecordedFormulas
         The module's formulas as a tape, with which launches that batches left are tried again; empty at first.

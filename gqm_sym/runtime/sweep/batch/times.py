@@ -71,7 +71,7 @@ CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 # energy of a lap, do not matter: for librations from rest, one turning point of which is exact, for other librations,
 # and for laps. In even wells both turning points may be near a hilltop, so the factor at these is used, unless they are
 # exact, as those of a launch from rest are.
-MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.25, 0.1, 0.5, 0.85
+MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.25, 0.1, 0.5, 0.9
 
 # The same for all librations whose turning points are known to more digits than a double has.
 MIN_EXACT_RATIO = 0.03
@@ -105,9 +105,9 @@ def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-un
     roundings, slopes, offsets = work[2, :n], work[5, :n], work[9, :n]
     out, any_far = work[10:13].reshape(-1)[: 3 * n].reshape(3, n), False
     for j in range(n):
-        _, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
+        end, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
         far = fabs(ends[j]) > FAR * (offset_high[j] - offset_low[j])
-        roundings[j] = choose(far, rounding, 0.0)
+        roundings[j] = choose(far, (end - ends[j]) + rounding, 0.0)
         any_far |= far
     slopes[:] = 0.0
     if any_far:

@@ -76,7 +76,7 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
 UNPROVED = {1: 50, -1: 49}
 
 # From these amplitudes on, batches leave times of thrown bodies until the turning points have more digits.
-NEAR_TOP = 2.2
+NEAR_TOP = 2.0
 
 
 @pytest.mark.parametrize("said", SAID)

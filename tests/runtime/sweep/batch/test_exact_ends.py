@@ -72,3 +72,15 @@ def test_wells_between_hills(v0: float, spiral: ModuleType) -> None:
         half_period, turns = true_orbit(mpf(lam0[k]), mpf(v0), ends.values[k].tolist())
         assert turns == pytest.approx(ends.values[k].tolist(), rel=4e-16)
         assert swept.values[k] == pytest.approx(half_period, abs=MAX_ERROR * np.spacing(half_period))
+
+
+def test_no_answer_depends_on_the_other_launches(module_of: ModuleOf) -> None:
+    """A launch has the same half period alone, with orbits beside the top in its batch, and with orbits elsewhere."""
+    places = np.concatenate([np.linspace(-1.5, 2.0, 12), np.full(4, np.pi - 1e-5)])
+    v0 = np.concatenate([np.sqrt(2 * 9.81 * (np.cos(places[:12]) + 0.999)), np.zeros(4)])
+    circle = module_of("circle")
+    together = circle.sweep("half_period", places, v0, L=1).values
+    alone = [
+        circle.sweep("half_period", lam0, speed, L=1).values.item() for lam0, speed in zip(places, v0, strict=True)
+    ]
+    assert together.tolist() == alone
