@@ -90,6 +90,32 @@ def test_short_trains_on_small_swings(circle: ModuleType, radius: float, length:
         assert abs(sum(motion.turning_points)) <= 8 * place * radius
 
 
+def test_times_by_the_length(circle: ModuleType) -> None:
+    """The derivatives of a half period, of a lap and of a time at a place are those for a pendulum under weaker
+    gravity, also of a short train, of which they are in proportion to the length.
+    """
+
+    def quarter(length: Any) -> Any:
+        return mp.sqrt(2 / weaker(length, 2)) * mp.ellipk(mp.sin(mpf("0.3")) ** 2)
+
+    def lap(length: Any) -> Any:
+        share = 144 + 4 * weaker(length, 2) * (1 - mp.cos(mpf("0.6")))
+        return 8 / mp.sqrt(share) * mp.ellipk(8 * weaker(length, 2) / share)
+
+    with mp.workdps(40):
+        for length, tolerance in (("3/2", 1e-14), ("5", 1e-14), ("1/1000", 1e-12)):
+            value = mpf(3) / 2 if length == "3/2" else mp.mpf(1) / 1000 if length == "1/1000" else mpf(5)
+            by_quarter, by_lap = float(mp.diff(quarter, value)), float(mp.diff(lap, value))
+            swing = circle.solve("6/5", L=2, length=length)
+            assert swing.gradient("half_period", "length")["length"] == pytest.approx(2 * by_quarter, rel=tolerance)
+            if length == "3/2":
+                assert swing.gradient("time_at", "length", lam=0)["length"] == pytest.approx(by_quarter, rel=1e-13)
+                turning = circle.solve("6/5", 12, L=2, length=length).gradient("period", "length")
+                assert turning["length"] == pytest.approx(by_lap, rel=tolerance)
+    with pytest.raises(SolutionError, match="no second derivatives with respect to parameters that shape"):
+        swing.gradient("half_period", ["length"], order=2)
+
+
 def test_forces_on_cars(circle: ModuleType) -> None:
     """The forces are those on bodies on a circle at the speed of the train, and couplings carry the rest of gravity."""
     radius, length, cars, mass = 5.0, 4.0, 3, 900.0
@@ -133,8 +159,12 @@ def test_parabola(build: Build) -> None:
         def place(s: Any) -> Any:
             return mp.findroot(lambda x: arc(x) - s, s / 2)
 
-        def height(s: Any) -> Any:
+        def height(s: Any, length: Any = length) -> Any:
             return (raised(place(s + length / 2)) - raised(place(s - length / 2))) / length
+
+        def fastest(length: Any) -> Any:
+            """Return the largest speed after a launch at 10 m/s, which is that at the lowest place."""
+            return mp.sqrt(100 + 2 * G * (height(-end, length) - height(mpf(0), length)))
 
         start, end = arc(mpf(reach)), mpf(5) / 2
         low, high = height(mpf(0)), height(end)
@@ -146,11 +176,14 @@ def test_parabola(build: Build) -> None:
             s = end * mp.sin(angle)
             total += end * mp.cos(angle) / mp.sqrt(2 * G * (high - height(s)))
         truth = total * mp.pi / count
-        launch = str(start - end)
+        launch, change = str(start - end), float(mp.diff(fastest, length))
     module = build("train_on_parabola", gqm.Curve.graph("x**2", parameter="x", domain=(-reach, reach)))
     motion = module.solve(launch, length="3/2")
     assert ulps(motion.half_period, truth) <= MAX_ULPS
     assert motion.turning_points == pytest.approx((float(start - end), float(start + end)), rel=1e-15)
+    # The lowest place is the same for any length.
+    fast = module.solve(launch, 10, length="3/2")
+    assert fast.gradient("v_max", "length")["length"] == pytest.approx(change, rel=1e-13)
     # Beyond its range an end of the train would be beyond the end of the track.
     with pytest.raises(LaunchError, match="domain"):
         module.solve("1/2", length="3/2")

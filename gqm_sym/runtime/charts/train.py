@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 from numba import types
+from numpy.polynomial.chebyshev import chebder
 
 from gqm_sym.errors import ParameterError
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
-from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_chart_z
+from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_chart_z, divdiff2_chart_z
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
@@ -150,6 +151,31 @@ class TrackOfTrain:
         blocks = _blocks(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
         return [_Charted(block, edges, True) for block in blocks]
 
+    def change_of_mean(self, chart: Chart, p: tuple[float, ...], mean: int, edges: Array) -> Array:
+        """Return the block of a chart of the derivative of a mean with respect to the length, but for a constant.
+
+        Parameters
+        ----------
+        chart : Chart
+            The chart of the track of the train.
+        p : sequence of float
+            The run-time parameters.
+        mean : int
+            The number of the mean: 0 for the height, then those of the other parts.
+        edges : array
+            The edges of the pieces of its chart.
+        """
+        block = chart.block[: int(chart.block[0])]
+        if mean:
+            block = self._charted_parts(self.track.chart(p), p)[mean - 1].block
+        half = 0.5 * np.diff(edges)
+        places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
+        slopes = _slopes_of_change(np.ascontiguousarray(block), places.ravel(), float(p[self.length]))
+        slopes = slopes.reshape(places.shape)
+        bends = np.asarray(chebder(slopes @ FIT.T, axis=1)) @ AT_NODES[:-1] / half[:, None]
+        (made,) = _blocks(edges, np.zeros(1), slopes[:, None], bends[:, None], chart.period)
+        return made
+
     def potential(self, chart: Chart, p: Sequence[float], s: Array) -> tuple[Array, Array]:
         """Return the potential energy per unit mass of a body at arc lengths, and its derivative by arc length.
 
@@ -249,6 +275,21 @@ def _over_train(chart, places, length):  # type: ignore[no-untyped-def]
         out[2, i], out[3, i] = chart_alpha(chart, back), chart_alpha(chart, front)
     chart_rows(chart, (1,), places, heights)
     return out, heights
+
+
+@entry(VECTOR(VECTOR, VECTOR, REAL))
+def _slopes_of_change(chart, places, length):  # type: ignore[no-untyped-def]
+    """Return the derivative with respect to the place, then to the length of a train, of a mean over it.
+
+    It is half of z[a, b, b] - z[a, a, b] with both ends a and b, in which nothing is divided by a small length.
+    """
+    out = np.empty(places.size)
+    for i in range(places.size):
+        back = places[i] - 0.5 * length
+        front = back + length
+        ahead = divdiff2_chart_z(chart, back, front, front, length, 0.0)
+        out[i] = 0.5 * (ahead - divdiff2_chart_z(chart, back, back, front, 0.0, length))
+    return out
 
 
 @dataclass(frozen=True, slots=True)

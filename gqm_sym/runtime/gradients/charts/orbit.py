@@ -110,6 +110,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         assert pieces is not None
         self.direction, self._edges, self._passage = direction, edges, passage
         self.source = source_along(problem)
+        chart = problem.formulas.chart
+        self._shaped_by = {*self.source.shaping, *((chart and chart.shaped_by) or ())}
         self._shape = ShapedPieces(problem, pieces, self.source.shaping)
         self._found = passage.found
         numbers = [
@@ -251,7 +253,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             If one of the variables shapes the curve.
         """
         source, shape = self.source, self._shape
-        if set(rows) & set(source.shaping):
+        if self._shaped_by.intersection(rows):
             raise SolutionError(
                 "gradient: there are no second derivatives with respect to parameters that shape a curve without "
                 "formulas yet; name the others in wrt, or take differences of the first derivatives, which are right "
