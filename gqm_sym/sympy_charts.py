@@ -87,7 +87,7 @@ def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
 
 class TrainLoad(sp.Function):  # type: ignore[misc]
     """The mean of |N|/m over the cars of a train, as a function of the place of its middle, V**2, length, number of
-    cars and g.
+    cars, g, and whether other potentials than gravity act (1) or not (0).
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
         The functions for its derivatives with respect to V**2 and the place; None if they are not known.
     """
 
-    nargs = 5
+    nargs = 6
     is_real = True
     by_speed: "ClassVar[type[TrainLoad] | None]" = None
     by_place: "ClassVar[type[TrainLoad] | None]" = None
@@ -132,11 +132,16 @@ class train_load_in_plane(TrainLoad):
     by_speed = train_load_slope_in_plane
 
 
-TRAIN_LOADS: dict[str, tuple[str, ...]] = {
-    **{head.__name__: ("along_x", "along_y", "along_z") for head in (train_load, train_load_slope, train_load_rate)},
-    **{head.__name__: ("chart",) for head in (train_load_in_plane, train_load_slope_in_plane)},
+LOADS_IN_SPACE, LOAD_IN_PLANE = ("load_x", "load_y", "load_z"), ("load",)
+"""The charts of the static load per unit mass on a body across the track under other potentials than gravity."""
+TRAIN_LOADS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    **{
+        head.__name__: (("along_x", "along_y", "along_z"), LOADS_IN_SPACE)
+        for head in (train_load, train_load_slope, train_load_rate)
+    },
+    **{head.__name__: (("chart",), LOAD_IN_PLANE) for head in (train_load_in_plane, train_load_slope_in_plane)},
 }
-"""The charts that each of these functions reads."""
+"""The charts that each of these functions reads: those of the track, and those of loads if there are any."""
 
 ROLL = "roll"
 AXES = ("x", "y", "z")

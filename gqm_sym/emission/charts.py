@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from sympy import Expr, Function, S, Symbol
+from sympy import Add, Expr, Function, S, Symbol
 
 from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
@@ -11,13 +11,13 @@ from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.derivation.algebra.differentiate import differentiate
-from gqm_sym.derivation.forces.train import potential_parts, rates_along
+from gqm_sym.derivation.forces.train import PotentialParts, loads_along, potential_parts, rates_along
 from gqm_sym.derivation.geometry.geometry import cross, geometry
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.dissipative import planar_point, point_in_space
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
-from gqm_sym.sympy_charts import MEAN_PARTS
+from gqm_sym.sympy_charts import LOAD_IN_PLANE, LOADS_IN_SPACE, MEAN_PARTS
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -200,26 +200,36 @@ def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
     arguments.append(f"length={lowering.order[train.train_length.name]}")
     parts: tuple[ExactIR, ...] = ()
     if whole.parts:
-        parts = (_parts_along_track(lowering, whole.parts),)
+        parts = (_parts_along_track(lowering, whole),)
         held = tuple(place for _, place in parts[0].parameters)
         arguments += [f"parts={parts[0].name}", f"held={held!r}"]
+    loads = LOADS_IN_SPACE if lowering.model.curve.in_space else LOAD_IN_PLANE
     return replace(
         track,
         statement=f"TrackOfTrain({', '.join(arguments)})",
         imports=(*track.imports, "TrackOfTrain"),
         means=("along_h", *(f"along_{heads[0].axis}" for _, heads in zip(whole.parts, MEAN_PARTS, strict=False))),
+        loads=loads if whole.parts and train.friction else (),
         exact=(*track.exact, numbers, *parts),
     )
 
 
-def _parts_along_track(lowering: Lowering, parts: tuple[Expr, ...]) -> ExactIR:
-    """Return the function for parts of a potential with two derivatives each by arc length."""
+def _parts_along_track(lowering: Lowering, whole: PotentialParts) -> ExactIR:
+    """Return the function for parts of a potential with two derivatives each by arc length, and with friction for the
+    load across the track under them (`loads_along`).
+    """
     if lowering.model.curve.in_space:
         names, _ = point_in_space(lowering)
         place, tangent, bend = names[:3], names[3:6], names[6:9]
     else:
         names = x, z, dxds, dzds, kappa = planar_point(lowering)[0]
         place, tangent, bend = (x, S.Zero, z), (dxds, S.Zero, dzds), (-kappa * dzds, S.Zero, kappa * dxds)
-    outputs = tuple(form for part in parts for form in rates_along(part, place, tangent, bend))
+    outputs = tuple(form for part in whole.parts for form in rates_along(part, place, tangent, bend))
     doc = "The other parts of the potential, each with its first two derivatives by arc length."
+    if lowering.model.force.friction:
+        others = Add(*(factor * part for factor, part in zip(whole.factors, whole.parts, strict=True)))
+        outputs += loads_along(others, place, tangent, bend, in_space=lowering.model.curve.in_space)
+        doc += (
+            " Then their sum, a component of its gradient across the track, and the rate of that, for each component."
+        )
     return lowering.exact_function("parts_along_track", doc, outputs, names)

@@ -83,6 +83,8 @@ class ChartIR:
         parameters; all have the same size.
     means : tuple of str
         Those of the means over a train, which follow them and have another size.
+    loads : tuple of str
+        Those of the load across the track of a train, which follow these and have a third size.
     """
 
     statement: str
@@ -91,6 +93,7 @@ class ChartIR:
     exact: tuple[ExactIR, ...] = ()
     names: tuple[str, ...] = ()
     means: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
     data: tuple[tuple[str, str], ...] = ()
 
 

@@ -135,8 +135,11 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         if in_space or _CHART_CALL.fullmatch(name.removeprefix("i")):
             texts.insert(0, chart)
             self.charts.add(chart)
-        texts[:0] = read = TRAIN_LOADS.get(name, ())
-        self.charts.update(read)
+        if name in TRAIN_LOADS:
+            track, loads = TRAIN_LOADS[name]
+            read = (*track, *(loads if arguments[-1] else ()))
+            self.charts.update(read)
+            texts = [f"({', '.join(read)},)" if len(read) == 1 else f"({', '.join(read)})", *texts[:-1]]
         return f"{self.prefix}{name}({', '.join(texts)})"
 
     def _print_Function(self, expr: Expr) -> str:

@@ -69,7 +69,7 @@ class _Functions:
     def add(self, module: ModuleIR) -> None:
         """Add all functions of a module, in the order in which they are printed."""
         chart, separated = module.chart, module.separated
-        charts = [group for group in (chart.names, chart.means) if group] if chart else []
+        charts = [group for group in (chart.names, chart.means, chart.loads) if group] if chart else []
         groups = (
             (self.single, (*module.functions, *(chart.functions if chart else ())), module.bounds),
             (self.batch, (*module.batch, *((separated.function,) if separated else ())), module.bounds_batch),

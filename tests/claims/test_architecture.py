@@ -216,6 +216,7 @@ TESTED_THROUGH = {
     "quadrature/kronrod.py": "runtime/quadrature/test_time_panels.py",
     "quadrature/substitution.py": "runtime/quadrature/test_time_panels.py",
     "sweep/arrivals.py": "runtime/sweep/test_sweep.py",
+    "sweep/batch/known_turns.py": "runtime/sweep/batch/test_batches.py",
     "sweep/batch/rows.py": "runtime/sweep/batch/test_batches.py",
     "sweep/batch/turning_points.py": "runtime/sweep/batch/test_batches.py",
     "sweep/cluster.py": "studies/test_studies.py",

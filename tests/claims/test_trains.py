@@ -90,6 +90,32 @@ def test_short_trains_on_small_swings(circle: ModuleType, radius: float, length:
         assert abs(sum(motion.turning_points)) <= 8 * place * radius
 
 
+def test_times_by_the_length(circle: ModuleType) -> None:
+    """The derivatives of a half period, of a lap and of a time at a place are those for a pendulum under weaker
+    gravity, also of a short train, of which they are in proportion to the length.
+    """
+
+    def quarter(length: Any) -> Any:
+        return mp.sqrt(2 / weaker(length, 2)) * mp.ellipk(mp.sin(mpf("0.3")) ** 2)
+
+    def lap(length: Any) -> Any:
+        share = 144 + 4 * weaker(length, 2) * (1 - mp.cos(mpf("0.6")))
+        return 8 / mp.sqrt(share) * mp.ellipk(8 * weaker(length, 2) / share)
+
+    with mp.workdps(40):
+        for length, tolerance in (("3/2", 1e-14), ("5", 1e-14), ("1/1000", 1e-12)):
+            value = mpf(3) / 2 if length == "3/2" else mp.mpf(1) / 1000 if length == "1/1000" else mpf(5)
+            by_quarter, by_lap = float(mp.diff(quarter, value)), float(mp.diff(lap, value))
+            swing = circle.solve("6/5", L=2, length=length)
+            assert swing.gradient("half_period", "length")["length"] == pytest.approx(2 * by_quarter, rel=tolerance)
+            if length == "3/2":
+                assert swing.gradient("time_at", "length", lam=0)["length"] == pytest.approx(by_quarter, rel=1e-13)
+                turning = circle.solve("6/5", 12, L=2, length=length).gradient("period", "length")
+                assert turning["length"] == pytest.approx(by_lap, rel=tolerance)
+    with pytest.raises(SolutionError, match="no second derivatives with respect to parameters that shape"):
+        swing.gradient("half_period", ["length"], order=2)
+
+
 def test_forces_on_cars(circle: ModuleType) -> None:
     """The forces are those on bodies on a circle at the speed of the train, and couplings carry the rest of gravity."""
     radius, length, cars, mass = 5.0, 4.0, 3, 900.0
@@ -133,8 +159,12 @@ def test_parabola(build: Build) -> None:
         def place(s: Any) -> Any:
             return mp.findroot(lambda x: arc(x) - s, s / 2)
 
-        def height(s: Any) -> Any:
+        def height(s: Any, length: Any = length) -> Any:
             return (raised(place(s + length / 2)) - raised(place(s - length / 2))) / length
+
+        def fastest(length: Any) -> Any:
+            """Return the largest speed after a launch at 10 m/s, which is that at the lowest place."""
+            return mp.sqrt(100 + 2 * G * (height(-end, length) - height(mpf(0), length)))
 
         start, end = arc(mpf(reach)), mpf(5) / 2
         low, high = height(mpf(0)), height(end)
@@ -146,11 +176,14 @@ def test_parabola(build: Build) -> None:
             s = end * mp.sin(angle)
             total += end * mp.cos(angle) / mp.sqrt(2 * G * (high - height(s)))
         truth = total * mp.pi / count
-        launch = str(start - end)
+        launch, change = str(start - end), float(mp.diff(fastest, length))
     module = build("train_on_parabola", gqm.Curve.graph("x**2", parameter="x", domain=(-reach, reach)))
     motion = module.solve(launch, length="3/2")
     assert ulps(motion.half_period, truth) <= MAX_ULPS
     assert motion.turning_points == pytest.approx((float(start - end), float(start + end)), rel=1e-15)
+    # The lowest place is the same for any length.
+    fast = module.solve(launch, 10, length="3/2")
+    assert fast.gradient("v_max", "length")["length"] == pytest.approx(change, rel=1e-13)
     # Beyond its range an end of the train would be beyond the end of the track.
     with pytest.raises(LaunchError, match="domain"):
         module.solve("1/2", length="3/2")
@@ -323,12 +356,13 @@ def test_friction_on_a_helix(build: Build) -> None:
 @pytest.mark.parametrize("in_space", [True, False])
 def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     """Friction acts on each car by its own contact force, as in Newton's law for all cars by DOP853; couplings add
-    up.
+    up. In space another potential acts too.
     """
     waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
     curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
-    name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
-    module = build(name, curve, gqm.CoulombFriction(), cars=4)
+    field = gqm.Potential("x**2/40 + y*z/8") if in_space else None
+    name = "rubbing_train_in_a_field" if in_space else "rubbing_train_in_plane"
+    module = build(name, curve, field + gqm.CoulombFriction() if field else gqm.CoulombFriction(), cars=4)
     length, mu, v0, launch = 8.0, 0.05, 12.0, 30.0
     motion = module.solve(launch, v0, length=length, mu=mu)
     shares = (np.arange(4) + 0.5) / 4 - 0.5
@@ -341,7 +375,14 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
         size = np.linalg.norm(first, axis=0)
         t = first / size
         bend = (second - t * (t * second).sum(axis=0)) / size**2
-        return np.linalg.norm(w * bend + 9.81 * (np.array([[0], [0], [1]]) - t * t[2]), axis=0)
+        x, y, z = 20 * u, 5 * np.sin(u), 3 * np.cos(u)
+        pull = np.array([x / 20, z / 8, y / 8]) * in_space + 9.81 * np.array([[0], [0], [1]])
+        return np.linalg.norm(w * bend + pull - t * (t * pull).sum(axis=0), axis=0)
+
+    def energy(s: Any) -> Any:
+        """Return the potential energy per unit mass of a body."""
+        u = places(s)
+        return 9.81 * 3 * np.cos(u) + (10 * u**2 + 15 * np.sin(u) * np.cos(u) / 8) * in_space
 
     nodes, weights = np.polynomial.legendre.leggauss(40)
 
@@ -357,15 +398,11 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
             u = u - (arc(u) - s) / rate
         return u
 
-    def ends(s: float) -> Any:
-        u = places(s + length * np.array([-0.5, 0.5]))
-        return 3 * np.cos(u)
-
     def slopes(_: float, y: Any) -> Any:
         s, v, _ = y
-        low, high = ends(s)
+        low, high = energy(s + length * np.array([-0.5, 0.5]))
         rubbing = mu * pressed(s, v * v).mean()
-        return [v, -9.81 * (high - low) / length - np.sign(v) * rubbing, rubbing * abs(v)]
+        return [v, -(high - low) / length - np.sign(v) * rubbing, rubbing * abs(v)]
 
     times = [0.5, 1.5, 3.0]
     truth = solve_ivp(slopes, (0.0, 3.0), [launch, v0, 0.0], "DOP853", times, rtol=1e-12, atol=1e-12).y
@@ -376,11 +413,10 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     cars = motion.cars(1.5)
     force = pressed(truth[0][1], truth[1][1] ** 2)
     assert np.abs(cars.normal_force) == pytest.approx(force / 4, rel=1e-10)
-    low, high = ends(truth[0][1])
-    acceleration = -9.81 * (high - low) / length - mu * force.mean()
-    # A coupling balances what the cars behind it lack, which is gravity over their own part of the track.
-    edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
-    lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
+    edges = energy(truth[0][1] + length * (np.arange(5) / 4 - 0.5))
+    acceleration = -(edges[-1] - edges[0]) / length - mu * force.mean()
+    # A coupling balances what the cars behind it lack, which is the potential's force over their part of the track.
+    lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
 
 

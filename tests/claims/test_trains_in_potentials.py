@@ -172,12 +172,33 @@ def test_drag_under_a_potential(build_train: Build) -> None:
         assert abs(legs[0].lam_end / turn - 1) <= 2 * ROUNDING
 
 
+def test_friction_about_a_centre(build_train: Build) -> None:
+    """On a circle about a centre of attraction all cars press alike, so that V**2 approaches that of a circular orbit
+    exponentially in arc length, or moves away from it until the train rests.
+    """
+    module = build_train("rubbing_train", gqm.families.circle(), gqm.CentralForce() + gqm.CoulombFriction(), 4)
+    radius, strength, mu, start = 2.0, 20.0, 0.2, 3.0
+    constants = {"L": radius, "mu": mu, "length": 1}
+    for k in (strength, 2.0):
+        motion, orbit = module.solve(0, start, k=k, **constants, t_max=4), k / radius
+        state = motion.state(np.array([0.5, 1.5, 3.0]))
+        growth = np.exp((2 if start**2 < orbit else -2) * mu * state.lam / radius)
+        assert state.v2 == pytest.approx(orbit + (start**2 - orbit) * growth, rel=1e-13)
+        force = (state.v2[1] - orbit) / radius / 4
+        cars = motion.cars(1.5)
+        assert cars.normal_force == pytest.approx(np.full(4, force), rel=1e-12)
+        assert np.abs(cars.coupling_force).max() < 1e-13
+    # The charts of the load belong to a strength.
+    places = module.sweep("rest_position", 0, start, k=[strength, 24.0], **constants).values
+    wanted = [radius / (2 * mu) * np.log(1 / (1 - start**2 * radius / k)) for k in (strength, 24.0)]
+    assert places == pytest.approx(wanted, rel=1e-13)
+
+
 def test_what_is_refused() -> None:
-    """A train without a potential, and friction of its cars under other forces than gravity, are refused."""
+    """A train without a potential, and friction of its cars in a rotating frame, are refused."""
     circle, train = gqm.families.circle(), gqm.Train(length=1)
     for force, message in (
         (gqm.QuadraticDrag(), "no potential acts on it"),
-        (gqm.Gravity() + gqm.Potential("x**2") + gqm.CoulombFriction(), "friction on the cars"),
         (gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction(), "friction on the cars"),
     ):
         with pytest.raises(DeclarationError, match=message):

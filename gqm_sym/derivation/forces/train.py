@@ -117,16 +117,53 @@ def load_of_cars(kernel: Kernel, lam: sp.Symbol, *, in_space: bool) -> sp.Expr:
     Raises
     ------
     DeclarationError
-        If there is friction, and other forces than gravity act.
+        If there is friction in a rotating frame.
     """
     whole = potential_parts(kernel.potential)
-    if kernel.friction and (whole.parts or kernel.spin):
+    if kernel.friction and kernel.spin:
         raise DeclarationError(
-            "derive: coulomb: the friction on the cars of a train is known under gravity alone; leave it out, or the "
-            "other potentials and the rotating frame"
+            "derive: coulomb: the friction on the cars of a train is not known in a rotating frame; leave it out, or "
+            "the rotating frame"
         )
     head = train_load if in_space else train_load_in_plane
-    return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), whole.gravity)
+    others = sp.Integer(bool(whole.parts))
+    return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), whole.gravity, others)
+
+
+def loads_along(
+    potential: sp.Expr, place: Place, tangent: Sequence[sp.Expr], bend: Sequence[sp.Expr], *, in_space: bool
+) -> tuple[sp.Expr, ...]:
+    """Return the static load per unit mass on a body across a track, the components of the gradient of a potential
+    that are normal to the track: along x, y and z, or along the normal of a planar track.
+
+    Parameters
+    ----------
+    potential, place, tangent, bend
+        As in `rates_along`.
+    in_space
+        Whether the track is a curve in space.
+
+    Returns
+    -------
+    tuple
+        The potential, the component and its derivative by arc length, for each component.
+    """
+    slopes = [differentiate(potential, axis) for axis in (X, Y, Z)]
+    rows = [rates_along(slope, place, tangent, bend)[:2] for slope in slopes]
+    gradient, change = ([row[k] for row in rows] for k in (0, 1))
+    value, along, _ = rates_along(potential, place, tangent, bend)
+    bent = sp.Add(*(a * b for a, b in zip(gradient, bend, strict=True)))
+    turned = sp.Add(*(a * b for a, b in zip(change, tangent, strict=True))) + bent
+    found: list[sp.Expr] = []
+    if not in_space:
+        dxds, _, dzds = tangent
+        curvature = dxds * bend[2] - dzds * bend[0]
+        load = gradient[2] * dxds - gradient[0] * dzds
+        return value, load, change[2] * dxds - change[0] * dzds - curvature * along
+    for axis in range(3):
+        load = gradient[axis] - along * tangent[axis]
+        found += [value, load, change[axis] - turned * tangent[axis] - along * bend[axis]]
+    return tuple(found)
 
 
 def notes_of_train(kernel: Kernel) -> tuple[str, ...]:

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 from numba import types
+from numpy.polynomial.chebyshev import chebder
 
 from gqm_sym.errors import ParameterError
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
-from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_chart_z
+from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_chart_z, divdiff2_chart_z
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
@@ -49,8 +50,10 @@ class TrackOfTrain:
     length : int
         The index of the length among the run-time parameters.
     parts, optional
-        ``f(op, ..., p)``: these parts at a place, each with its first two derivatives by arc length. In a plane the
-        place is given by x, z, dx/ds, dz/ds and the curvature, in space by x, y and z and their first two derivatives.
+        ``f(op, ..., p)``: these parts at a place, each with its first two derivatives by arc length; with friction
+        also, for each component of the load across the track under them, their sum, the component and its derivative.
+        In a plane the place is given by x, z, dx/ds, dz/ds and the curvature, in space by x, y and z and their first
+        two derivatives.
     held : tuple of int
         The indices of the run-time parameters that they depend on.
     """
@@ -86,7 +89,8 @@ class TrackOfTrain:
             )
         size = int(track.block[0])
         height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
-        charted = (height, *self._charted_parts(track, p))
+        others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 3
+        charted, loads = (height, *others[:count]), others[count:]
         edges = _graded(_edges(track, charted[-1].edges, length), track.period > 0.0)
         block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
         joints = _merged(np.concatenate([edges, _inside(track.edges, edges)]), whole)
@@ -94,7 +98,7 @@ class TrackOfTrain:
         breaks = joints[np.unique(np.abs(joints[:, None] - kinks).argmin(axis=0))] if kinks.size else kinks
         return replace(
             track,
-            block=np.concatenate([track.block, block]),
+            block=np.concatenate([track.block, block, *(load.block for load in loads)]),
             low=float(edges[0]),
             high=float(edges[-1]),
             ends=("domain-end", "domain-end"),
@@ -104,7 +108,9 @@ class TrackOfTrain:
         )
 
     def _along(self, track: Chart, p: Sequence[float], s: Array) -> Array:
-        """Return the parts of the potential besides the height at arc lengths, each with two derivatives, as rows."""
+        """Return the parts of the potential besides the height at arc lengths, each with two derivatives, and what
+        follows them, as rows.
+        """
         if self.parts is None:
             return np.empty((0, s.size))
         if isinstance(track, SpaceChart):
@@ -119,7 +125,9 @@ class TrackOfTrain:
         return rows
 
     def _charted_parts(self, track: Chart, p: tuple[float, ...]) -> "list[_Charted]":
-        """Return the charts of these parts along the track."""
+        """Return the charts of these parts along the track, and of the load across it. The angle of such a chart is the
+        derivative of the part, or the component of the load.
+        """
         if self.parts is None:
             return []
         edges = track.edges
@@ -143,6 +151,31 @@ class TrackOfTrain:
         blocks = _blocks(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
         return [_Charted(block, edges, True) for block in blocks]
 
+    def change_of_mean(self, chart: Chart, p: tuple[float, ...], mean: int, edges: Array) -> Array:
+        """Return the block of a chart of the derivative of a mean with respect to the length, but for a constant.
+
+        Parameters
+        ----------
+        chart : Chart
+            The chart of the track of the train.
+        p : sequence of float
+            The run-time parameters.
+        mean : int
+            The number of the mean: 0 for the height, then those of the other parts.
+        edges : array
+            The edges of the pieces of its chart.
+        """
+        block = chart.block[: int(chart.block[0])]
+        if mean:
+            block = self._charted_parts(self.track.chart(p), p)[mean - 1].block
+        half = 0.5 * np.diff(edges)
+        places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
+        slopes = _slopes_of_change(np.ascontiguousarray(block), places.ravel(), float(p[self.length]))
+        slopes = slopes.reshape(places.shape)
+        bends = np.asarray(chebder(slopes @ FIT.T, axis=1)) @ AT_NODES[:-1] / half[:, None]
+        (made,) = _blocks(edges, np.zeros(1), slopes[:, None], bends[:, None], chart.period)
+        return made
+
     def potential(self, chart: Chart, p: Sequence[float], s: Array) -> tuple[Array, Array]:
         """Return the potential energy per unit mass of a body at arc lengths, and its derivative by arc length.
 
@@ -160,7 +193,7 @@ class TrackOfTrain:
         height, slope = chart.points(places)[1:3]
         if not isinstance(chart, SpaceChart):  # there it is an angle
             slope = np.sin(slope)
-        rows = self._along(chart, p, places)
+        rows = self._along(chart, p, places)[: 3 * len(factors)]
         energy = gravity * height + sum(factor * row for factor, row in zip(factors, rows[::3], strict=True))
         change = gravity * slope + sum(factor * row for factor, row in zip(factors, rows[1::3], strict=True))
         return energy.reshape(s.shape), change.reshape(s.shape)
@@ -242,6 +275,21 @@ def _over_train(chart, places, length):  # type: ignore[no-untyped-def]
         out[2, i], out[3, i] = chart_alpha(chart, back), chart_alpha(chart, front)
     chart_rows(chart, (1,), places, heights)
     return out, heights
+
+
+@entry(VECTOR(VECTOR, VECTOR, REAL))
+def _slopes_of_change(chart, places, length):  # type: ignore[no-untyped-def]
+    """Return the derivative with respect to the place, then to the length of a train, of a mean over it.
+
+    It is half of z[a, b, b] - z[a, a, b] with both ends a and b, in which nothing is divided by a small length.
+    """
+    out = np.empty(places.size)
+    for i in range(places.size):
+        back = places[i] - 0.5 * length
+        front = back + length
+        ahead = divdiff2_chart_z(chart, back, front, front, length, 0.0)
+        out[i] = 0.5 * (ahead - divdiff2_chart_z(chart, back, back, front, 0.0, length))
+    return out
 
 
 @dataclass(frozen=True, slots=True)

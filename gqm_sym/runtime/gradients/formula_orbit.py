@@ -1,6 +1,7 @@
 """A periodic orbit along a curve with formulas, with its derivatives: means over equal steps of the phase angle."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property, partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from gqm_sym.runtime.gradients.evaluation import (
     fill_panel_means,
     values,
 )
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
+from gqm_sym.runtime.gradients.multiprecision import MultiprecisionOrbit
 from gqm_sym.runtime.gradients.orbit import (
     OrbitDerivatives,
     SeriesOf,
@@ -42,6 +43,9 @@ from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+
+# What stands for a number of nodes that double-double arithmetic does not tell.
+UNKNOWN = -1
 
 # Pi as two doubles.
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
@@ -105,10 +109,11 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     @cached_property
     def _multiprecision(self) -> MultiprecisionOrbit:
-        return self._in_multiprecision(self._program, turning_point_program(self.source))
+        return self._in_multiprecision(self._program, turning_point_program(self.source), self._in_double_double[1])
 
-    def _in_multiprecision(self, program: Program, turns: Program) -> MultiprecisionOrbit:
-        return MultiprecisionOrbit(self.source, program, turns, self._given, self.direction, self._offsets)
+    def _in_multiprecision(self, program: Program, turns: Program, nodes: int) -> MultiprecisionOrbit:
+        given = self._given, self.direction, self._offsets, self._edges
+        return MultiprecisionOrbit(self.source, program, turns, *given, needs_panels=nodes == 0)
 
     @cached_property
     def _end_rows(self) -> Array:
@@ -157,34 +162,43 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return np.ascontiguousarray(inputs), trapezoidal_nodes(LIBRATION)
 
     @cached_property
+    def _in_double_double(self) -> tuple[Array | None, int]:
+        return self._means_of(self._program, lambda: np.empty(0) if self.direction else self._end_rows)
+
+    @cached_property
     def _means(self) -> tuple[Array, int, bool]:
         """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them.
 
         The number is 0 if the means were found on panels.
         """
-        found = None if self._orbit is None else self._means_of(self._program, *self._rule)
-        return found or (*self._multiprecision.means[:2], False)
+        found, n = self._in_double_double
+        return (*self._multiprecision.means[:2], False) if found is None else (found, n, True)
 
     @property
     def nodes(self) -> int:
         """The number of nodes by which means over the orbit are found; 0 if it needs panels instead."""
-        try:
-            return self._means[1]
-        except SolutionError:  # too many of them
-            return 0
+        n = self._in_double_double[1]
+        if n != UNKNOWN:
+            return n
+        with suppress(SolutionError):
+            return found[1] if (found := self._multiprecision.means_over_steps) else 0
+        return 0
 
-    def _means_of(self, program: Program, inputs: Array, nodes: Array) -> tuple[Array, int, bool] | None:
-        """Return `_means` of any program whose first result is the rate of time, in double-double arithmetic; None if
-        digits are lost.
+    def _means_of(self, program: Program, ends: Callable[[], Array]) -> tuple[Array | None, int]:
+        """Return the means of a program, whose first result is the rate of time, in double-double arithmetic (None if
+        digits are lost), and the number of nodes, which is 0 if it needs panels, or UNKNOWN.
+
+        ``ends`` returns the derivatives of a libration's turning points (`_rule_with`).
         """
-        found = np.zeros((program.outputs.size, MEAN))
+        if self._orbit is None:
+            return None, UNKNOWN
+        (inputs, nodes), found = self._rule_with(ends()), np.zeros((program.outputs.size, MEAN))
         n = fill_means(program.operands, program.work, inputs, nodes, found)
-        if n == NOT_SMOOTH:
-            kind = CIRCULATION if self.direction else LIBRATION
-            if fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found) <= 0:
-                raise SolutionError(UNDECIDED)
-            return found, 0, True
-        return None if n == LOST_DIGITS else (found, n, True)
+        if n != NOT_SMOOTH:
+            return (None, UNKNOWN) if n == LOST_DIGITS else (found, n)
+        kind = CIRCULATION if self.direction else LIBRATION
+        n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found)
+        return found if n > 0 else None, 0
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
         """Return the derivatives that `OrbitDerivatives.second_durations` describes."""
@@ -193,10 +207,9 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
             program = circulation_seconds(self.source, self.direction, rows)
         else:
             program = libration_seconds(self.source, rows)
-        found = None
-        if self._orbit is not None:
-            found = self._means_of(program, *self._rule_with(np.empty(0) if self.direction else self._ends_by(turns)))
-        return self._over_phase(found[0] if found else self._in_multiprecision(program, turns).means[0])[1:]
+        found, n = self._means_of(program, lambda: np.empty(0) if self.direction else self._ends_by(turns))
+        means = self._in_multiprecision(program, turns, n).means[0] if found is None else found
+        return self._over_phase(means)[1:]
 
     def _integrals(self, first: int, count: int) -> Array:
         """Return the integrals of results over a half period, or over a lap."""
@@ -219,7 +232,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         # The means at n nodes are exact as soon as terms of order 2n vanish; twice as many nodes resolve these terms.
         means, count, is_double_double = self._means
         if not count:
-            return self._on_panels()
+            return self._on_panels() if is_double_double else self._multiprecision.panels(everywhere=True)[0]
         n = min(2 * count, LEVELS[-1] // 2)
         if is_double_double:
             inputs, nodes = self._rule
@@ -252,7 +265,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         n, found = self.source.variables, self.samples
         if isinstance(found, Panels):
             samples, phases, whole = found.samples, found.phases, 1.0 if self.direction else 2.0 * np.pi
-            make: Callable[[Array], SeriesOf] = partial(PanelSeries, found.edges / whole)
+            make: Callable[[Array], SeriesOf] = partial(PanelSeries, found.edges, whole=whole)
         else:
             count = found.shape[1]
             samples, phases, make = found, 2.0 * np.pi * (np.arange(count) + 0.5) / count, Series

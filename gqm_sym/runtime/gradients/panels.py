@@ -8,12 +8,18 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import two_product
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 from gqm_sym.runtime.double_double.quadrature import fill_panel
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.series import to_legendre
+from gqm_sym.runtime.gradients.series import panel_widths, to_legendre
+
+# The message for an orbit without derivatives.
+UNDECIDED = (
+    "gradients: the motion comes too near to an equilibrium, or bends too sharply along its orbit; "
+    "launch a little farther from there"
+)
 
 # A panel is resolved if the last two Legendre coefficients of all integrands are below this share of the integrals of
 # the absolute values; other panels are halved, at most this many times.
@@ -55,17 +61,24 @@ def fill_shares(kind, panels, rule, shares):  # type: ignore[no-untyped-def]
     ----------
     kind : int
         LIBRATION or CIRCULATION.
-    panels : (m, 2) array
-        The start and the width of each panel, as phase angles or as shares of a lap.
+    panels : (3, m) array
+        The start of each panel, and its width as two doubles, as phase angles or as shares of a lap.
     rule : (4, RULE) array
         The nodes of a panel (`nodes.panel_rule`).
     shares : (2, m * RULE) array
         Filled with the share of the orbit's width at each node, as two doubles.
     """
     nodes = np.empty((4, RULE))
-    for k in range(panels.shape[0]):
-        fill_panel(kind, (panels[k, 0], 0.0), (panels[k, 1], 0.0), 0, rule, nodes)
+    for k in range(panels.shape[1]):
+        fill_panel(kind, (panels[0, k], 0.0), (panels[1, k], panels[2, k]), 0, rule, nodes)
         shares[:, k * RULE : (k + 1) * RULE] = nodes[:2]
+
+
+def shares_on(kind: int, left: Array, right: Array) -> Array:
+    """Return the nodes of Gauss's rule on panels between edges, as `fill_shares` fills them."""
+    shares = np.empty((2, RULE * left.size))
+    fill_shares(kind, np.array([left, *panel_widths(left, right)]), panel_rule(), shares)
+    return shares
 
 
 def resolved(
@@ -94,12 +107,10 @@ def resolved(
         If there are no such panels, or digits are lost.
     """
     rule, tail_factors = panel_rule(), to_legendre()[:, -2:]
-    pending, done, sizes = np.stack([edges[:-1], np.diff(edges)], axis=1), [], np.empty((0, 1))
+    pending, done, sizes = np.stack([edges[:-1], edges[1:]], axis=1), [], np.empty((0, 1))
     for _ in range(MAX_HALVINGS):
-        shares = np.empty((2, RULE * len(pending)))
-        fill_shares(kind, np.ascontiguousarray(pending), rule, shares)
-        got = evaluate(shares).reshape(-1, 3, len(pending), RULE)
-        high, widths = got[wanted, 0], pending[:, 1]
+        got = evaluate(shares_on(kind, *pending.T.copy())).reshape(-1, 3, len(pending), RULE)
+        high, widths = got[wanted, 0], pending[:, 1] - pending[:, 0]
         if not np.isfinite(high).all():
             raise SolutionError(UNDECIDED)
         here = (np.abs(got[:, 0]) @ rule[2]) * widths
@@ -110,27 +121,36 @@ def resolved(
         noise = (got[wanted, 2] @ rule[2]) * widths / scale
         is_resolved = (tails <= np.maximum(MAX_TAIL, noise)).all(axis=0)
         done.append((pending[is_resolved], got[:, :, is_resolved]))
-        left, width_left = pending[~is_resolved].T
+        left, right = pending[~is_resolved].T
         if not left.size:
             break
-        half = 0.5 * width_left
-        pending = np.stack([np.concatenate([left, left + half]), np.concatenate([half, half])], axis=1)
+        middle = 0.5 * (left + right)
+        pending = np.stack([np.concatenate([left, middle]), np.concatenate([middle, right])], axis=1)
     else:
         raise SolutionError(UNDECIDED)
     panels, samples = np.concatenate([d[0] for d in done]), np.concatenate([d[1] for d in done], axis=2)
     order = np.argsort(panels[:, 0])
     panels, samples = panels[order], samples[:, :, order]
-    weights = rule[2] * panels[:, 1:]
-    errors = np.einsum("kmj,mj->k", samples[:, 2], weights)
+    weights = _weights(*panels.T)
+    errors = np.einsum("kmj,mj->k", samples[:, 2], weights[0])
     if not (errors[wanted] <= MAX_ROUNDING * sizes[wanted, 0]).all():
         raise SolutionError(UNDECIDED)
-    integrals = np.array([_total(row[0] * weights, row[1] * weights) for row in samples])
+    integrals = np.array([_total(row, weights) for row in samples])
     integrals[np.abs(integrals) <= errors] = 0.0
     return Panels(np.append(panels[:, 0], edges[-1]), samples[:, 0], integrals)
 
 
-def _total(high: Array, low: Array) -> float:
-    """Return the sum of numbers, rounded once."""
+def _weights(left: Array, right: Array) -> tuple[Array, Array]:
+    """Return the weight of each node of panels, as two doubles."""
+    (width, low), rule = panel_widths(left, right), panel_rule()
+    weight, rest = two_product.py_func(width[:, None], rule[2])
+    return weight, rest + (width[:, None] * rule[3] + low[:, None] * rule[2])
+
+
+def _total(row: Array, weights: tuple[Array, Array]) -> float:
+    """Return the integral of a function given as two doubles at each node, rounded once."""
     from math import fsum
 
+    high, low = two_product.py_func(row[0], weights[0])
+    low = low + (row[0] * weights[1] + row[1] * weights[0])
     return fsum([*high.ravel().tolist(), *low.ravel().tolist()])

@@ -8,6 +8,8 @@ from numba import types
 from numpy.polynomial.legendre import legint, legvander
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import VECTOR, Array
 from gqm_sym.runtime.double_double.interpreter import BLOCK
@@ -117,23 +119,37 @@ def fill_series(table, shares, found):  # type: ignore[no-untyped-def]
         found[:, :, start : start + some.size] = part
 
 
+def panel_widths(left: Array, right: Array) -> tuple[Array, Array]:
+    """Return the widths of panels between phase angles, or shares of a lap, as two doubles.
+
+    The upper turning point is at the angle pi itself and not at its nearest double: beside a hilltop the body takes a
+    long time for the difference.
+    """
+    width, low = two_sum.py_func(right, -left)
+    return width, low + np.where(right == 2.0 * HALF_PI[0], 2.0 * HALF_PI[1], 0.0)
+
+
 class PanelSeries:
     """Functions of a share of the phase, given by their values at the nodes of panels.
 
     Parameters
     ----------
     edges : (m+1,) array
-        The edges of the panels.
+        The edges of the panels, as phases.
     samples : (k, m, RULE) array
         The values of k functions.
+    whole : float
+        The phase of which shares are meant. A share of a panel's edge would be rounded, which matters where panels are
+        narrow.
     begin : float
         The share at which integrals begin.
     """
 
-    def __init__(self, edges: Array, samples: Array, begin: float = 0.0) -> None:
-        self._edges, self._samples = edges, samples
-        terms, halves = samples @ to_legendre(), 0.5 * np.diff(edges)
-        here, start = place_on.py_func(edges, begin)
+    def __init__(self, edges: Array, samples: Array, whole: float = 1.0, begin: float = 0.0) -> None:
+        self._edges, self._samples, self._whole = edges, samples, whole
+        width, low = panel_widths(edges[:-1], edges[1:])
+        terms, halves = samples @ to_legendre(), 0.5 * ((width + low) / whole)
+        here, start = place_on.py_func(edges, begin * whole)
         # Each panel's integrals begin at the end of it that is nearer to the beginning.
         integrals = np.empty((*terms.shape[:2], terms.shape[2] + 1))
         for panels, bound in ((slice(0, here), 1.0), (slice(here, here + 1), start), (slice(here + 1, None), -1.0)):
@@ -147,33 +163,33 @@ class PanelSeries:
 
     def begun_at(self, share: float) -> "PanelSeries":
         """Return the same functions with integrals that begin at a share: nothing cancels in those to places nearby."""
-        return PanelSeries(self._edges, self._samples, share)
+        return PanelSeries(self._edges, self._samples, self._whole, share)
 
     def __call__(self, share: Array) -> Array:
         """Return the values at shares, and the integrals from 0 to these: a row for each function."""
         found = np.empty((2, self._table.shape[2] // 2, share.size))
-        fill_polynomials(self._edges, self._table, share, found)
+        fill_polynomials(self._edges, self._table, share * self._whole, found)
         return found
 
 
 @Inner
-def place_on(edges, share):  # type: ignore[no-untyped-def]
-    """Return the panel that contains a share, and the place on it, from -1 to 1."""
-    panel = min(max(np.searchsorted(edges, share, side="right") - 1, 0), edges.size - 2)
+def place_on(edges, phase):  # type: ignore[no-untyped-def]
+    """Return the panel that contains a phase, and the place on it, from -1 to 1."""
+    panel = min(max(np.searchsorted(edges, phase, side="right") - 1, 0), edges.size - 2)
     left, right = edges[panel], edges[panel + 1]
-    return panel, min(max((2.0 * share - left - right) / (right - left), -1.0), 1.0)
+    return panel, min(max(((phase - left) + (phase - right)) / (right - left), -1.0), 1.0)
 
 
 @entry(types.void(VECTOR, CUBE, VECTOR, CUBE), checked=False)
-def fill_polynomials(edges, table, shares, found):  # type: ignore[no-untyped-def]
-    """Fill values and integrals of Legendre series on panels at shares.
+def fill_polynomials(edges, table, phases, found):  # type: ignore[no-untyped-def]
+    """Fill values and integrals of Legendre series on panels at phases.
 
     The table has for each panel and degree the coefficients of the values, and then those of the integrals.
     """
     degrees, functions = table.shape[1], table.shape[2]
     sums = np.empty(functions)
-    for i in range(shares.size):
-        panel, x = place_on(edges, shares[i])
+    for i in range(phases.size):
+        panel, x = place_on(edges, phases[i])
         before, now = 0.0, 1.0
         sums[:] = 0.0
         for k in range(degrees):

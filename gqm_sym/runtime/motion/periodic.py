@@ -15,9 +15,9 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
+from gqm_sym.runtime.gradients.panels import UNDECIDED
 from gqm_sym.runtime.gradients.passages.arrival import arrival_slopes
 from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of

@@ -209,7 +209,14 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         if batches is not None:
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
-            answer_batches(batches.addresses(), layout, *launches, wanted, found._replace(values=spans))
+            in_batches, asked_for = partial(answer_batches, batches.addresses(), layout), found._replace(values=spans)
+            in_batches(*launches, wanted, NO_TAPE, asked_for)
+            left = np.flatnonzero(found.status == quantities.UNDECIDED)
+            if left.size and (exact := _recorded(formulas, asked.lows)).work.size:
+                again = [line if line.size == 1 else line[left] for line in lines]
+                some = asked_for.part(left)
+                in_batches(pointers(again), formulas.monotone, wanted, exact, some)
+                asked_for.put(left, some)
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue
         if group.table_between_ends and (found.status == quantities.UNDECIDED).any():

@@ -125,9 +125,11 @@ def test_a_train_that_leaves_a_helix(tmp_path_factory: pytest.TempPathFactory) -
     motion = module.solve(20)
     distance, slope = 20 - 1.5, 0.75 / (4 + 0.75**2) ** 0.5
     time = (2 * distance / (9.81 * slope)) ** 0.5
-    found = motion.gradient("t_end", ("g", "lam0"))
+    found = motion.gradient("t_end", ("g", "lam0", "length"))
     assert motion.t_end == pytest.approx(time, rel=1e-14)
     assert (found["g"], found["lam0"]) == pytest.approx((-time / (2 * 9.81), time / (2 * distance)), rel=ROUNDING)
+    # The middle of a longer train is nearer to the end of the track.
+    assert found["length"] == pytest.approx(-time / (4 * distance), rel=ROUNDING)
 
 
 def test_what_has_no_derivatives(hoop: ModuleType) -> None:

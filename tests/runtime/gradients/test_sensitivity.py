@@ -29,7 +29,7 @@ def swing(time: Any, at: dict[str, Any]) -> list[Any]:
     return [2 * mp.asin(k * sn), at["L"] * 2 * k * rate * cn]
 
 
-@pytest.mark.parametrize("amplitude", [1.2, 2.9, 0.05, 3.1415])
+@pytest.mark.parametrize("amplitude", [1.2, 2.9, 0.05, 3.1415, 3.1415926])
 def test_a_pendulum_at_any_time(amplitude: float) -> None:
     """Sensitivities are right up to 1e9 periods, within 1e-14 of the largest derivative in the period then."""
     launch = {"lam0": amplitude, "L": 1.25, "g": 9.81}
@@ -164,7 +164,7 @@ def test_shapes_and_names() -> None:
     assert motion.sensitivity("1/2", "L").wrt == ("L",)
     np.testing.assert_allclose(motion.sensitivity(0.0).lam, [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-15)
     with pytest.raises(SolutionError, match="too near to an equilibrium"):
-        generated("circle").solve(lam0="pi - 1/10**9").sensitivity(0.5)
+        generated("circle").solve(lam0="pi - 1/10**30").sensitivity(0.5)
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,17 @@ def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
     )
 
 
+def test_beside_a_hilltop() -> None:
+    """A body that passes a hilltop slowly has coefficients too: those of the velocity, times k, are those of the arc
+    length.
+    """
+    motion = load(str(ROOT / "generated" / "double_well.py"), "double_well").solve(lam0=0, v0=1e-12)
+    v, s = motion.fourier("v", 9), motion.fourier("s", 9)
+    order = 2 * np.pi / motion.period * np.arange(10)
+    np.testing.assert_allclose(v.a, order * s.b, atol=2e-15, rtol=0)
+    np.testing.assert_allclose(v.b, -order * s.a, atol=2e-15, rtol=0)
+
+
 @pytest.mark.parametrize(
     ("quantity", "n", "launch", "error", "text"),
     [

@@ -11,8 +11,11 @@ from types import ModuleType
 import numpy as np
 import pandas as pd
 import pytest
+from mpmath import mp, mpf
+from paths import ROOT
 
 import gqm_sym as gqm
+from gqm_sym.loading import load
 from gqm_sym.runtime import Energy, State
 
 
@@ -130,6 +133,18 @@ def test_energy_is_kept(swing: ModuleType) -> None:
     assert energy.potential == pytest.approx(15 * state.z, rel=1e-14, abs=1e-14)
     assert np.array_equal(energy.lost, np.zeros(TIMES.size))
     assert energy.kinetic + energy.potential == pytest.approx(np.full(TIMES.size, 6 - 15 * np.cos(1)), rel=1e-13)
+
+
+def test_the_speed_beside_a_hilltop() -> None:
+    """A body that passes a hilltop slowly has V**2 = v0**2 + 2 g h (2 x**2 - x**4), however much of that cancels in
+    doubles.
+    """
+    motion = load(str(ROOT / "generated" / "double_well.py"), "double_well").solve(0, 1e-12, h="1/4", g="9.81")
+    state = motion.state(motion.period * np.linspace(0.0, 0.24, 500))
+    with mp.workdps(40):
+        squares = [mpf(x) ** 2 for x in state.lam]
+        wanted = [mp.sqrt(mpf(1e-12) ** 2 + mpf("9.81") / 2 * (2 * square - square**2)) for square in squares]
+    np.testing.assert_allclose(state.v, np.array(wanted, dtype=float), atol=8e-15, rtol=0)
 
 
 def test_a_rolling_body_turns_too(tmp_path: Path) -> None:

@@ -7,9 +7,14 @@ bodies along charts is known of the times of trains. The contact force on the ot
 
 The polynomials of the means are taken as they are in the chart of the train, so that results have the accuracy of
 doubles.
+
+A potential with a single part leaves a coordinate for the derivative of its mean with respect to the length of the
+train, whose factor is the difference from the given length. So derivatives with respect to the length are those with
+respect to the strength of a force.
 """
 
 from collections.abc import Callable, Sequence
+from ctypes import memset
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import frexp, nan
@@ -25,11 +30,12 @@ from gqm_sym.runtime.charts.chart import Chart, SpaceChart
 from gqm_sym.runtime.charts.double_double.pieces import NODES, Samples, TruePieces, sample_places, starting_context
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.train import TrackOfTrain
+from gqm_sym.runtime.compiled.emitted import RunByPython
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, square_root
 from gqm_sym.runtime.gradients.orbit import without_formulas
-from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.interface import PATH_IN_SPACE, SPACE_ROWS, ExactPotential
 from gqm_sym.runtime.launch.formulas import ParameterValues, chart_with, shape_of
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
@@ -39,6 +45,9 @@ MAX_SLOPE = 0.5
 
 # A curve in space has one coordinate without a force and two with one.
 MOST_MEANS = 2
+
+# This stands for the derivative of the first mean with respect to the length of the train.
+BY_LENGTH = -1
 
 
 def on_curve_of_means(problem: Problem) -> Problem:
@@ -59,39 +68,57 @@ def on_curve_of_means(problem: Problem) -> Problem:
     assert isinstance(train, TrackOfTrain)
     means = _means_of(train, len(values))
     chart = chart_with(train, values)
-    records = [_records(chart, mean) for mean in means]
+    records = _all_records(train, chart, values, means)
     steepest = (float(np.abs(record[:, 6 + 2 * TERMS : 6 + 3 * TERMS]).sum(axis=1).max()) for record in records)
     scales = tuple(2.0 ** (frexp(slope / MAX_SLOPE)[1]) if slope else 1.0 for slope in steepest)
-    curve = _CurveOfMeans(train, means, scales, shape_of(train, values, 1.0))
-    potential = _Potential(train, formulas.inertia, means, scales)
+    curve = CurveOfMeans(train, means, scales, shape_of(train, values, 1.0))
+    potential = _Potential(train, formulas.inertia, means, scales, values[train.length])
     other = replace(
         formulas,
         chart=curve,
         exact=ExactPotential(potential),
-        path_in_space=formulas.functions.effective_potential if len(means) > 1 else None,
+        path_in_space=_path_in_space() if len(means) > 1 else None,
     )
     p = ParameterValues(problem.p)
     p.values, p.conditions = problem.p.values, {}
     return Problem(other, problem.launch, p, problem.domain)
 
 
+@lru_cache(maxsize=1)
+def _path_in_space() -> RunByPython:
+    """Return the function for y and the contact force on the other curve, which are not asked for."""
+
+    def zeros(n: int, _places: int, _speeds: int, _v: float, _p: int, out: int) -> None:
+        memset(out, 0, 8 * SPACE_ROWS * n)
+
+    return RunByPython(zeros, PATH_IN_SPACE)
+
+
 def _means_of(train: TrackOfTrain, parameters: int) -> tuple[int, ...]:
-    """Return the numbers of the means that the potential has: 0 for the height, then those of other parts."""
+    """Return the numbers of the means that the potential has: 0 for the height, then those of other parts. If there is
+    only one, `BY_LENGTH` follows.
+    """
     _, gravity, _, *factors = train.numbers(FLOATS, (nan,) * parameters)
     means = tuple(range(0 if gravity != 0 else 1, len(factors) + 1))
     if len(means) > MOST_MEANS:
         raise without_formulas()
-    return means
+    return means if len(means) == MOST_MEANS else (*means, BY_LENGTH)
 
 
-def _records(chart: Chart, mean: int) -> Array:
-    """Return the records of the pieces of the chart of a mean (`charts.evaluate`)."""
+def _all_records(train: TrackOfTrain, chart: Chart, values: tuple[float, ...], means: tuple[int, ...]) -> list[Array]:
+    """Return the records of the pieces of the charts of means (`charts.evaluate`)."""
     size = int(chart.block[0])
-    begin = size * (3 + chart.banked if isinstance(chart, SpaceChart) else 1)
-    begin += mean * int(chart.block[begin])
-    count = int(chart.block[begin + 1])
-    first = begin + EDGES + 3 * count + 2
-    return chart.block[first : first + count * RECORD].reshape(count, RECORD)
+    start = size * (3 + chart.banked if isinstance(chart, SpaceChart) else 1)
+    found = []
+    for mean in means:
+        block = chart.block[start + max(mean, 0) * int(chart.block[start]) :]
+        if mean == BY_LENGTH:
+            of_mean = chart.block[start + EDGES : start + EDGES + int(chart.block[start + 1]) + 1]
+            block = train.change_of_mean(chart, values, means[0], of_mean)
+        count = int(block[1])
+        first = EDGES + 3 * count + 2
+        found.append(block[first : first + count * RECORD].reshape(count, RECORD))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,26 +135,30 @@ class _Potential:
         The numbers of the means that are the coordinates z and y.
     scales : tuple of float
         The means over these coordinates.
+    length : float
+        The length of the train.
     """
 
     train: TrackOfTrain
     inertia: Callable[..., Any] | None
     means: tuple[int, ...]
     scales: tuple[float, ...]
+    length: float
 
     def __call__(self, op: Any, *arguments: Any) -> tuple[Any, ...]:
         *coordinates, p = arguments
         _, gravity, _, *others = self.train.numbers(op, p)
         inertia = 1 if self.inertia is None else self.inertia(op, p)
-        slopes = [
-            (gravity, *others)[mean] * scale / inertia for mean, scale in zip(self.means, self.scales, strict=True)
-        ]
+        factors = [(gravity, *others)[mean] for mean in self.means if mean != BY_LENGTH]
+        if BY_LENGTH in self.means:
+            factors.append(factors[0] * (p[self.train.length] - op.mpf(self.length)))
+        slopes = [factor * scale / inertia for factor, scale in zip(factors, self.scales, strict=True)]
         value = sum((slope * place for slope, place in zip(slopes, reversed(coordinates[1:]), strict=True)), op.mpf(0))
         return value, op.mpf(0), *reversed(slopes)
 
 
 @dataclass(frozen=True, slots=True)
-class _CurveOfMeans:
+class CurveOfMeans:
     """The curve, which makes its chart: that of the train.
 
     Attributes
@@ -148,6 +179,14 @@ class _CurveOfMeans:
         """The run-time parameters that the chart depends on, by their place; None if that is not known."""
         return self.train.shaped_by
 
+    @property
+    def moved_by(self) -> tuple[int, ...] | None:
+        """Those on which the potential does not depend instead of the chart."""
+        shaped = self.shaped_by
+        if shaped is None or BY_LENGTH not in self.means:
+            return shaped
+        return tuple(index for index in shaped if index != self.train.length)
+
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Return the chart of the train."""
         return chart_with(self.train, p)
@@ -164,7 +203,8 @@ class _CurveOfMeans:
         """Return the curve in double-double arithmetic; None for other values of the parameters that shape it."""
         if shape_of(self.train, tuple(number.value for number in p), 1.0) != shape_of(self.train, self.shape, 1.0):
             return None
-        return _Pieces(chart, _sampler(chart, self.means, self.scales), in_space=len(self.means) > 1)
+        records = _all_records(self.train, chart, tuple(number.value for number in p), self.means)
+        return _Pieces(chart, _sampler(chart, records, self.scales), in_space=len(self.means) > 1)
 
 
 class _Pieces(TruePieces):
@@ -228,14 +268,14 @@ def fill_samples(records, scales, low, high, nodes, integrals, samples):  # type
         samples[0, 0, i], samples[0, 1, i] = multiply(total, total_low, half, half_low)
 
 
-def _sampler(chart: Chart, means: tuple[int, ...], scales: tuple[float, ...]) -> Callable[[int], Samples]:
+def _sampler(chart: Chart, records: list[Array], scales: tuple[float, ...]) -> Callable[[int], Samples]:
     """Return the function that samples a piece (`charts.double_double.pieces`)."""
-    records, edges, sizes = [_records(chart, mean) for mean in means], chart.edges.tolist(), np.array(scales)
+    edges, sizes = chart.edges.tolist(), np.array(scales)
 
     def sample(k: int) -> Samples:
         low, high = edges[k], edges[k + 1]
         here = np.stack([_piece_at(record, 0.5 * (low + high)) for record in records])
-        samples = np.empty((1 + len(means), 2, NODES))
+        samples = np.empty((1 + len(records), 2, NODES))
         fill_samples(here, sizes, low, high, sample_places(), _integrals(), samples)
         return samples, 4.0 * UNIT * float(np.abs(samples).max())
 

@@ -110,6 +110,8 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         assert pieces is not None
         self.direction, self._edges, self._passage = direction, edges, passage
         self.source = source_along(problem)
+        chart = problem.formulas.chart
+        self._shaped_by = {*self.source.shaping, *((chart and chart.shaped_by) or ())}
         self._shape = ShapedPieces(problem, pieces, self.source.shaping)
         self._found = passage.found
         numbers = [
@@ -251,7 +253,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             If one of the variables shapes the curve.
         """
         source, shape = self.source, self._shape
-        if set(rows) & set(source.shaping):
+        if self._shaped_by.intersection(rows):
             raise SolutionError(
                 "gradient: there are no second derivatives with respect to parameters that shape a curve without "
                 "formulas yet; name the others in wrt, or take differences of the first derivatives, which are right "
@@ -280,14 +282,13 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     def series(self) -> tuple[SeriesOf, Array]:
         """As `OrbitDerivatives.series`."""
         panels, n = self._panels, self.source.variables
-        edges, samples = panels.edges, panels.samples
+        whole, samples = 1.0 if self.direction else 2.0 * np.pi, panels.samples
         arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
         if self.direction:
             arcs *= self.width
         else:
             arcs *= 0.5 * self.width * np.sin(panels.phases)
-            edges = edges / (2.0 * np.pi)
-        return PanelSeries(edges, np.concatenate([samples[: 1 + n], arcs])), np.zeros(n)
+        return PanelSeries(panels.edges, np.concatenate([samples[: 1 + n], arcs]), whole), np.zeros(n)
 
     @property
     def width(self) -> float:

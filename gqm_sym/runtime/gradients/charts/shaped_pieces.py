@@ -106,7 +106,8 @@ def shaping_of(formulas: Formulas) -> tuple[int, ...]:
     known.
     """
     assert formulas.chart is not None
-    shaped_by = formulas.chart.shaped_by
+    # The potential of a train may take over the dependence on its length (`means`).
+    shaped_by = getattr(formulas.chart, "moved_by", formulas.chart.shaped_by)
     return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
 
 

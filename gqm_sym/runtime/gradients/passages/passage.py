@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
-from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.panels import UNDECIDED
 from gqm_sym.runtime.gradients.path import (
     CURVATURE,
     DS,

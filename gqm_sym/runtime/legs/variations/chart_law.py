@@ -9,6 +9,7 @@ import numpy as np
 
 from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.charts.means import CurveOfMeans
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
 from gqm_sym.runtime.gradients.orbit import without_formulas
@@ -57,7 +58,7 @@ class ChartLaw(Law):
         )
         self._forces = ChartForces(formulas.exact, self.count, self.mass, varied, dimension)
         self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
-        self._launch, self._chart = problem.launch.lam0, chart
+        self._launch, self._chart, self._maker = problem.launch.lam0, chart, maker
 
     @property
     def launch_changes(self) -> Array:
@@ -70,8 +71,13 @@ class ChartLaw(Law):
 
     @property
     def ranges(self) -> Array:
-        """See `Law`. The ends of the curve keep their labels."""
-        return np.zeros((3, self.count))
+        """See `Law`. The ends of the curve keep their labels, but the middle of a longer train stays farther from
+        them.
+        """
+        found = np.zeros((3, self.count))
+        if isinstance(self._maker, CurveOfMeans):
+            found[:2, self._maker.train.length] = 0.5, -0.5
+        return found
 
     def coordinates(self, states: Array) -> Array:
         """See `Law`."""

@@ -62,7 +62,8 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         found = self.known_gradient(quantity, wrt, lam)
-        self._check_known(f"gradient of {quantity}", found, found.values())
+        if self.problem.formulas.chart is not None:
+            self._check_known(f"gradient of {quantity}", found, found.values())
         return found
 
     def known_gradient(self, quantity: str, wrt: Any, lam: Any = None) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """The cars of a train: their places, the contact force on each, and the force in each coupling."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,20 +121,21 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     rows: list[Array] = [*found, coupling]
     kind: type[Cars] | type[CarsOfRiders] = Cars
     if formulas.rider_loads is not None:
-        rows, kind = [*rows, *_loads(problem, state, found[0], track, values)], CarsOfRiders
+        rows, kind = [*rows, *_loads(problem, state, found[0], partial(track.potential, chart, values))], CarsOfRiders
     return kind(state.t, *(row if np.ndim(state.lam) else row[:, 0] for row in rows))
 
 
 def _loads(
-    problem: Problem, state: Any, places: Array, track: TrackOfTrain, values: list[float]
+    problem: Problem, state: Any, places: Array, potential: Callable[[Array], tuple[Array, Array]]
 ) -> tuple[Array, Array, Array]:
-    """Return the loads on riders upwards, to the left and ahead at places of a train."""
+    """Return the loads on riders upwards, to the left and ahead at places of a train; ``potential`` is that of
+    `TrackOfTrain` at places.
+    """
     lam, v, ahead = (np.atleast_1d(row) for row in (state.lam, state.v, state.n_longitudinal))
     speeds, direction = (np.broadcast_to(row, places.shape).ravel() for row in (v * v, np.sign(v)))
     formulas, p, car_places = problem.formulas, problem.functions.p, places.ravel()
     upwards, sideways = rider_loads(formulas, p, car_places, speeds, direction, np.zeros(car_places.size))[:2]
     # The acceleration is that of the train; the component of the applied force along the track is that at the car.
-    chart = formulas.charted(problem.p)
-    slopes, slope = (track.potential(chart, values, at)[1] for at in (places, lam))
+    slopes, slope = (potential(at)[1] for at in (places, lam))
     felt = ahead + (slopes - slope) / STANDARD_GRAVITY
     return upwards.reshape(places.shape), sideways.reshape(places.shape), felt

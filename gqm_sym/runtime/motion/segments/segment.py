@@ -47,9 +47,9 @@ MAX_CORRECTION_SHARE = 2.0**-10
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
 
-# The slope of the time by the phase angle above which it has enough digits for a speed, as a share of its largest
-# value.
-MIN_TIME_SLOPE = 1e-6
+# The share of the largest speed below which the slopes of arc length and time by the phase angle have more digits of a
+# speed than V**2 in doubles.
+MAX_SLOW_SPEED = 0.3
 
 
 @dataclass(slots=True, kw_only=True)
@@ -338,7 +338,7 @@ class Segment:
 
     def speeds(self, phi: Array) -> Array:
         """Return |ds/dt| in m/s at phase angles."""
-        f, exact = self.functions, self.from_multiprecision
+        exact = self.from_multiprecision
         if self.v2 is not None and not exact:
             along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
@@ -346,19 +346,23 @@ class Segment:
             last, terms = self.speed_series
             smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
             return smooth * (last * (phi + self.turn_offset)) if self.kind == FROM_TURN else smooth
-        speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
+        speeds = self._speeds_in_doubles(phi)
         return self._improved_by_panels(phi, speeds) if exact else speeds * self.width_ratio
 
-    def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
-        """Return |ds/dt| from the slopes of arc length and time, which has digits even where V**2 in doubles is
-        rounding only.
+    def _speeds_in_doubles(self, phi: Array) -> Array:
+        f = self.functions
+        found: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
+        return found
 
-        Where the body is so fast that the time hardly grows, the slope of the time has fewer digits than V**2. At a
-        turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
+    def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
+        """Return |ds/dt|, where the body is slow from the slopes of arc length and time, which have digits even where
+        V**2 in doubles is rounding only.
+
+        At a turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
         """
+        limit = MAX_SLOW_SPEED * self._speeds_in_doubles(self.edges).max()
         lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
-        limit = MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
-        np.divide(lengths, times, out=speeds, where=times > limit)
+        np.divide(lengths, times, out=speeds, where=~(speeds > limit))
         return np.maximum(speeds, 0.0)
 
     def times(self, phi: Array) -> Array:

@@ -10,17 +10,20 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+from gqm_sym.runtime.sweep.batch.exact_ends import add_what_ends_lack, find_exact_ends, move_ends
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
     END_HIGH,
     END_LOW,
     FOUND,
+    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LANES,
@@ -32,6 +35,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ROWS,
     SEARCH_DIRECTION,
     SEARCH_LENGTH,
+    SEEKING,
     STATE,
     TIME_ROWS,
     TRIAL,
@@ -42,6 +46,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     borrowed_orbits,
     contains,
     gather,
+    is_careful,
     partition,
     shrink,
 )
@@ -51,6 +56,7 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
     prove,
     search,
     set_ends,
+    start_at_first_hill,
     start_search,
     start_search_behind,
 )
@@ -73,6 +79,7 @@ from gqm_sym.runtime.sweep.quantities import (
     UPPER_END,
     Answers,
 )
+from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
 
 # The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
 # pieces stand for the proofs that all orbits of a well share.
@@ -134,11 +141,41 @@ def fill_ends(orbits, kind, answers):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Prove orbits of one kind, and fill the answers for those that are proved; ``spare`` stores the others
+def answer_times(fns, kind, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Fill half periods, periods or loop times."""
+    if kind.kind == AGM_LIBRATION:
+        half_periods_by_agm(fns, orbits, scratch, quantity, answers)
+    else:
+        times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
+
+
+@Inner
+def answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Fill half periods or periods of orbits whose ends are found in double-double arithmetic.
+
+    ``moved`` stores the orbits with moved ends meanwhile.
+    """
+    n, count, lacks = orbits.size, scratch.param_count, scratch.ends
+    shares, indices, times = lacks[4, :n], lacks[5, :n], lacks[6, :n]
+    find_exact_ends(scratch.exact, count, orbits, lacks)
+    for j in range(n):
+        scratch.others[j] = j
+    gather(orbits, count, scratch.others, n, moved, TIME_ROWS)
+    others = Orbits(n, moved.rows, moved.params)
+    move_ends(n, others.rows, lacks, shares, indices)
+    answer_times(fns, kind, others, scratch, quantity, answers)
+    for j in range(n):
+        times[j] = answers.values[int(indices[j]), 0]
+    answer_times(fns, kind, orbits, scratch, quantity, answers)
+    add_what_ends_lack(n, shares, indices, times, answers)
+
+
+@Inner
+def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Prove orbits of one kind, and fill the answers for those that are proved; ``spares`` store the others and copies
     meanwhile.
     """
-    count = scratch.param_count
+    count, (spare, moved), careful = scratch.param_count, spares, is_careful(scratch)
     for pieces in (SHARED, FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         if pieces == SHARED and not kind.shared:
             continue
@@ -154,15 +191,15 @@ def answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers): 
                 prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
             proved, unproved = partition(rows[STATE, :n], scratch.chosen, scratch.others)
         waiting = gather(orbits, count, scratch.others, unproved, spare, ROWS)
-        orbits = shrink(orbits, count, scratch.chosen, proved, TIME_ROWS)
+        orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if careful else TIME_ROWS)
         if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
             answer_spans(orbits, kind.kind, quantity, answers)
         elif orbits.size:
             fill_ends(orbits, kind.kind, answers)
-            if kind.kind == AGM_LIBRATION:
-                half_periods_by_agm(fns, orbits, scratch, quantity, answers)
+            if careful and kind.kind != CIRCULATION:
+                answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers)
             else:
-                times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
+                answer_times(fns, kind, orbits, scratch, quantity, answers)
         if unproved == 0:
             return
         orbits, spare = Orbits(waiting, spare.rows, spare.params), orbits
@@ -178,12 +215,17 @@ def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ign
             fill_row(columns, DOMAIN_LOW + row, begin, number, domain[row, :n])
     index, place, v2 = rows[INDEX, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
     direction, rests, total = rows[SEARCH_DIRECTION, :n], rows[V2_REST, :n], scratch.work[0, :n]
+    places, places_low, halves_low = domain[3, :n], domain[4, :n], rows[HALF_REST, :n]
     rows[HALF_WIDTH, :n] = nan
     fill_row(columns, LAM0, begin, number, place)
     fill_row(columns, V0, begin, number, v2)
     fill_row(columns, DIRECTION, begin, number, direction)
     for j in range(n):
         rests[j] = fma(v2[j], v2[j], -(v2[j] * v2[j]))
+    for j in range(n):
+        distance, rounding = two_sum(place[j], -places[j])
+        _, lost = two_sum(distance, -places_low[j])
+        halves_low[j] = choose(v2[j] == 0.0, rounding + lost, 1.0)
     for j in range(n):
         index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
         v2[j] *= v2[j]
@@ -202,7 +244,7 @@ def find_orbits(fns, orbits, laps, domain, monotone, wells, scratch):  # type: i
 
     Circulations are copied to ``laps``. All other launches are dropped.
     """
-    count, lap_count = scratch.param_count, 0
+    count, lap_count, careful = scratch.param_count, 0, is_careful(scratch)
     for ahead in (True, False):
         n, rows = orbits.size, orbits.rows
         p = orbits.params[: count * n].reshape(count, n)
@@ -210,7 +252,9 @@ def find_orbits(fns, orbits, laps, domain, monotone, wells, scratch):  # type: i
             start_search(fns, n, rows, p, domain, monotone, wells, scratch.work)
         else:
             start_search_behind(fns, n, rows, p, monotone, scratch.work)
-        search(fns, n, rows, p, scratch.work)
+        if careful and contains(rows[STATE, :n], SEEKING):
+            start_at_first_hill(fns, n, rows, p, scratch.work)
+        search(fns, n, rows, p, careful, scratch.work)
         classify(n, rows)
         if ahead and contains(rows[TRIAL, :n], FOUND):
             lap_count, _ = partition(rows[TRIAL, :n], scratch.others, scratch.chosen)
@@ -248,18 +292,45 @@ def kind_of_librations(fns, orbits, monotone, wells):  # type: ignore[no-untyped
 
 
 @Inner
+def answer_librations(fns, orbits, buffers, monotone, wells, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Answer orbits about an axis of symmetry, other even orbits, and the rest, each by its own method, so that no
+    answer depends on the other orbits of a batch.
+    """
+    rest, spares = buffers
+    for even, about_axis in ((FOUND, FOUND), (FOUND, NOWHERE), (NOWHERE, NOWHERE)):
+        n, rows, count = orbits.size, orbits.rows, scratch.param_count
+        if n == 0:
+            return
+        wanted = scratch.work[0, :n]
+        for j in range(n):
+            axis = choose(rows[STATE, j] == FOUND, rows[TRIAL, j], NOWHERE)
+            wanted[j] = choose((rows[STATE, j] == even) & (axis == about_axis), FOUND, NOWHERE)
+        number, others = partition(wanted, scratch.chosen, scratch.others)
+        waiting = gather(orbits, count, scratch.others, others, rest, ROWS)
+        orbits = shrink(orbits, count, scratch.chosen, number, ROWS)
+        if number > 0:
+            kind = kind_of_librations(fns, orbits, monotone, wells)
+            answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers)
+        orbits, rest = Orbits(waiting, rest.rows, rest.params), orbits
+
+
+@Inner
 def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ignore[no-untyped-def]
     """Answer batch after batch; the first four arguments and the last but one are those of `answer_batches`.
 
     The buffers belong to the caller. Otherwise numba would count references to arrays at each call, by instructions
     that wait for memory.
     """
-    (first, spare, laps), scratch, domain, wells = buffers
+    (first, spare, laps, rest), scratch, domain, wells = buffers
     columns, domain = borrowed(columns), borrowed(domain)
     answers = Answers(borrowed(answers.values), borrowed(answers.status), borrowed(answers.route))
     first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
+    rest = borrowed_orbits(rest)
     chosen, others, work = borrowed(scratch.chosen), borrowed(scratch.others), borrowed(scratch.work)
-    scratch = Scratch(scratch.param_count, scratch.layout, chosen, others, work)
+    (address, operations, parts, registers), registers_of_places, p = scratch.exact
+    tape = address, borrowed(operations), parts, registers
+    exact = RecordedFormulas(tape, borrowed(registers_of_places), borrowed(p))
+    scratch = Scratch(scratch.param_count, scratch.layout, chosen, others, work, borrowed(scratch.ends), exact)
     wells = borrowed_wells(wells)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
@@ -267,25 +338,31 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
         load_launches(columns, begin, number, orbits, domain, scratch)
         if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
             kind = OrbitKind(fastest_method(fns), True, True, True, True)
-            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
+            answer_orbits(fns, kind, orbits, (spare, laps), wells, scratch, quantity, answers)
             continue
         orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
-        if orbits.size:
-            kind = kind_of_librations(fns, orbits, monotone, wells)
-            answer_orbits(fns, kind, orbits, spare, wells, scratch, quantity, answers)
         if lap_count:
             laps_found = Orbits(lap_count, laps.rows, laps.params)
             kind = OrbitKind(CIRCULATION, False, False, False, False)
-            answer_orbits(fns, kind, laps_found, spare, wells, scratch, quantity, answers)
+            answer_orbits(fns, kind, laps_found, (spare, laps), wells, scratch, quantity, answers)
+        answer_librations(fns, orbits, (rest, (spare, laps)), monotone, wells, scratch, quantity, answers)
 
 
 @entry(
     types.void(
-        *(BATCH_ADDRESSES, types.UniTuple(types.int64, 3), types.int64[:, ::1], types.boolean, types.int64, ANSWERS)
+        *(
+            BATCH_ADDRESSES,
+            types.UniTuple(types.int64, 3),
+            types.int64[:, ::1],
+            types.boolean,
+            types.int64,
+            EXACT,
+            ANSWERS,
+        )
     ),
     nogil=True,
 )
-def answer_batches(fns, layout, columns, monotone, quantity, answers):  # type: ignore[no-untyped-def]
+def answer_batches(fns, layout, columns, monotone, quantity, exact, answers):  # type: ignore[no-untyped-def]
     """Answer the launches that batches can answer; the others keep their status.
 
     Parameters
@@ -300,6 +377,9 @@ def answer_batches(fns, layout, columns, monotone, quantity, answers):  # type: 
         Whether V**2 is monotone between neighbouring axes of symmetry and ds vanishes nowhere.
     quantity : int
         HALF_PERIOD, PERIOD, TURNING_POINTS or SPANS.
+    exact : RecordedFormulas
+        The module's formulas as a tape for launches that batches left before; empty for others. With it the search for
+        turning points makes smaller steps, and they are found in double-double arithmetic for times.
     answers : Answers
         Filled in: the quantity, and beside times, if there are columns for them, both turning points.
     """
@@ -307,9 +387,10 @@ def answer_batches(fns, layout, columns, monotone, quantity, answers):  # type: 
     size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)))
+    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)), np.empty((7, BATCH)), exact)
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
-    buffers = (first, spare, laps), scratch, domain, wells_of(columns)
+    rest = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    buffers = (first, spare, laps, rest), scratch, domain, wells_of(columns)
     answer_all(fns, columns, monotone, quantity, answers, buffers)

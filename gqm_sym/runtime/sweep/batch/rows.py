@@ -20,6 +20,8 @@ END_LOW, END_HIGH    both ends as values of the curve's parameter               
 LAUNCH_PLACE         the launch place                                                     all
 LAUNCH_V2            V**2 at launch                                                       all
 HALF_WIDTH           half the orbit's width if a closed form gives it, otherwise NaN      time about axes
+HALF_REST            of a launch from rest, the rounding of the distance from the axis;   time about axes
+                     1 for others
 SEARCH_DIRECTION     the sign of the direction in which is searched; 0 for none           search
 SEARCH_LENGTH        how far the search goes at most                                      search
 LENGTH_BEHIND        how far it goes the other way; CLOSED on a closed curve              search
@@ -38,7 +40,7 @@ V2_REST              what rounding took from V**2 at launch                     
 The quadrature needs only the rows before TIME_ROWS.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,9 +54,9 @@ from gqm_sym.runtime.compiled.types import Array
 BATCH, LANES = 128, 8
 
 INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 17)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(17, 22)
-ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(22, 29)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 18)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(18, 23)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(23, 30)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
@@ -96,6 +98,10 @@ class Scratch(NamedTuple):
         Lists of columns.
     work : (13, BATCH) array
         Rows for intermediate results.
+    ends : (7, BATCH) array
+        Rows for orbits whose ends are found in double-double arithmetic.
+    exact : RecordedFormulas
+        The module's formulas as a tape, with which launches that batches left are tried again; empty at first.
     """
 
     param_count: int
@@ -103,12 +109,20 @@ class Scratch(NamedTuple):
     chosen: NDArray[np.int64]
     others: NDArray[np.int64]
     work: Array
+    ends: Array
+    exact: Any
 
 
 @Inner
 def borrowed_orbits(orbits):  # type: ignore[no-untyped-def]
     """Return the orbits with arrays whose references numba does not count."""
     return Orbits(orbits.size, borrowed(orbits.rows), borrowed(orbits.params))
+
+
+@Inner
+def is_careful(scratch):  # type: ignore[no-untyped-def]
+    """Return whether turning points are searched carefully and known in double-double arithmetic."""
+    return scratch.exact.work.size > 0
 
 
 @Inner

@@ -38,6 +38,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
+    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LAUNCH_PLACE,
@@ -48,6 +49,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     SUM,
     TIME_ROWS,
     VALUE,
+    is_careful,
     shrink,
 )
 from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
@@ -69,7 +71,10 @@ CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 # energy of a lap, do not matter: for librations from rest, one turning point of which is exact, for other librations,
 # and for laps. In even wells both turning points may be near a hilltop, so the factor at these is used, unless they are
 # exact, as those of a launch from rest are.
-MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.15, 0.25, 0.1, 0.5
+MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.25, 0.1, 0.5, 0.9
+
+# The same for all librations whose turning points are known to more digits than a double has.
+MIN_EXACT_RATIO = 0.03
 
 # The distance of an end from zero, in widths of the orbit, from which on its rounding counts.
 FAR = 2.0
@@ -100,9 +105,9 @@ def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-un
     roundings, slopes, offsets = work[2, :n], work[5, :n], work[9, :n]
     out, any_far = work[10:13].reshape(-1)[: 3 * n].reshape(3, n), False
     for j in range(n):
-        _, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
+        end, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
         far = fabs(ends[j]) > FAR * (offset_high[j] - offset_low[j])
-        roundings[j] = choose(far, rounding, 0.0)
+        roundings[j] = choose(far, (end - ends[j]) + rounding, 0.0)
         any_far |= far
     slopes[:] = 0.0
     if any_far:
@@ -219,16 +224,17 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
     """Set the mean of each orbit's integrand by a level of the rule, and the verdict on it.
 
-    ``ratios`` are the smallest ratios of factors that doubles permit, for a launch from rest and for another one.
+    ``ratios`` are the smallest ratios of factors that doubles permit, for a launch from rest, for another one, and at
+    turning points in even wells.
     """
-    from_rest, thrown = ratios
+    from_rest, thrown, at_turns = ratios
     for j in range(n):
         value, before = rows[SUM, j] / nodes, rows[CHANGE, j]
         change = fabs(value - rows[VALUE, j]) / value
         rows[VALUE, j], rows[CHANGE, j] = value, change
         high, at_turn = rows[FACTOR_HIGH, j], rows[FACTOR_AT_TURN, j]
         least = choose(rows[LAUNCH_V2, j] == 0.0, from_rest, thrown)
-        clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > MIN_EVEN_RATIO * high)
+        clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > at_turns * high)
         verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
 
 
@@ -289,6 +295,9 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
     from_rest = MIN_REST_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
+    ratios = from_rest, thrown, MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO
+    if is_careful(scratch):
+        ratios = MIN_EXACT_RATIO, MIN_LAP_RATIO if kind == CIRCULATION else MIN_EXACT_RATIO, 0.0
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
@@ -297,7 +306,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
             rates = fill_integrand_batch(fns, kind, n, node, rows, p, work)
             if mirrored and node == 0 and begin == 0:
                 for j in range(n):
-                    rows[FACTOR_AT_TURN, j] = choose(rows[LAUNCH_V2, j] == 0.0, inf, rows[FACTOR_LOW, j])
+                    rows[FACTOR_AT_TURN, j] = choose(fabs(rows[HALF_REST, j]) > 0.0, rows[FACTOR_LOW, j], inf)
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
@@ -310,7 +319,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
         for j in range(n):
             total, rounding = two_sum(rows[SUM, j], more[j])
             rows[SUM, j], rows[REST, j] = total, rows[REST, j] + (rounding - lost[j])
-        judge_level(rows, n, nodes, (from_rest, thrown), work[0, :n])
+        judge_level(rows, n, nodes, ratios, work[0, :n])
         if begin > 0:
             rests, times = work[1, :n], work[2, :n]
             relative_rests(orbits.params, -1 if kind == CIRCULATION else scratch.layout[2], rests)
@@ -329,12 +338,13 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
     p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
     pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]
-    rests = work[5, :n]
+    rests, known = work[5, :n], is_careful(scratch)
     fill_halves(n, rows, halves)
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]
-        least = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, MIN_EVEN_RATIO)
+        rounded = (fabs(rows[HALF_REST, j]) > 0.0) & (not known)
+        least = choose(rounded, MIN_AXIS_RATIO, MIN_CANCELLATION_RATIO)
         balanced = (b > least * a) & (a > least * b) & (a + b < inf)
         clear[j] = choose(balanced, 1.0, 0.0)
         pair[0, j], pair[1, j] = sqrt(a), sqrt(b)

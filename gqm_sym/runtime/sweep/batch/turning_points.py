@@ -1,17 +1,18 @@
 """The turning points of many orbits at once.
 
-They are computed by a closed form if there is one (`derivation.wells.symmetric_orbits`), which is proved symbolically.
-Otherwise they are approximated by Newton's method and then proved by interval bounds.
+They are known without a search (`known_turns`), or are approximated by Newton's method and then proved by interval
+bounds.
 """
 
 from math import fabs, inf, nan
 
-from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch, call_turning_point_batch
+from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of, fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.launch.ends import distance_to_axis
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CUSP_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
+from gqm_sym.runtime.sweep.batch.known_turns import by_closed_form, by_symmetry
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
     AXIS_NUMBER,
@@ -22,7 +23,6 @@ from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
     FOUND,
-    HALF_WIDTH,
     LAUNCH_PLACE,
     LAUNCH_V2,
     LENGTH_BEHIND,
@@ -39,108 +39,20 @@ from gqm_sym.runtime.sweep.batch.rows import (
     ZERO_BEHIND,
     contains,
 )
-from gqm_sym.runtime.sweep.batch.wells import find_proved, is_clear_of_axes
+from gqm_sym.runtime.sweep.batch.wells import is_clear_of_axes
 
 # The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
+
+# A careful search looks at so many places before its first trial, with distances in this ratio; and the largest growth
+# of the distance in a step that follows.
+SAMPLES, SAMPLE_RATIO, SMALL_GROWTH = 16, 1.25, 1.5
 
 # The largest distance of the middle of an orbit from the axis about which it is even, relative to the places.
 EVEN_TOLERANCE = 8.0 * 2.0**-52
 
 # The largest width of an orbit about one axis, in distances between axes; a wider one may reach the neighbouring axes.
 MAX_WIDTH = 1.999
-
-# The turning point is given by the square of a sine, which is 1 at a potential maximum. Within NEAR_MAXIMUM of 1 the
-# closed form is not used.
-NEAR_MAXIMUM = 1e-9
-
-
-@Inner
-def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
-    """Set both zeros, and the direction of bodies at rest, from the closed form of the width of the orbit in its well.
-
-    If that form does not apply, ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the
-    well, and SEEKING for all others. Each root of a thrown body is improved by a step of Newton's method, because its
-    roundings are those of the whole energy, and V**2 at launch may be much less. Unless V**2 is ``monotone`` between
-    axes for all parameters, launches in other periods are left to the search.
-    """
-    start, w0, direction, state, roundings = (
-        rows[LAUNCH_PLACE, :n],
-        rows[LAUNCH_V2, :n],
-        rows[SEARCH_DIRECTION, :n],
-        rows[STATE, :n],
-        rows[V2_REST, :n],
-    )
-    ahead, behind, axis = rows[ZERO, :n], rows[ZERO_BEHIND, :n], rows[AXIS_DISTANCE, :n]
-    places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
-    out, halves, offsets, thrown = (
-        work[:3].reshape(-1)[: 3 * n].reshape(3, n),
-        work[3, :n],
-        work[4, :n],
-        work[5, :n],
-    )
-    for j in range(n):
-        axis[j] = (start[j] - places[j]) - places_low[j]
-    call_turning_point_batch(fns.turning_point, n, axis, w0, p, out)
-    for j in range(n):
-        period, rests = 2.0 * steps[j], w0[j] == 0.0
-        periods = choose(period > 0.0, floor_of(axis[j] / period + 0.5), 0.0)
-        offsets[j] = fma(-periods, period, axis[j])
-        halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
-        ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
-        thrown[j] = choose((periods == 0.0) & (w0[j] > 0.0), 1.0, 0.0)
-    if contains(thrown, 1.0):
-        ends, away = work[7, :n], work[8, :n]
-        slopes = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
-        for j in range(n):
-            away[j] = ahead[j] * halves[j] - offsets[j]
-            ends[j] = start[j] + away[j]
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, ends, away, p, slopes)
-        for j in range(n):
-            left = fma(-2.0 * away[j], slopes[0, j], w0[j]) + roundings[j]
-            missed = ahead[j] * (left / (2.0 * slopes[2, j]))
-            halves[j] += choose(thrown[j] == 1.0, missed, 0.0)
-    widths = rows[HALF_WIDTH, :n]
-    for j in range(n):
-        offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
-        size, alone = fabs(offset), step == 0.0
-        well = (out[1, j] > 0.0) & (alone | (size < step)) & (monotone | (offset == axis[j]))
-        clear = is_clear_of_axes(size, start[j], places[j], step)
-        inside = choose(size > half, half, size)  # many periods away the offset has the larger rounding error
-        ascent = choose(sense * offset < 0.0, -inside, inside)
-        known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
-        ahead[j], behind[j] = choose(known_well, half - ascent, 0.0), choose(known_well, half + ascent, nan)
-        widths[j] = choose(known_well, half, nan)
-        direction[j] = choose(known_well, sense, direction[j])
-        axis[j] = -sense * offset
-        state[j] = choose(well & (out[2, j] > 1.0 + NEAR_MAXIMUM), NOWHERE, SEEKING)
-
-
-@Inner
-def by_symmetry(fns, n, rows, domain, wells, work):  # type: ignore[no-untyped-def]
-    """Set both zeros of bodies released at rest in a well that is proved to rise on both sides of its axis.
-
-    Such a body turns at its mirror image. For others ZERO_BEHIND stays NaN.
-    """
-    start, w0, places, places_low, steps = (
-        rows[LAUNCH_PLACE, :n],
-        rows[LAUNCH_V2, :n],
-        domain[3, :n],
-        domain[4, :n],
-        domain[5, :n],
-    )
-    offsets, distances, proved = work[0, :n], work[1, :n], work[2, :n]
-    for j in range(n):
-        offset, step = (start[j] - places[j]) - places_low[j], steps[j]
-        size = fabs(offset)
-        clear = is_clear_of_axes(size, start[j], places[j], step)
-        offsets[j], distances[j] = offset, choose(clear & (w0[j] == 0.0), size, nan)
-    find_proved(fns, wells.about_axis, distances, proved)
-    for j in range(n):
-        if proved[j] == FOUND:
-            size = distances[j]
-            rows[SEARCH_DIRECTION, j] = 1.0 if offsets[j] < 0.0 else -1.0
-            rows[ZERO, j], rows[ZERO_BEHIND, j], rows[AXIS_DISTANCE, j] = 2.0 * size, 0.0, size
 
 
 @Inner
@@ -277,11 +189,35 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
 
 
 @Inner
-def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
+def start_at_first_hill(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
+    """Let searches begin at the first of some places up to the first trial at which V**2 < 0, if there is one.
+
+    So they do not pass over hills, or over poles of the potential, that are not narrower than the distances between
+    these places.
+    """
+    offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    firsts, start, w0 = work[5, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
+    direction, trial, share = rows[SEARCH_DIRECTION, :n], rows[TRIAL, :n], SAMPLE_RATIO**-SAMPLES
+    firsts[:] = 0.0
+    for _ in range(SAMPLES):
+        for j in range(n):
+            offsets[j] = direction[j] * share * trial[j]
+            places[j] = start[j] + offsets[j]
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
+        for j in range(n):
+            is_first = (firsts[j] == 0.0) & (w0[j] - 2.0 * offsets[j] * out[0, j] < 0.0)
+            firsts[j] = choose(is_first, share * trial[j], firsts[j])
+        share *= SAMPLE_RATIO
+    for j in range(n):
+        trial[j] = choose(firsts[j] > 0.0, firsts[j], trial[j])
+
+
+@Inner
+def search(fns, n, rows, p, careful, work):  # type: ignore[no-untyped-def]
     """Approximate the distance of the first zero of V**2 from each launch, beginning at TRIAL.
 
     Newton's method is applied to V**2/distance, which does not vanish at a launch from rest. As long as no trial has
-    V**2 < 0, the next one is at most four times as far away.
+    V**2 < 0, the next one is at most four times as far away, and in a ``careful`` search one and a half times.
     """
     offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     start, w0, rests, direction, length = (
@@ -300,6 +236,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
     )
     if not contains(state, SEEKING):
         return
+    growth, step = (SMALL_GROWTH, SMALL_GROWTH) if careful else (4.0, 2.0)
     for j in range(n):
         bracket_low[j], bracket_high[j] = 0.0, inf
     for _ in range(MAX_TRIALS):
@@ -314,8 +251,8 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
             better = guess + guess * (w / (2.0 * offsets[j] * out[2, j] + w))
             close = fabs(better - guess) <= LAST_STEP * guess
             bracketed = high < inf
-            within = (better > low) & (better < choose(bracketed, high, 4.0 * guess))
-            new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * guess))
+            within = (better > low) & (better < choose(bracketed, high, growth * guess))
+            new = choose(within, better, choose(bracketed, 0.5 * (low + high), step * guess))
             new = choose(new > length[j], length[j], new)
             lost = (w != w) | (before & (guess >= length[j]))
             live = state[j] == SEEKING

@@ -37,7 +37,8 @@ from gqm_sym.runtime.gradients.lanes.arrivals.programs import SQUARE
 from gqm_sym.runtime.gradients.lanes.arrivals.weights import FLIP, LAUNCH_SIGN, PLACE_SIGN, ROWS
 from gqm_sym.runtime.gradients.lanes.evaluation import WIDTH, fill_inputs, rows_of
 from gqm_sym.runtime.gradients.lanes.pairs import fill_ends
-from gqm_sym.runtime.gradients.panels import fill_shares
+from gqm_sym.runtime.gradients.panels import shares_on
+from gqm_sym.runtime.gradients.passages.arrival import counts_from_upper
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The numbers of panels with Gauss's rule that are tried in turn, and the largest change of an integral by the last
@@ -52,9 +53,8 @@ def gauss_nodes() -> Array:
     """Return the nodes of all numbers of panels: shares as two doubles, and weights."""
     parts = []
     for count in PANELS:
-        panels, shares = np.empty((count, 2)), np.empty((2, count * RULE))
-        panels[:, 0], panels[:, 1] = np.pi * np.arange(count) / count, np.pi / count
-        fill_shares(LIBRATION, panels, panel_rule(), shares)
+        edges = np.pi * np.arange(count + 1) / count
+        shares = shares_on(LIBRATION, edges[:-1], edges[1:])
         parts.append(np.vstack([shares, np.tile(panel_rule()[2] * (np.pi / count), count)]))
     found: Array = np.ascontiguousarray(np.hstack(parts))
     return found
@@ -62,10 +62,7 @@ def gauss_nodes() -> Array:
 
 @Inner
 def choose_ends(asked, v0, kept, shape, lanes, state, ends):  # type: ignore[no-untyped-def]
-    """Choose the turning points from which times are counted, and fill the signs of both times.
-
-    A launch at rest is one of the turning points. The way may turn at one; else that is taken which moves less, or is
-    nearer.
+    """Choose the turning points from which times are counted (`counts_from_upper`), and fill the signs of both times.
 
     Parameters
     ----------
@@ -92,11 +89,7 @@ def choose_ends(asked, v0, kept, shape, lanes, state, ends):  # type: ignore[no-
         for j in range(wanted):
             lower += fabs(kept[(first + 2 + j) * ROW + i])
             upper += fabs(kept[(first + 2 + wanted + j) * ROW + i])
-        is_upper = upper * (above[i] - min(lam0, place)) < lower * (max(lam0, place) - below[i])
-        if rests:
-            is_upper = above[i] - lam0 < lam0 - below[i]
-        elif has_turned:
-            is_upper = upwards
+        is_upper = counts_from_upper(lam0, direction, rests, place, (below[i], above[i]), (lower, upper))
         towards = is_upper == upwards
         ends[i], state[FLIP, i] = 1.0 if is_upper else 0.0, -1.0 if is_upper else 1.0
         state[LAUNCH_SIGN, i] = 1.0 if towards else -1.0

@@ -1,0 +1,86 @@
+"""Launches that batches leave at first are tried again with turning points in double-double arithmetic."""
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+ModuleOf = Callable[[str], ModuleType]
+
+# The largest error of a half period in units in the last place, and the largest share of errors above two of them.
+MAX_ERROR, MAX_SHARE = 3.1, 0.01
+
+
+def test_thrown_towards_the_rim(module_of: ModuleOf) -> None:
+    """The half period of a pendulum that is thrown towards the top follows from its energy to the last places."""
+    rng = np.random.default_rng(4)
+    reach, share = rng.uniform(2.0, 3.05, 300), rng.uniform(-0.99, 0.99, 300)
+    place = share * reach
+    v0 = np.sqrt(2 * 9.81 * (np.cos(place) - np.cos(reach)))
+    swept = module_of("circle").sweep("half_period", place, v0, L=1, g=9.81)
+    assert swept.route_counts() == {"batch": 300}
+    errors = []
+    for value, lam0, speed in zip(swept.values.tolist(), place.tolist(), v0.tolist(), strict=True):
+        with mp.workdps(40):
+            m = mp.sin(mpf(lam0) / 2) ** 2 + mpf(speed) ** 2 / (4 * mpf(9.81))
+            truth = 2 * mp.ellipk(m) / mp.sqrt(mpf(9.81))
+            errors.append(abs(float((mpf(value) - truth) / mpf(float(np.spacing(float(truth)))))))
+    assert max(errors) <= MAX_ERROR
+    assert np.mean(np.array(errors) > 2.0) <= MAX_SHARE
+
+
+@pytest.fixture(scope="module")
+def spiral(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """Return the module of a hyperbolic spiral."""
+    curve, folder = gqm.Curve.polar("5/th", parameter="th"), tmp_path_factory.mktemp("spirals")
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="hyperbolic_spiral", folder=folder)
+
+
+def true_orbit(lam0: mpf, v0: mpf, near: list[float]) -> tuple[float, list[float]]:
+    """Return half period and turning points of a motion on the spiral from their definitions; ``near`` are estimates of
+    the latter.
+    """
+    with mp.workdps(40):
+        level = 5 * mp.sin(lam0) / lam0 + v0**2 / (2 * mpf(9.81))
+        low, high = (mp.findroot(lambda th: 5 * mp.sin(th) / th - level, mpf(end)) for end in near)
+        middle, half = (low + high) / 2, (high - low) / 2
+
+        def rate(u: mpf) -> mpf:
+            th = middle + half * mp.sin(u)
+            speed = mp.sqrt(2 * mpf(9.81) * (level - 5 * mp.sin(th) / th))
+            return 5 * mp.sqrt(1 + th**2) / th**2 * half * mp.cos(u) / speed
+
+        edges = mp.linspace(-mp.pi / 2, mp.pi / 2, 5)
+        return float(mp.quad(rate, edges, method="gauss-legendre")), [float(low), float(high)]
+
+
+@pytest.mark.parametrize("v0", [0.0, 1.5])
+def test_wells_between_hills(v0: float, spiral: ModuleType) -> None:
+    """On a spiral with an axis of symmetry that is wells away, orbits turn at the first hill, not at the mirror
+    image.
+    """
+    lam0 = 10.9 + np.linspace(0.3, 1.5, 20)
+    swept = spiral.sweep("half_period", lam0, v0, -1, g=9.81)
+    assert swept.route_counts() == {"batch": 20}
+    ends = spiral.sweep("turning_points", lam0, v0, -1, g=9.81)
+    assert ends.route_counts() == {"batch": 20}
+    for k in (0, 10, 19):
+        half_period, turns = true_orbit(mpf(lam0[k]), mpf(v0), ends.values[k].tolist())
+        assert turns == pytest.approx(ends.values[k].tolist(), rel=4e-16)
+        assert swept.values[k] == pytest.approx(half_period, abs=MAX_ERROR * np.spacing(half_period))
+
+
+def test_no_answer_depends_on_the_other_launches(module_of: ModuleOf) -> None:
+    """A launch has the same half period alone, with orbits beside the top in its batch, and with orbits elsewhere."""
+    places = np.concatenate([np.linspace(-1.5, 2.0, 12), np.full(4, np.pi - 1e-5)])
+    v0 = np.concatenate([np.sqrt(2 * 9.81 * (np.cos(places[:12]) + 0.999)), np.zeros(4)])
+    circle = module_of("circle")
+    together = circle.sweep("half_period", places, v0, L=1).values
+    alone = [
+        circle.sweep("half_period", lam0, speed, L=1).values.item() for lam0, speed in zip(places, v0, strict=True)
+    ]
+    assert together.tolist() == alone
