@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 17, input 38113942f710, body 32155ed77ed2
+# interface 18, input 38113942f710, body 8e338ad80ea6
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=17)
+compiled = compiler(__file__, interface=18)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 17, input b87305fcd75e, body c52d9201e4c7
+# interface 18, input b87305fcd75e, body 1d7aef523de8
 """A train of five cars on hills
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=17)
+compiled = compiler(__file__, interface=18)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,

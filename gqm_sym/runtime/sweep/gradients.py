@@ -89,7 +89,7 @@ def sweep_with_gradient(
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
         route[k] = SOLVE
         with suppress(GQMError):
-            by = motion.known_gradient(quantity, tuple(rows), None if lam is None else place)
+            by = motion._known_gradient(quantity, tuple(rows), None if lam is None else place)
             by_name = np.stack(list(by.values()), axis=-1)
             falls = quantity == "turning_points" and motion.turning_points[0] > motion.turning_points[1]
             gradient[k] = by_name[::-1] if falls else by_name

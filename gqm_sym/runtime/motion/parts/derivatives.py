@@ -61,12 +61,12 @@ class Derivatives(Positions):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
-        found = self.known_gradient(quantity, wrt, lam)
+        found = self._known_gradient(quantity, wrt, lam)
         if self.problem.formulas.chart is not None:
             self._check_known(f"gradient of {quantity}", found, found.values())
         return found
 
-    def known_gradient(self, quantity: str, wrt: Any, lam: Any = None) -> dict[str, Any]:
+    def _known_gradient(self, quantity: str, wrt: Any, lam: Any = None) -> dict[str, Any]:
         """Return `gradient`, with NaN for names with respect to which there is no derivative although others exist.
 
         Parameters
