@@ -47,9 +47,10 @@ MAX_CORRECTION_SHARE = 2.0**-10
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
 
-# The share of the largest speed below which the slopes of arc length and time by the phase angle have more digits of a
-# speed than V**2 in doubles.
-MAX_SLOW_SPEED = 0.3
+# The slopes of arc length and time by the phase angle have more digits of a speed than V**2 in doubles where the slope
+# of the time is above this share of its largest value, and where the speed is below that share of its largest value.
+# Beside a hilltop the slope of the time is so large that other places, where the body is slow too, are below the first.
+MIN_TIME_SLOPE, MAX_SLOW_SPEED = 1e-6, 0.3
 
 
 @dataclass(slots=True, kw_only=True)
@@ -355,14 +356,16 @@ class Segment:
         return found
 
     def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
-        """Return |ds/dt|, where the body is slow from the slopes of arc length and time, which have digits even where
-        V**2 in doubles is rounding only.
+        """Return |ds/dt| from the slopes of arc length and time, which has digits even where V**2 in doubles is
+        rounding only.
 
-        At a turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
+        Where the body is so fast that the time hardly grows, the slope of the time has fewer digits than V**2. At a
+        turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
         """
-        limit = MAX_SLOW_SPEED * self._speeds_in_doubles(self.edges).max()
         lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
-        np.divide(lengths, times, out=speeds, where=~(speeds > limit))
+        grows = times > MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
+        is_slow = ~(speeds > MAX_SLOW_SPEED * self._speeds_in_doubles(self.edges).max())
+        np.divide(lengths, times, out=speeds, where=grows | is_slow)
         return np.maximum(speeds, 0.0)
 
     def times(self, phi: Array) -> Array:
