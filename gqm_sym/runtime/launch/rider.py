@@ -97,7 +97,7 @@ def fill_rider_loads(address, given, rows, part, past_cache):  # type: ignore[no
 def _has_signs(directions, forces, i, v, nu):  # type: ignore[no-untyped-def]
     """Return whether the direction of the motion and the sign of the contact force at a place are these."""
     direction = directions[i if directions.size > 1 else 0]
-    return direction == v and (nu < 0.0) == (forces.size > 0 and forces[i if forces.size else 0] < 0.0)
+    return direction == v and (nu < 0.0) == (forces.size > 0 and forces[i] < 0.0)
 
 
 def check_banked(formulas: "Formulas", asked: str) -> None:

@@ -62,8 +62,7 @@ class Derivatives(Positions):
         if order == 2:
             return self._second_gradient(quantity, wrt)
         found = self._known_gradient(quantity, wrt, lam)
-        if self.problem.formulas.chart is not None:
-            self._check_known(f"gradient of {quantity}", found, found.values())
+        self._check_known(f"gradient of {quantity}", found, found.values())
         return found
 
     def _known_gradient(self, quantity: str, wrt: Any, lam: Any = None) -> dict[str, Any]:
