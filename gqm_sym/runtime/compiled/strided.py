@@ -2,8 +2,8 @@
 stands for all launches.
 
 Their order is that of the constants below: the launch (place, speed, direction); the target of ``time_at``; both ends
-of the curve's domain and its period; an axis of symmetry as two doubles (NaN if there is none that can be used) and the
-distance to the next one; and the run-time parameters.
+of the curve's domain and its period; an axis of symmetry (NaN if there is none that can be used) and the distance
+to the next one, each as two doubles; and the run-time parameters.
 """
 
 from ctypes import c_double
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.uncompiled import in_python
 
-LAM0, V0, DIRECTION, TARGET, DOMAIN_LOW, DOMAIN_HIGH, DOMAIN_PERIOD, AXIS, PLACE_LOW, AXIS_STEP, PARAMETERS = range(11)
+LAM0, V0, DIRECTION, TARGET, DOMAIN_LOW, DOMAIN_HIGH, DOMAIN_PERIOD, AXIS, PLACE_LOW, AXIS_STEP = range(10)
+AXIS_STEP_LOW, PARAMETERS = range(10, 12)
 
 
 def widen(column: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -106,23 +106,31 @@ def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
     if formulas.chart is not None:
         return
     place, step = formulas.axes(ARRAYS, tuple(p))
-    found = (*formulas.ends(ARRAYS, tuple(p)), place, _rounding_of_axis(formulas, place, p), step)
-    for value, default in zip(found, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
+    place_low, step_low = _roundings_of_axes(formulas, place, step, p)
+    found = (*formulas.ends(ARRAYS, tuple(p)), place, place_low, step, step_low)
+    for value, default in zip(found, (-inf, inf, 0.0, nan, nan, 0.0, 0.0), strict=True):
         yield np.asarray(default if value is None else value, dtype=np.float64)
 
 
-def _rounding_of_axis(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
-    """Return the difference between the axis of symmetry and its nearest double, if the axis is the same for all
-    launches.
+def _roundings_of_axes(
+    formulas: "Formulas", place: Any, step: Any, p: list[Array]
+) -> tuple[float | None, float | None]:
+    """Return what rounding took from the axis of symmetry and from the distance to the next one, if both are the same
+    for all launches; of the latter None also if there is no next one.
     """
-    if place is None or np.ndim(place) or not all(column.size for column in p):
-        return None
-    return _rounding_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))
+    if place is None or np.ndim(place) or np.ndim(step) or not all(column.size for column in p):
+        return None, None
+    values = tuple(float(column.flat[0]) for column in p)
+    return _roundings_of(formulas.axes, float(place), None if step is None else float(step), values)
 
 
 @lru_cache(maxsize=256)
-def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ...]) -> float:
+def _roundings_of(
+    axes: Callable[..., Any], place: float, step: float | None, values: tuple[float, ...]
+) -> tuple[float, float | None]:
     from mpmath import mp
 
     with mp.workdps(40):
-        return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
+        exact_place, exact_step = axes(mp, tuple(map(mp.mpf, values)))
+        place_low = float(mp.mpf(exact_place) - mp.mpf(place))
+        return place_low, None if step is None else float(mp.mpf(exact_step) - mp.mpf(step))

@@ -95,7 +95,7 @@ def groups_of(
             chart = chart_with(formulas.chart, values)
         except GQMError:
             continue  # `solve` reports the reason
-        domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
+        domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0, 0.0)]
         table = NO_TABLE
         if not formulas.dissipation:
             radius = dict(zip(formulas.parameters, values, strict=False)).get(formulas.rolling_radius, 0.0)

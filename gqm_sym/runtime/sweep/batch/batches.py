@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
@@ -18,12 +17,12 @@ from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAME
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 from gqm_sym.runtime.sweep.batch.exact_ends import add_what_ends_lack, find_exact_ends, move_ends
+from gqm_sym.runtime.sweep.batch.known_turns import fill_axis_offsets
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
     END_HIGH,
     END_LOW,
     FOUND,
-    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LANES,
@@ -206,7 +205,7 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
 
 
 @Inner
-def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ignore[no-untyped-def]
+def load_launches(columns, begin, number, orbits, domain, monotone, scratch):  # type: ignore[no-untyped-def]
     """Copy ``number`` launches into a batch; SEARCH_DIRECTION is 0 for those that are not finite."""
     n, rows, count = orbits.size, orbits.rows, scratch.param_count
     p = orbits.params[: count * n].reshape(count, n)
@@ -215,17 +214,13 @@ def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ign
             fill_row(columns, DOMAIN_LOW + row, begin, number, domain[row, :n])
     index, place, v2 = rows[INDEX, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
     direction, rests, total = rows[SEARCH_DIRECTION, :n], rows[V2_REST, :n], scratch.work[0, :n]
-    places, places_low, halves_low = domain[3, :n], domain[4, :n], rows[HALF_REST, :n]
     rows[HALF_WIDTH, :n] = nan
     fill_row(columns, LAM0, begin, number, place)
     fill_row(columns, V0, begin, number, v2)
     fill_row(columns, DIRECTION, begin, number, direction)
     for j in range(n):
         rests[j] = fma(v2[j], v2[j], -(v2[j] * v2[j]))
-    for j in range(n):
-        distance, rounding = two_sum(place[j], -places[j])
-        _, lost = two_sum(distance, -places_low[j])
-        halves_low[j] = choose(v2[j] == 0.0, rounding + lost, 1.0)
+    fill_axis_offsets(n, rows, domain, monotone)
     for j in range(n):
         index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
         v2[j] *= v2[j]
@@ -305,12 +300,13 @@ def answer_librations(fns, orbits, buffers, monotone, wells, scratch, quantity, 
         for j in range(n):
             axis = choose(rows[STATE, j] == FOUND, rows[TRIAL, j], NOWHERE)
             wanted[j] = choose((rows[STATE, j] == even) & (axis == about_axis), FOUND, NOWHERE)
+        if not contains(wanted, FOUND):
+            continue
         number, others = partition(wanted, scratch.chosen, scratch.others)
         waiting = gather(orbits, count, scratch.others, others, rest, ROWS)
         orbits = shrink(orbits, count, scratch.chosen, number, ROWS)
-        if number > 0:
-            kind = kind_of_librations(fns, orbits, monotone, wells)
-            answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers)
+        kind = kind_of_librations(fns, orbits, monotone, wells)
+        answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers)
         orbits, rest = Orbits(waiting, rest.rows, rest.params), orbits
 
 
@@ -335,7 +331,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
         orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
-        load_launches(columns, begin, number, orbits, domain, scratch)
+        load_launches(columns, begin, number, orbits, domain, monotone, scratch)
         if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
             kind = OrbitKind(fastest_method(fns), True, True, True, True)
             answer_orbits(fns, kind, orbits, (spare, laps), wells, scratch, quantity, answers)

@@ -6,11 +6,13 @@ rest and turns at its mirror image.
 
 from math import fabs, nan
 
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.calls import call_potential_divdiff1_batch, call_turning_point_batch
 from gqm_sym.runtime.compiled.intrinsics import choose, floor_of, fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
+    AXIS_OFFSET,
     FOUND,
     HALF_WIDTH,
     LAUNCH_PLACE,
@@ -32,13 +34,36 @@ NEAR_MAXIMUM = 1e-9
 
 
 @Inner
-def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
+def fill_axis_offsets(n, rows, domain, monotone):  # type: ignore[no-untyped-def]
+    """Fill the offsets of launches from the axis of symmetry in their own period.
+
+    In other periods than that of the known axis they are NaN unless V**2 is ``monotone`` between axes. There, what
+    rounding takes from the place may be many roundings of the offset. ``domain`` has the rows DOMAIN_LOW to
+    AXIS_STEP_LOW of `strided`.
+    """
+    start, offsets, any_other = rows[LAUNCH_PLACE, :n], rows[AXIS_OFFSET, :n], False
+    places, places_low, steps, steps_low = domain[3, :n], domain[4, :n], domain[5, :n], domain[6, :n]
+    for j in range(n):
+        offsets[j] = (start[j] - places[j]) - places_low[j]
+        any_other |= (steps[j] > 0.0) & (fabs(offsets[j]) > steps[j])
+    if any_other:
+        for j in range(n):
+            distance, rounding = two_sum(start[j], -places[j])
+            distance, lost = two_sum(distance, -places_low[j])
+            period = 2.0 * steps[j]
+            periods = choose(period > 0.0, floor_of(distance / period + 0.5), 0.0)
+            lacking = (rounding + lost) - periods * (2.0 * steps_low[j])
+            offset = fma(-periods, period, distance) + lacking
+            offsets[j] = choose(monotone | (periods == 0.0), offset, nan)
+
+
+@Inner
+def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-def]
     """Set both zeros, and the direction of bodies at rest, from the closed form of the width of the orbit in its well.
 
     If that form does not apply, ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the
     well, and SEEKING for all others. Each root of a thrown body is improved by a step of Newton's method, because its
-    roundings are those of the whole energy, and V**2 at launch may be much less. Unless V**2 is ``monotone`` between
-    axes for all parameters, launches in other periods are left to the search.
+    roundings are those of the whole energy, and V**2 at launch may be much less.
     """
     start, w0, direction, state, roundings = (
         rows[LAUNCH_PLACE, :n],
@@ -48,23 +73,14 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
         rows[V2_REST, :n],
     )
     ahead, behind, axis = rows[ZERO, :n], rows[ZERO_BEHIND, :n], rows[AXIS_DISTANCE, :n]
-    places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
-    out, halves, offsets, thrown = (
-        work[:3].reshape(-1)[: 3 * n].reshape(3, n),
-        work[3, :n],
-        work[4, :n],
-        work[5, :n],
-    )
+    places, steps, offsets = domain[3, :n], domain[5, :n], rows[AXIS_OFFSET, :n]
+    out, halves, thrown = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[5, :n]
+    call_turning_point_batch(fns.turning_point, n, offsets, w0, p, out)
     for j in range(n):
-        axis[j] = (start[j] - places[j]) - places_low[j]
-    call_turning_point_batch(fns.turning_point, n, axis, w0, p, out)
-    for j in range(n):
-        period, rests = 2.0 * steps[j], w0[j] == 0.0
-        periods = choose(period > 0.0, floor_of(axis[j] / period + 0.5), 0.0)
-        offsets[j] = fma(-periods, period, axis[j])
-        halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
+        rests = w0[j] == 0.0
+        halves[j] = choose(rests, fabs(offsets[j]), out[0, j])
         ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
-        thrown[j] = choose((periods == 0.0) & (w0[j] > 0.0), 1.0, 0.0)
+        thrown[j] = choose((offsets[j] == offsets[j]) & (w0[j] > 0.0), 1.0, 0.0)
     if contains(thrown, 1.0):
         ends, away = work[7, :n], work[8, :n]
         slopes = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
@@ -80,7 +96,7 @@ def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-
     for j in range(n):
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
-        well = (out[1, j] > 0.0) & (alone | (size < step)) & (monotone | (offset == axis[j]))
+        well = (out[1, j] > 0.0) & (alone | (size < step))
         clear = is_clear_of_axes(size, start[j], places[j], step)
         inside = choose(size > half, half, size)  # many periods away the offset has the larger rounding error
         ascent = choose(sense * offset < 0.0, -inside, inside)
@@ -98,19 +114,12 @@ def by_symmetry(fns, n, rows, domain, wells, work):  # type: ignore[no-untyped-d
 
     Such a body turns at its mirror image. For others ZERO_BEHIND stays NaN.
     """
-    start, w0, places, places_low, steps = (
-        rows[LAUNCH_PLACE, :n],
-        rows[LAUNCH_V2, :n],
-        domain[3, :n],
-        domain[4, :n],
-        domain[5, :n],
-    )
-    offsets, distances, proved = work[0, :n], work[1, :n], work[2, :n]
+    start, w0, places, steps = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], domain[3, :n], domain[5, :n]
+    offsets, distances, proved = rows[AXIS_OFFSET, :n], work[1, :n], work[2, :n]
     for j in range(n):
-        offset, step = (start[j] - places[j]) - places_low[j], steps[j]
-        size = fabs(offset)
-        clear = is_clear_of_axes(size, start[j], places[j], step)
-        offsets[j], distances[j] = offset, choose(clear & (w0[j] == 0.0), size, nan)
+        size = fabs(offsets[j])
+        clear = is_clear_of_axes(size, start[j], places[j], steps[j])
+        distances[j] = choose(clear & (w0[j] == 0.0), size, nan)
     find_proved(fns, wells.about_axis, distances, proved)
     for j in range(n):
         if proved[j] == FOUND:

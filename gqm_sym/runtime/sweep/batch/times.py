@@ -38,7 +38,6 @@ from gqm_sym.runtime.sweep.batch.rows import (
     FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
-    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LAUNCH_PLACE,
@@ -306,7 +305,10 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
             rates = fill_integrand_batch(fns, kind, n, node, rows, p, work)
             if mirrored and node == 0 and begin == 0:
                 for j in range(n):
-                    rows[FACTOR_AT_TURN, j] = choose(fabs(rows[HALF_REST, j]) > 0.0, rows[FACTOR_LOW, j], inf)
+                    rest, offset = rows[LAUNCH_V2, j] == 0.0, rows[OFFSET_LOW, j] + rows[OFFSET_HIGH, j]
+                    _, rounding = two_sum(rows[LAUNCH_PLACE, j], offset)
+                    exact = rest & ((kind == AXIS_LIBRATION) | (rounding == 0.0))
+                    rows[FACTOR_AT_TURN, j] = choose(exact, inf, rows[FACTOR_LOW, j])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
@@ -338,13 +340,12 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
     p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
     pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]
-    rests, known = work[5, :n], is_careful(scratch)
+    rests, from_thrown = work[5, :n], MIN_CANCELLATION_RATIO if is_careful(scratch) else MIN_AXIS_RATIO
     fill_halves(n, rows, halves)
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]
-        rounded = (fabs(rows[HALF_REST, j]) > 0.0) & (not known)
-        least = choose(rounded, MIN_AXIS_RATIO, MIN_CANCELLATION_RATIO)
+        least = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, from_thrown)
         balanced = (b > least * a) & (a > least * b) & (a + b < inf)
         clear[j] = choose(balanced, 1.0, 0.0)
         pair[0, j], pair[1, j] = sqrt(a), sqrt(b)

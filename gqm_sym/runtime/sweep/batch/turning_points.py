@@ -16,6 +16,7 @@ from gqm_sym.runtime.sweep.batch.known_turns import by_closed_form, by_symmetry
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
     AXIS_NUMBER,
+    AXIS_OFFSET,
     AXIS_SPACING,
     BRACKET_HIGH,
     BRACKET_LOW,
@@ -23,6 +24,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
     FOUND,
+    HALF_WIDTH,
     LAUNCH_PLACE,
     LAUNCH_V2,
     LENGTH_BEHIND,
@@ -85,8 +87,8 @@ def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
 def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead of each launch. A body at rest starts in the direction of the force.
 
-    ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of `strided`. If V**2 is ``monotone`` between axes, a body released
-    at rest turns at its mirror image, and no search is needed.
+    ``domain`` has the rows DOMAIN_LOW to AXIS_STEP_LOW of `strided`. If V**2 is ``monotone`` between axes, a body
+    released at rest turns at its mirror image, and no search is needed.
     """
     start, w0, direction, state = (
         rows[LAUNCH_PLACE, :n],
@@ -96,7 +98,7 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
     )
     length, length_behind, trial = rows[SEARCH_LENGTH, :n], rows[LENGTH_BEHIND, :n], rows[TRIAL, :n]
     lows, highs, periods = domain[0, :n], domain[1, :n], domain[2, :n]
-    places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
+    places, steps, offsets = domain[3, :n], domain[5, :n], rows[AXIS_OFFSET, :n]
     axis, next_axis, number, zero, behind = (
         rows[AXIS_DISTANCE, :n],
         rows[AXIS_SPACING, :n],
@@ -105,7 +107,7 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         rows[ZERO_BEHIND, :n],
     )
     if fns.turning_point:
-        by_closed_form(fns, n, rows, p, domain, monotone, work)
+        by_closed_form(fns, n, rows, p, domain, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
         if wells.about_axis.proofs.size > 0 and not monotone:
@@ -128,11 +130,11 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         trial[j] = choose(closed, 0.125 * period, choose(extent < inf, 0.125 * extent, 1.0))
         state[j] = choose((direction[j] != 0.0) & (low <= start[j]) & (start[j] <= high), state[j], NOWHERE)
     for j in range(n):
-        step, low, itself = steps[j], places_low[j], direction[j] * (places[j] - start[j])
+        step, itself, ahead = steps[j], direction[j] * (places[j] - start[j]), -direction[j] * offsets[j]
         first = distance_to_axis(start[j], direction[j], places[j], step)
         passed = floor_of((first - itself) / step + 0.5)  # steps from the known axis to the first ahead
-        known_well = monotone & (low == low) & (first == itself)  # axes have the rounding of steps
-        first += choose(known_well, direction[j] * low, 0.0)
+        known_well = monotone & (ahead > 0.0)  # of other axes the distance has the rounding of the place
+        first = choose(known_well, ahead, first)
         # A body released at rest moves towards the axis and turns on the other side of it.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < length[j], mirrored, length[j])
@@ -299,6 +301,7 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         rows[STATE, :n],
         rows[TRIAL, :n],
     )
+    w0, offsets, widths = rows[LAUNCH_V2, :n], rows[AXIS_OFFSET, :n], rows[HALF_WIDTH, :n]
     for j in range(n):
         first, second = a[j], direction[j] * zero[j]
         missed = fabs(0.5 * (first + second) - axis[j])
@@ -306,6 +309,10 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         known = number[j] == 2.0 * floor_of(0.5 * number[j])
         between = (step[j] == 0.0) | ((fabs(first - second) < MAX_WIDTH * step[j]) & known)
         state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
+        # From rest half the width is the distance from the axis, to more digits than a search gives.
+        half, width = fabs(offsets[j]), fabs(first - second)
+        mirrored = (w0[j] == 0.0) & even & between & (fabs(2.0 * half - width) <= EVEN_TOLERANCE * width)
+        widths[j] = choose(mirrored, half, widths[j])
     for j in range(n):
         first, second = a[j], direction[j] * zero[j]
         offset_low[j], offset_high[j] = choose(first < second, first, second), choose(first < second, second, first)

@@ -21,6 +21,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS
 from gqm_sym.runtime.launch.zeros import CUSP_SHARE
 from gqm_sym.runtime.sweep.batch.rows import (
+    AXIS_OFFSET,
     END_HIGH,
     END_LOW,
     FOUND,
@@ -254,18 +255,17 @@ def set_ends_from_rest(fns, n, rows, domain, monotone, wells, work):  # type: ig
     """Set both ends of all orbits if each body is released at rest in a well that is proved to rise on both sides of
     its axis; return whether this is so.
 
-    Such a body turns at its mirror image, so no zero is searched. ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of
-    `strided`. If V**2 is ``monotone`` between axes, it is enough that the potential rises half way to the next axis.
+    Such a body turns at its mirror image, so no zero is searched. ``domain`` has the rows DOMAIN_LOW to AXIS_STEP_LOW
+    of `strided`. If V**2 is ``monotone`` between axes, it is enough that the potential rises half way to the next axis.
     """
     if wells.about_axis.proofs.size == 0:
         return False
     start, w0, direction = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[SEARCH_DIRECTION, :n]
     low, high, a, b = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[END_LOW, :n], rows[END_HIGH, :n]
     firsts, lasts, periods = domain[0, :n], domain[1, :n], domain[2, :n]
-    places, places_low, steps, distances = domain[3, :n], domain[4, :n], domain[5, :n], work[0, :n]
+    places, steps, offsets, distances = domain[3, :n], domain[5, :n], rows[AXIS_OFFSET, :n], work[0, :n]
     for j in range(n):
-        offset = (start[j] - places[j]) - places_low[j]
-        size, image, closed = fabs(offset), -2.0 * offset, periods[j] > 0.0
+        size, image, closed = fabs(offsets[j]), -2.0 * offsets[j], periods[j] > 0.0
         clear = is_clear_of_axes(size, start[j], places[j], steps[j])
         length = choose(closed, periods[j], choose(image > 0.0, lasts[j] - start[j], start[j] - firsts[j]))
         inside = (firsts[j] <= start[j]) & (start[j] <= lasts[j]) & (fabs(image) <= length)

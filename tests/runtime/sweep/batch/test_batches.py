@@ -34,7 +34,7 @@ def answered(
     monotone: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Answer launches by batches alone; the symmetry is unknown unless ``mirrors`` gives it."""
-    known = (*domain, mirrors[0], np.nan, mirrors[1])
+    known = (*domain, mirrors[0], np.nan, mirrors[1], 0.0)
     columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
     n = max(column.size for column in columns)
     lines = [np.broadcast_to(column, n) for column in columns]

@@ -109,6 +109,20 @@ def test_thrown_bodies_on_a_circle(tmp_path: Path) -> None:
     assert np.quantile(np.abs(found), 0.99) <= 2.1
 
 
+def test_released_at_rest_in_later_laps(build: Callable[..., ModuleType]) -> None:
+    """The distance from the lowest point, which is not a double, has all digits many laps away too; half periods follow
+    by elliptic integrals.
+    """
+    circle = gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", period="2*pi")
+    module, rng = build("circle_from_the_side", circle, gqm.Rolling()), np.random.default_rng(8)
+    places = rng.uniform(-2.0, 2.0, 300) - np.pi / 2 + 2.0 * np.pi * rng.integers(1, 60, 300)
+    values = module.sweep("half_period", places, beta=0.0).values
+    with mp.workdps(40):
+        squares = [mp.sin((mpf(place) + mp.pi / 2) / 2) ** 2 for place in places.tolist()]
+        truths = [2 * mp.ellipk(square) / mp.sqrt(mpf(9.81)) for square in squares]
+    assert np.abs(errors(values, truths)).max() <= MAX_ERROR
+
+
 def half_period_on_hyperbolic_cosine(start: float) -> Any:
     """Return the half period of a body released on z = cosh(3x/2) at ``start``."""
     end, nodes, total = mpf(start), 96, mpf(0)
