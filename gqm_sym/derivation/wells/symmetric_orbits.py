@@ -129,6 +129,7 @@ def symmetric_orbits(
     if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
         return None  # beyond half a turn Y decreases
     rate, height, metric = found
+    metric = _with_double_roots(metric, waves)
     less, more = (ONE_MINUS_Y, 1 + Y) if waves.sign < 0 else (1 + Y, ONE_MINUS_Y)
     # V**2 = (SINE_SQUARED - _SINE)*slope, where the difference is a product of factors without cancellation.
     sine_gap = 4 * T_MINUS_Y * ONE_MINUS_YT * COSINE_FOURTH / more**2
@@ -282,6 +283,26 @@ def _with_agm(
         ends = ({cosine2: sp.S.One, sine2: sp.S.Zero}, {cosine2: sp.S.Zero, sine2: sp.S.One})
         arguments = tuple(inverse.xreplace(end).xreplace(dict(invariants)) for end in ends)
     return SymmetricOrbits(integrand, divisor, invariants, turning_point, arguments)
+
+
+def _with_double_roots(metric: sp.Expr, waves: _Waves) -> sp.Expr:
+    """Return (ds/dd)**2 with its sums as products of powers if they are polynomials with double roots, as at cusps.
+
+    Near such a root the terms of the expanded polynomial cancel twice as many digits as those of its root.
+    """
+    cosine = 1 + waves.sign * _SINE
+
+    def rooted(part: sp.Expr) -> sp.Expr:
+        form = part.xreplace({_COSINE: cosine})
+        if not part.is_Add or not form.is_polynomial(_SINE) or sp.Poly(form, _SINE).domain.is_EX:
+            return part
+        constant, factors = sp.sqf_list(form, _SINE)
+        if all(power < 2 for _, power in factors):
+            return part
+        ratios = [(factor, sp.cancel(factor / cosine), power) for factor, power in factors]
+        return sp.Mul(constant, *((f if r.has(_SINE) else r * _COSINE) ** power for f, r, power in ratios))
+
+    return sp.Mul(*map(rooted, sp.Mul.make_args(metric)))
 
 
 def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:

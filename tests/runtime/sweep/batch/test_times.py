@@ -123,6 +123,22 @@ def test_released_at_rest_in_later_laps(build: Callable[..., ModuleType]) -> Non
     assert np.abs(errors(values, truths)).max() <= MAX_ERROR
 
 
+def test_between_the_cusps_of_a_tricuspoid(build: Callable[..., ModuleType]) -> None:
+    """The square of ds has a double root at each cusp, and its expanded terms cancelled near it; with the square S of
+    the sine of half the distance from the axis, half periods are complete elliptic integrals of 2*S/(1 - 2*S).
+    """
+    curve = gqm.Curve.parametric(x="2*sin(t)-sin(2*t)", z="-2*cos(t)-cos(2*t)", parameter="t")
+    places = np.pi + np.linspace(0.1, 1.03, 300)
+    values = build("tricuspoid", curve, gqm.Rolling()).sweep("half_period", places, beta=0.0).values
+    truths = []
+    with mp.workdps(40):
+        for place in places.tolist():
+            rest = mp.cos(mpf(place) - mp.pi)
+            first, second = mp.ellipk((1 - rest) / rest), mp.ellipe((1 - rest) / rest)
+            truths.append(2 * mp.sqrt(8 / (mpf(9.81) * rest)) * (first - 2 * rest * (first - second)))
+    assert np.abs(errors(values, truths)).max() <= MAX_ERROR
+
+
 def half_period_on_hyperbolic_cosine(start: float) -> Any:
     """Return the half period of a body released on z = cosh(3x/2) at ``start``."""
     end, nodes, total = mpf(start), 96, mpf(0)
