@@ -160,6 +160,7 @@ TESTED_THROUGH = {
     "legs/frames/tiny_legs.py": "runtime/sweep/test_planes_with_friction.py",
     "legs/gaps/blocks.py": "runtime/legs/gaps/test_passing.py",
     "legs/gaps/data.py": "claims/test_space_curves.py",
+    "legs/gaps/rooms.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/inherited.py": "runtime/legs/test_leg_errors.py",
     "legs/kinks/places.py": "runtime/legs/kinks/test_parts.py",
     "legs/layout.py": "claims/test_dissipative.py",
