@@ -1,8 +1,7 @@
 """Bodies driven along the curve by compiled code: a few legs of one body, or one number for each of many."""
 
-import threading
 from math import fabs, inf, isfinite, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -51,7 +50,8 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.frames.local_frame import may_be_small
 from gqm_sym.runtime.legs.frames.tiny_legs import is_tiny, slides_little
-from gqm_sym.runtime.legs.gaps.data import room_kept
+from gqm_sym.runtime.legs.gaps.data import forget
+from gqm_sym.runtime.legs.gaps.rooms import room_for
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -112,13 +112,6 @@ AGREEMENTS = 2
 UNBOUNDED_GROWTH = 1e6
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
-
-# The data kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart. The chart is
-# stored with them, so that no other chart can have the same identity. A thread that uses an entry removes it for that
-# time.
-_KEPT: dict[Any, tuple[Array, Array]] = {}
-MAX_KEPT = 8
-_LOCK = threading.Lock()
 
 # The joints of a curve that is smooth everywhere, for compiled code.
 SMOOTH = Joints(NO_NUMBERS, NO_NUMBERS, NO_NUMBERS, NO_NUMBERS)
@@ -370,12 +363,30 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
     return what
 
 
+@Inner
+def row_of(parameters, k, row, gaps):  # type: ignore[no-untyped-def]
+    """Return the run-time parameters of body k, and after them the chart (`drive`).
+
+    What is kept of the gaps between breaks holds for one set of parameters. Successive bodies with the same ones share
+    it.
+    """
+    if row.size == 0:
+        return parameters[k if parameters.shape[0] > 1 else 0]
+    is_new = k == 0
+    for i in range(parameters.shape[1]):
+        is_new |= parameters[k, i] != row[i]
+    if is_new:
+        row[: parameters.shape[1]] = parameters[k]
+        forget(gaps)
+    return row
+
+
 @entry(
-    INTEGER(DISSIPATION, MATRIX, JOINTS, INTEGER, MATRIX, MATRIX),
+    INTEGER(DISSIPATION, MATRIX, VECTOR, JOINTS, INTEGER, MATRIX, MATRIX),
     nogil=True,
     checked=False,
 )
-def drive(dissipation, parameters, joints, question, bodies, records):  # type: ignore[no-untyped-def]
+def drive(dissipation, parameters, row, joints, question, bodies, records):  # type: ignore[no-untyped-def]
     """Drive bodies along the curve, each of them until a question about its motion is answered.
 
     Parameters
@@ -383,7 +394,10 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     dissipation : Dissipation
         The module's compiled functions, and the kind of its forces.
     parameters : array
-        A row of run-time parameters for each body, or one for all of them.
+        A row of run-time parameters for each body, or one for all of them, which is followed by the chart if there is
+        one.
+    row : array
+        Work space for one row if there is a row for each body on a chart, which follows here; otherwise empty.
     joints : Joints
     question : int
         FIRST_LEGS to MOST_LENGTH. From END_TIME on, the answers are in VALUE and STATUS of each body; LEAST_LOAD to
@@ -404,8 +418,9 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     breaks, corners, liftoff_corners, ahead, gaps = joints
     joints = Joints(borrowed(breaks), borrowed(corners), borrowed(liftoff_corners), borrowed(ahead), borrowed(gaps))
     parameters, bodies, records, what = borrowed(parameters), borrowed(bodies), borrowed(records), END_REST
+    row = borrowed(row)
     for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
-        p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
+        p, body = row_of(parameters, k, row, joints.gaps), bodies[k]
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
             is_swing = question == FIRST_LEGS and not dissipation.friction
@@ -425,21 +440,18 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
 def drive_along(
     track: Track, dissipation: Dissipation, parameters: Array, question: int, bodies: Array, records: Array
 ) -> int:
-    """Call `drive` for a curve, with the data kept of it for these forces and run-time parameters."""
-    if not track.breaks.size:
-        what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
-        return what
+    """Call `drive` for a curve, with the data kept of it for these forces and run-time parameters.
+
+    If each body has a row of parameters, the chart does not follow them.
+    """
     chart, breaks, corners, liftoff_corners, blocks = track
-    key, kept = (dissipation, id(chart), parameters[0, : -chart.size].tobytes(), blocks), NO_NUMBERS
-    if track.is_kept(dissipation):
-        with _LOCK:
-            found = _KEPT.pop(key, None)
-        kept = room_kept(breaks.size, with_blocks=blocks) if found is None else found[0]
-    joints = Joints(breaks, corners, liftoff_corners, np.empty(room_ahead(breaks.size)), kept)
-    what = drive(dissipation, parameters, joints, question, bodies, records)
-    if kept.size:
-        with _LOCK:
-            _KEPT[key] = kept, chart
-            while len(_KEPT) > MAX_KEPT:
-                del _KEPT[next(iter(_KEPT))]
+    has_own = chart.size > 0 and parameters.shape[0] > 1
+    row = np.concatenate([parameters[0], chart]) if has_own else NO_NUMBERS
+    if not breaks.size:
+        what: int = drive(dissipation, parameters, row, SMOOTH, question, bodies, records)
+        return what
+    key = None if has_own else (dissipation, id(chart), parameters[0, : -chart.size].tobytes(), blocks)
+    with room_for(chart, breaks.size if track.is_kept(dissipation) else 0, key, with_blocks=blocks) as kept:
+        joints = Joints(breaks, corners, liftoff_corners, np.empty(room_ahead(breaks.size)), kept)
+        what = drive(dissipation, parameters, row, joints, question, bodies, records)
     return what

@@ -141,12 +141,13 @@ def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
 
 
 def _rows(parameters: list[Array], chart: Array) -> Array:
-    """Return the parameters of each body as a row, followed by the chart; a single row if all bodies have the same
+    """Return the parameters of each body as a row; a single row, followed by the chart, if all bodies have the same
     parameters.
     """
-    if chart.size:
-        return np.concatenate([*(column[:1] for column in parameters), chart]).reshape(1, -1)
-    rows = np.empty((max((column.size for column in parameters), default=1), len(parameters)))
+    count = max((column.size for column in parameters), default=1)
+    if chart.size and count == 1:
+        return np.concatenate([*parameters, chart]).reshape(1, -1)
+    rows = np.empty((count, len(parameters)))
     for k, column in enumerate(parameters):
         rows[:, k] = column
     return rows

@@ -89,6 +89,8 @@ def groups_of(
     if formulas.separated is not None and formulas.dissipation is None:
         factors = [widen(factor, shape) for factor in formulas.separated_factors(columns[4:])]
     for found, chosen in _distinct([columns[4 + k] for k in common], shape):
+        if formulas.dissipation is not None:
+            chosen = _by_parameters(columns[4:], shape, chosen)
         given = dict(zip(common, found, strict=True))
         values = tuple(given.get(k, 1.0) for k in range(len(columns) - 4))
         try:
@@ -116,10 +118,12 @@ def _common_parameters(formulas: "Formulas", count: int) -> list[int]:
     """Return the indices of the run-time parameters, and of the chart after them, that the launches of one group have
     in common.
 
-    The curve and its table depend on no others; bodies that lose energy are driven with all parameters the same.
+    The curve and its table depend on no others. Bodies that lose energy have no table.
     """
     shaped_by = None if formulas.chart is None else formulas.chart.shaped_by
-    if formulas.separated is None or formulas.dissipation is not None or shaped_by is None:
+    if shaped_by is not None and formulas.dissipation is not None:
+        return sorted(shaped_by)
+    if formulas.separated is None or shaped_by is None:
         return list(range(count))
     return sorted({*shaped_by, *formulas.separated.held})
 
@@ -148,11 +152,11 @@ def _tabulated_range(
 ) -> tuple[CurveTable, int]:
     """Return the table of a curve with formulas over the range of all motions, and the kind of its ends.
 
-    The table is empty if launches differ in parameters.
+    The table is empty if launches differ in parameters, and the ends are then those of the curve.
     """
     low, high, period = domain[:3]
     if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
-        return NO_TABLE, NO_ENDS
+        return NO_TABLE, CURVE_ENDS
     p = np.array([column.item() for column in columns[4:]])
     first, last, places = low.item(), high.item(), np.ascontiguousarray(columns[0]).reshape(-1)
     ends = NO_ENDS
@@ -239,6 +243,19 @@ def _distinct(
     order = np.argsort(which.reshape(-1), kind="stable")
     parts = np.split(order, np.cumsum(np.bincount(which.reshape(-1)))[:-1])
     yield from zip(map(tuple, different.tolist()), parts, strict=True)
+
+
+def _by_parameters(
+    parameters: list[Array], shape: tuple[int, ...], chosen: NDArray[np.intp] | None
+) -> NDArray[np.intp] | None:
+    """Return the chosen elements (None for all) in an order in which those with the same parameters are together."""
+    varied = [column for column in parameters if column.size > 1]
+    if not varied:
+        return chosen
+    rows = [np.broadcast_to(column, shape).reshape(-1) for column in varied]
+    if chosen is None:
+        return np.lexsort(rows)
+    return chosen[np.lexsort([row[chosen] for row in rows])]
 
 
 def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> Array:

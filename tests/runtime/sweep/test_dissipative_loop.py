@@ -200,13 +200,15 @@ def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, name: str,
     assert np.array_equal(module.sweep(quantity, starts[::-1], speed, t_max=20.0, **given).values[::-1], values)
     for k in (0, 17, 59):
         assert module.sweep(quantity, [starts[k]], speed, t_max=20.0, **given).values == values[k : k + 1]
-    frictions = np.array([0.02, 0.05, 0.3])
-    swept = module.sweep(quantity, starts[3], speed, t_max=20.0, **given | {"mu": frictions}).values
-    each = [given | {"mu": frictions[k : k + 1]} for k in range(3)]
-    alone = [module.sweep(quantity, starts[3], speed, t_max=20.0, **one).values[0] for one in each]
+    # Launches with the same parameters share what is kept, also if launches with others lie between them.
+    frictions, some = np.array([0.05, 0.02, 0.3, 0.05]), starts[[3, 3, 3, 40]]
+    swept = module.sweep(quantity, some, speed, t_max=20.0, **given | {"mu": frictions}).values
+    each = [(some[k], given | {"mu": frictions[k : k + 1]}) for k in range(4)]
+    alone = [module.sweep(quantity, start, speed, t_max=20.0, **one).values[0] for start, one in each]
     assert np.array_equal(swept, alone, equal_nan=True)
     # Blocks of gaps are kept only for a number that all launches have in common, so that sums are rounded otherwise.
-    common = [module.sweep(quantity, starts[3], speed, t_max=20.0, **given | {"mu": mu}).values for mu in frictions]
+    each = zip(some, frictions, strict=True)
+    common = [module.sweep(quantity, start, speed, t_max=20.0, **given | {"mu": mu}).values for start, mu in each]
     np.testing.assert_allclose(swept, common, rtol=FEW)
 
 

@@ -181,6 +181,13 @@ def room_kept(breaks: int, *, with_blocks: bool) -> Array:
 
 
 @Inner
+def forget(gaps):  # type: ignore[no-untyped-def]
+    """Forget the data kept of all gaps and blocks, because the next body has other run-time parameters."""
+    for at in range(0, gaps.size - 1, GAP_COLUMNS):
+        gaps[at] = gaps[at + FIRST_OF_BLOCK] = 0.0
+
+
+@Inner
 def keeps_blocks(gaps):  # type: ignore[no-untyped-def]
     """Return whether data of blocks are kept."""
     return gaps[gaps.size - 1] != REFUSED
