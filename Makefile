@@ -1,7 +1,8 @@
-# Everything runs in a virtual environment of the project's own, made on first use. The targets types, current and site
-# are parts of lint that run at the same time.
+# Everything runs in a virtual environment of the project's own, made on first use. The parts of lint run at the same
+# time.
 PYTHON  ?= python3
 WORKERS ?= 2
+PARTS   ?= types current site
 VENV    := .venv
 BIN     := $(VENV)/bin
 
@@ -31,7 +32,7 @@ test: $(VENV)/.dev ## run every test, notebooks included
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
-	$(MAKE) --no-print-directory --jobs $(WORKERS) types current site
+	$(MAKE) --no-print-directory --jobs $(WORKERS) $(PARTS)
 
 types:
 	$(BIN)/mypy

@@ -26,7 +26,7 @@ from gqm_sym.runtime.sweep.quantities import (
     UNDECIDED,
     Answers,
 )
-from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
+from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 
 # The largest error of a turning point, as a share of the orbit's width, and of the rules for the time, as shares of it:
 # the answer is rounded to a double.

@@ -5,8 +5,8 @@ from math import nan
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.sweep.orbit import Orbit
-from gqm_sym.runtime.sweep.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
 from gqm_sym.runtime.sweep.quantities import MAX_FORCE, MAX_SPEED, MIN_FORCE, MIN_SPEED
+from gqm_sym.runtime.sweep.single.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
 from gqm_sym.runtime.sweep.tables.extremes import passage_extreme, stretch_of, stretch_to_turn
 
 EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)

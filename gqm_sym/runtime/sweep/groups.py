@@ -152,11 +152,11 @@ def _tabulated_range(
 ) -> tuple[CurveTable, int]:
     """Return the table of a curve with formulas over the range of all motions, and the kind of its ends.
 
-    The table is empty if launches differ in parameters.
+    The table is empty if launches differ in parameters, and the ends are then those of the curve.
     """
     low, high, period = domain[:3]
     if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
-        return NO_TABLE, NO_ENDS
+        return NO_TABLE, CURVE_ENDS
     p = np.array([column.item() for column in columns[4:]])
     first, last, places = low.item(), high.item(), np.ascontiguousarray(columns[0]).reshape(-1)
     ends = NO_ENDS

@@ -14,11 +14,6 @@ from numpy.typing import NDArray
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import (
-    AXIS,
-    AXIS_STEP,
-    DIRECTION,
-    DOMAIN_HIGH,
-    DOMAIN_LOW,
     DOMAIN_PERIOD,
     LAM0,
     PARAMETERS,
@@ -27,9 +22,6 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.launch.domain import DomainNumbers
-from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
-from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, TURN, SearchArrays, speed_squared
 from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
@@ -39,22 +31,17 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_rates,
     trapezoid_workspace,
 )
-from gqm_sym.runtime.sweep.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on, extreme_on_table
-from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
-from gqm_sym.runtime.sweep.orbit_extremes import MAX_GRIDS
+from gqm_sym.runtime.sweep.finding import find_orbit
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
     ARRIVAL_TIME,
     END_TIME,
     HALF_PERIOD,
-    MAX_FORCE,
-    MIN_FORCE,
     NEVER_THERE,
-    NOT_FINITE,
     NOT_PERIODIC,
-    OUTSIDE_DOMAIN,
     PERIOD,
     SINGLE,
     SPAN_KNOWN,
@@ -62,14 +49,16 @@ from gqm_sym.runtime.sweep.quantities import (
     TURNING_POINTS,
     UNDECIDED,
 )
-from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
+from gqm_sym.runtime.sweep.single.arrivals import arrival, refined_end
+from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself, until_loss
+from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS
+from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
-from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_half_v2_at_edges, find_passage, passage_of
+from gqm_sym.runtime.sweep.tables.passage import fill_half_v2_at_edges
 from gqm_sym.runtime.sweep.tables.rests import fill_at_rest, rests_on_level
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
-from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
 # The quantities that only motions that repeat have.
 PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
@@ -137,85 +126,6 @@ class Buffers(NamedTuple):
     work: Any
     series: Any
     half_v2_at_edges: Any
-
-
-@Inner
-def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignore[no-untyped-def]
-    """Return the orbit of a body that leaves the curve; `Orbit.leaves` is 0 if it stays, or if that is not certain."""
-    last, turn = (ahead, 0.0) if ahead.what == LIMIT else (behind, ahead.near)
-    end, leaves = last.near, direction if ahead.what == LIMIT else -direction
-    none = Orbit(False, False, direction, lam0, v2, 0.0, 0.0, 0)
-    if direction == 0 or last.what != LIMIT or curve.ends != CURVE_ENDS or curve.period > 0.0 or not isfinite(end):
-        return none
-    if not (ahead.what == TURN or (ahead.what == LIMIT and end != 0.0)):
-        return none
-    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
-    speed_squared(curve.fns, curve.p, lam0, v2, 0.0, arrays)
-    ds = arrays.rows[1, 0]
-    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, end, arrays)
-    if not (v2_there > MIN_LEAVING_SHARE * size and arrays.rows[1, 0] > CUSP_SHARE * ds):
-        return none
-    return Orbit(False, False, direction, lam0, v2, min(end, turn), max(end, turn), leaves)
-
-
-@Inner
-def ends_at_cusp(curve, lam0, v2, ahead, behind):  # type: ignore[no-untyped-def]
-    """Return whether it is certain that a motion ends at a cusp, which the body reaches with a speed above zero."""
-    last = behind if ahead.what == TURN else ahead
-    if last.what != CUSP or last.near == 0.0 or not isfinite(last.near):
-        return False
-    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
-    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, last.near, arrays)
-    return v2_there > MIN_LEAVING_SHARE * size
-
-
-@Inlined
-def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
-    """Return the status of launch k, which is ANSWERED if it has an orbit, this orbit, and the panels that it passes in
-    a table. The status is NOT_PERIODIC if the motion ends at a cusp.
-
-    The orbit's span is taken from ``spans`` if it is ``known``.
-    """
-    lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
-    first, last, period = (
-        element(columns, DOMAIN_LOW, k),
-        element(columns, DOMAIN_HIGH, k),
-        element(columns, DOMAIN_PERIOD, k),
-    )
-    axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
-    even, v2 = axis == axis, v0 * v0
-    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), NOWHERE
-    total = lam0 + v0
-    for row in range(columns.shape[0] - PARAMETERS):
-        total += curve.p[row]
-    if not isfinite(total):
-        return NOT_FINITE, none, nowhere
-    if not first <= lam0 <= last:
-        return OUTSIDE_DOMAIN, none, nowhere
-    if known:
-        low, high = spans[k, 0], spans[k, 1]
-        circulates = high != high
-        if circulates:
-            low, high = min(low, 0.0), max(low, 0.0)
-        elif v0 == 0.0:
-            direction = 1 if high > -low else -1
-        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high, 0), nowhere
-    orbit, passage = find_passage(curve, lam0, v0, direction)
-    if passage.panels > 0:
-        return ANSWERED, orbit, passage
-    domain = DomainNumbers(first, last, period, axis, step)
-    direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
-    kind = orbit_kind(direction, ahead, behind, v0, period)
-    if kind == NO_ORBIT:
-        orbit = orbit_that_leaves(curve, lam0, v2, direction, ahead, behind)
-        if orbit.leaves == 0 and direction != 0 and ends_at_cusp(curve, lam0, v2, ahead, behind):
-            return NOT_PERIODIC, orbit, nowhere
-        return ANSWERED if orbit.leaves != 0 else UNDECIDED, orbit, nowhere
-    circulates = kind == CIRCULATION
-    one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
-    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)
-    passage = passage_of(curve, orbit)
-    return ANSWERED if are_level(curve, passage) else UNDECIDED, orbit, passage
 
 
 @Inner
@@ -325,6 +235,36 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
 
 
 @Inner
+def loss_of(curve, orbit, passage, half_v2_at_edges, asked):  # type: ignore[no-untyped-def]
+    """Return whether it is decided if a body leaves the track, the place at which it does (NaN if it keeps contact),
+    the `Loss` on the table, and the orbit up to this place, which is found without a table.
+
+    ``asked`` is the side as in `GivenCurve`, and whether the orbit is on the table.
+    """
+    side, on_table = asked
+    if side == 0:
+        return True, nan, KEPT, orbit
+    if on_table:
+        loss = loss_of_contact(curve, orbit, passage, half_v2_at_edges, side)
+        return True, loss.place, loss, orbit
+    what, offset, has_turned = loss_by_itself(curve, orbit, side)
+    if what == LEAVES:
+        return True, orbit.lam0 + offset, KEPT, until_loss(orbit, offset, has_turned)
+    return what != UNKNOWN, nan, KEPT, orbit
+
+
+@Inner
+def extreme_until_loss(curve, orbit, passage, found, edges, quantity):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force up to a loss of contact, which is ``found`` on the table or without
+    it (`loss_of`).
+    """
+    loss, left = found
+    if loss.panel >= 0:
+        return extreme_on_table(curve, orbit, passage, loss, edges, quantity)
+    return extreme_by_itself(curve, left, quantity, MAX_GRIDS)
+
+
+@Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; return the status, which is SPAN_KNOWN for SPANS.
 
@@ -338,16 +278,13 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if orbit.leaves != 0 and needs_period:
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        loss = loss_of_contact(curve, orbit, passage, half_v2_at_edges, side) if side != 0 and on_table else KEPT
-        place = loss.place
-        if side != 0 and not on_table:  # a small swing keeps contact if the track pushes at the extreme force
-            least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
-            if orbit.leaves != 0 or not side * least > 0.0:
-                return UNDECIDED
+        decided, place, loss, left = loss_of(curve, orbit, passage, half_v2_at_edges, (side, on_table))
+        if not decided:
+            return UNDECIDED
         if place == place and needs_period:
             return NOT_PERIODIC
         if quantity in EXTREMES and place == place:
-            out[0] = extreme_on_table(curve, orbit, passage, loss, (half_v2_at_edges, tabulated), quantity)
+            out[0] = extreme_until_loss(curve, orbit, passage, (loss, left), (half_v2_at_edges, tabulated), quantity)
             return ANSWERED if isfinite(out[0]) else UNDECIDED
         if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
             return UNDECIDED

@@ -32,7 +32,7 @@ from gqm_sym.runtime.sweep.exact_orbits import answer_exactly
 from gqm_sym.runtime.sweep.groups import Group, groups_of, rests_on_corner
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
-from gqm_sym.runtime.sweep.slow_places import NO_TAPE, RecordedFormulas
+from gqm_sym.runtime.sweep.single.slow_places import NO_TAPE, RecordedFormulas
 from gqm_sym.runtime.sweep.tables.panel_forces import ROW
 
 if TYPE_CHECKING:

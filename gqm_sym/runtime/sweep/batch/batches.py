@@ -79,7 +79,7 @@ from gqm_sym.runtime.sweep.quantities import (
     UPPER_END,
     Answers,
 )
-from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas
+from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 
 # The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
 # pieces stand for the proofs that all orbits of a well share.

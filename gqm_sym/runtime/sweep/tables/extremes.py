@@ -6,7 +6,7 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_in_space
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.sweep.orbit_extremes import (
+from gqm_sym.runtime.sweep.single.orbit_extremes import (
     FORCE,
     FORCE_SQUARED,
     STEP_RATIO,

@@ -3,7 +3,6 @@
 from math import inf, nan
 
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.sweep.orbit_extremes import FORCE, fill_force, frame_buffer, point_buffer
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ARRIVAL_TIME,
@@ -16,6 +15,7 @@ from gqm_sym.runtime.sweep.quantities import (
     NOT_PERIODIC,
     UNDECIDED,
 )
+from gqm_sym.runtime.sweep.single.orbit_extremes import FORCE, fill_force, frame_buffer, point_buffer
 from gqm_sym.runtime.sweep.tables.layout import BASE_SIZE, SPREAD
 from gqm_sym.runtime.sweep.tables.panel_forces import FAR, prepare
 from gqm_sym.runtime.sweep.tables.places import locate, neighbour

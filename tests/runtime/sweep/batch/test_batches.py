@@ -14,7 +14,7 @@ import gqm_sym as gqm
 from gqm_sym.runtime.compiled.strided import pointers
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
-from gqm_sym.runtime.sweep.slow_places import NO_TAPE
+from gqm_sym.runtime.sweep.single.slow_places import NO_TAPE
 
 ModuleOf = Callable[[str], ModuleType]
 

@@ -64,7 +64,7 @@ def phase_from(near, far):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_phases(asked, v0, here, there, lanes, state):  # type: ignore[no-untyped-def]
-    """Fill the phases of librations from the end nearer to the launch (`sweep.arrivals`).
+    """Fill the phases of librations from the end nearer to the launch (`sweep.single.arrivals`).
 
     Parameters
     ----------

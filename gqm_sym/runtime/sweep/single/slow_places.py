@@ -23,7 +23,7 @@ from gqm_sym.runtime.double_double.quadrature import TAPE, energy_level, fill_pa
 from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
 from gqm_sym.runtime.sweep.orbit import Orbit
-from gqm_sym.runtime.sweep.orbit_extremes import GRID_INTERVALS, GRID_POINTS, V2, WIDTH_SHARES, sample_loads
+from gqm_sym.runtime.sweep.single.orbit_extremes import GRID_INTERVALS, GRID_POINTS, V2, WIDTH_SHARES, sample_loads
 
 # The smallest V**2 between turning points for which its place and times are accurate, as a share of the largest V**2.
 MIN_V2_SHARE = 1e-9

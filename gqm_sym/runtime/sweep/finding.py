@@ -1,0 +1,106 @@
+"""The orbit of one launch: on the table of its curve, or by a search along the curve."""
+
+from math import isfinite
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.strided import (
+    AXIS,
+    AXIS_STEP,
+    DIRECTION,
+    DOMAIN_HIGH,
+    DOMAIN_LOW,
+    DOMAIN_PERIOD,
+    LAM0,
+    PARAMETERS,
+    V0,
+    element,
+)
+from gqm_sym.runtime.launch.domain import DomainNumbers
+from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
+from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, TURN, SearchArrays, speed_squared
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
+from gqm_sym.runtime.sweep.orbit import CURVE_ENDS, Orbit
+from gqm_sym.runtime.sweep.quantities import ANSWERED, NOT_FINITE, NOT_PERIODIC, OUTSIDE_DOMAIN, UNDECIDED
+from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, find_passage, passage_of
+from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
+
+
+@Inner
+def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignore[no-untyped-def]
+    """Return the orbit of a body that leaves the curve; `Orbit.leaves` is 0 if it stays, or if that is not certain."""
+    last, turn = (ahead, 0.0) if ahead.what == LIMIT else (behind, ahead.near)
+    end, leaves = last.near, direction if ahead.what == LIMIT else -direction
+    none = Orbit(False, False, direction, lam0, v2, 0.0, 0.0, 0)
+    if direction == 0 or last.what != LIMIT or curve.ends != CURVE_ENDS or curve.period > 0.0 or not isfinite(end):
+        return none
+    if not (ahead.what == TURN or (ahead.what == LIMIT and end != 0.0)):
+        return none
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
+    speed_squared(curve.fns, curve.p, lam0, v2, 0.0, arrays)
+    ds = arrays.rows[1, 0]
+    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, end, arrays)
+    if not (v2_there > MIN_LEAVING_SHARE * size and arrays.rows[1, 0] > CUSP_SHARE * ds):
+        return none
+    return Orbit(False, False, direction, lam0, v2, min(end, turn), max(end, turn), leaves)
+
+
+@Inner
+def ends_at_cusp(curve, lam0, v2, ahead, behind):  # type: ignore[no-untyped-def]
+    """Return whether it is certain that a motion ends at a cusp, which the body reaches with a speed above zero."""
+    last = behind if ahead.what == TURN else ahead
+    if last.what != CUSP or last.near == 0.0 or not isfinite(last.near):
+        return False
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
+    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, last.near, arrays)
+    return v2_there > MIN_LEAVING_SHARE * size
+
+
+@Inlined
+def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
+    """Return the status of launch k, which is ANSWERED if it has an orbit, this orbit, and the panels that it passes in
+    a table. The status is NOT_PERIODIC if the motion ends at a cusp.
+
+    The orbit's span is taken from ``spans`` if it is ``known``.
+    """
+    lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
+    first, last, period = (
+        element(columns, DOMAIN_LOW, k),
+        element(columns, DOMAIN_HIGH, k),
+        element(columns, DOMAIN_PERIOD, k),
+    )
+    axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
+    even, v2 = axis == axis, v0 * v0
+    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), NOWHERE
+    total = lam0 + v0
+    for row in range(columns.shape[0] - PARAMETERS):
+        total += curve.p[row]
+    if not isfinite(total):
+        return NOT_FINITE, none, nowhere
+    if not first <= lam0 <= last:
+        return OUTSIDE_DOMAIN, none, nowhere
+    if known:
+        low, high = spans[k, 0], spans[k, 1]
+        circulates = high != high
+        if circulates:
+            low, high = min(low, 0.0), max(low, 0.0)
+        elif v0 == 0.0:
+            direction = 1 if high > -low else -1
+        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high, 0), nowhere
+    orbit, passage = find_passage(curve, lam0, v0, direction)
+    if passage.panels > 0:
+        return ANSWERED, orbit, passage
+    domain = DomainNumbers(first, last, period, axis, step)
+    direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
+    kind = orbit_kind(direction, ahead, behind, v0, period)
+    if kind == NO_ORBIT:
+        orbit = orbit_that_leaves(curve, lam0, v2, direction, ahead, behind)
+        if orbit.leaves == 0 and direction != 0 and ends_at_cusp(curve, lam0, v2, ahead, behind):
+            return NOT_PERIODIC, orbit, nowhere
+        return ANSWERED if orbit.leaves != 0 else UNDECIDED, orbit, nowhere
+    circulates = kind == CIRCULATION
+    one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
+    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)
+    passage = passage_of(curve, orbit)
+    return ANSWERED if are_level(curve, passage) else UNDECIDED, orbit, passage
