@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
-from gqm_sym.runtime.gradients.panels import UNDECIDED
+from gqm_sym.runtime.gradients.panels import UNDECIDED, rule_with_tails
 from gqm_sym.runtime.gradients.path import (
     CURVATURE,
     DS,
@@ -44,8 +44,8 @@ from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
-# The number of Newton steps to a turning point, starting from doubles, and the ends of the phase.
-NEWTON_STEPS, WHOLE_PHASE = 2, np.array([0.0, np.pi])
+# The number of Newton steps to a turning point, starting from doubles.
+NEWTON_STEPS = 2
 
 # Changes along a motion are resolved if the last two Legendre coefficients on all panels of the phase are below this
 # share of the largest value; panels are doubled from the first to the second number.
@@ -152,7 +152,7 @@ class PassageChanges:
         a, b = (a, b) if (a.high, a.low) < (b.high, b.low) else (b, a)
         program, inputs = self._program(a, b)
         found = np.zeros((program.outputs.size, MEAN))
-        given = (program.operands, program.work, inputs, LIBRATION, WHOLE_PHASE, panel_rule(), found)
+        given = (program.operands, program.work, inputs[np.newaxis], LIBRATION, rule_with_tails(), found)
         if fill_panel_means(*given) <= 0:
             raise SolutionError(UNDECIDED)
         slopes = PI * (found[:, 0] + found[:, 1])
