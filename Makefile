@@ -1,8 +1,7 @@
-# Everything runs in a virtual environment of the project's own, made on first use. The parts of lint run at the same
-# time.
+# Everything runs in a virtual environment of the project's own, made on first use. The targets types, current and site
+# are parts of lint that run at the same time.
 PYTHON  ?= python3
 WORKERS ?= 2
-PARTS   ?= types current site
 VENV    := .venv
 BIN     := $(VENV)/bin
 
@@ -32,7 +31,7 @@ test: $(VENV)/.dev ## run every test, notebooks included
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
-	$(MAKE) --no-print-directory --jobs $(WORKERS) $(PARTS)
+	$(MAKE) --no-print-directory --jobs $(WORKERS) types current site
 
 types:
 	$(BIN)/mypy
@@ -41,9 +40,8 @@ current:
 	$(BIN)/gqm-gen --check --quiet -o generated curves/*.yaml
 	$(BIN)/python scripts/make_family_pages.py --check
 
-# The pages are written for the warnings alone, with a theme that takes less time.
 site:
-	$(BIN)/python -m sphinx -W --keep-going --quiet -D nb_execution_mode=off -D html_theme=basic -b html docs docs/_build/lint
+	$(BIN)/python -m sphinx -W --keep-going --quiet -D nb_execution_mode=off -b html docs docs/_build/lint
 
 generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages made from the code
 	$(BIN)/gqm-gen --quiet -o generated curves/*.yaml
