@@ -203,6 +203,8 @@ def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
         parts = (_parts_along_track(lowering, whole),)
         held = tuple(place for _, place in parts[0].parameters)
         arguments += [f"parts={parts[0].name}", f"held={held!r}"]
+    if train.friction:
+        arguments.append("friction=True")
     loads = LOADS_IN_SPACE if lowering.model.curve.in_space else LOAD_IN_PLANE
     return replace(
         track,

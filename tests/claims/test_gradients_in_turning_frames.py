@@ -73,12 +73,16 @@ class Truth:
         return self.force(place, way)
 
     def place(self, t: Any, near: float) -> Any:
-        """Return the place at a time before the first turn."""
+        """Return the place at a time before the first turn, by Newton's method from one that is right to doubles."""
+        place = mp.mpf(near)
+        for _ in range(3):
+            passed = mp.quad(self.slowness, [self.lam0, place], method="gauss-legendre")
+            place += (t - self.way * passed) / (self.way * self.slowness(place))
+        return place
 
-        def time(u: Any) -> Any:
-            return self.way * mp.quad(lambda w: self.size(w) / mp.sqrt(self.square(w)), [self.lam0, u])
-
-        return mp.findroot(lambda u: time(u) - t, mp.mpf(near), tol=1e-30)
+    def slowness(self, u: Any) -> Any:
+        """Return the length of dt/du."""
+        return self.size(u) / mp.sqrt(self.square(u))
 
 
 def difference(of: Callable[[Numbers], Any], given: Numbers, name: str) -> float:

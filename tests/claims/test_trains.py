@@ -1,6 +1,7 @@
 """Trains agree with closed forms, with a 30-digit reference, and, if they are short, with the motion of a body."""
 
 from collections.abc import Callable
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -20,6 +21,8 @@ G = mpf("9.81")
 MAX_ULPS = 3.0
 # Forces are a few operations on such heights, and the tolerance is a share of the weight.
 SHARE = 1e-14
+# The tolerances of integrations by DOP853 over a few metres, whose errors are below those of the motion.
+TIGHT = {"rtol": 3e-14, "atol": 1e-14}
 # Times along points in space are known in doubles only, to some units in the last place.
 ROUNDING = 4e-15
 
@@ -418,6 +421,42 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     # A coupling balances what the cars behind it lack, which is the potential's force over their part of the track.
     lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
+
+
+def test_cars_pass_jumps_of_curvature(build: Build) -> None:
+    """Friction jumps when a car passes the end of an arc, between which places DOP853 integrates Newton's law; motions
+    ended at one of them as if the track were singular there.
+    """
+    radius, half, length, mu = 8.0, 10.0, 6.0, 0.02
+    bend, rest = gqm.arc(radius=8, angle="pi"), gqm.line(length=10)
+    stadium = gqm.Curve.piecewise([rest, bend, gqm.line(length=20), bend, rest], closed=True)
+    module = build("rubbing_train_on_stadium", stadium, gqm.CoulombFriction())
+    shares = np.array([-1, 0, 1]) / 3
+    passages = np.sort([side * half - length * share for side in (-1, 1) for share in (-0.5, *shares, 0.5)])
+
+    def angle(s: Any) -> Any:
+        return np.sign(s) * np.maximum(np.abs(s) - half, 0.0) / radius
+
+    def slope(s: float, w: float, direction: int, bent: Any) -> float:
+        """Return the derivative of V**2; ``bent`` says which cars are on an arc."""
+        low, high = radius * (1 - np.cos(angle(s + length * np.array([-0.5, 0.5]))))
+        force = 9.81 * np.cos(angle(s + length * shares)) + w / radius * bent
+        assert (force > 0).all()
+        return float(-2 * 9.81 * (high - low) / length - 2 * mu * direction * force.mean())
+
+    motion, place, w = module.solve(0, 9, length=length, mu=mu), 0.0, 81.0
+    for leg, direction in zip(motion.legs, (1, -1, 1), strict=False):
+        stops = [stop for stop in passages[::direction] if direction * (stop - place) > 0]
+        for stop in stops:
+            bent = np.abs((place + stop) / 2 + length * shares) > half
+            law = partial(slope, direction=direction, bent=bent)
+            w = solve_ivp(lambda s, y, law=law: [law(s, y[0])], (place, stop), [w], "DOP853", **TIGHT).y[0, -1]
+            place = stop
+        law = partial(slope, direction=direction, bent=np.ones(3))
+        place = solve_ivp(lambda w, y, law=law: [1 / law(y[0], w)], (w, 0.0), [place], "DOP853", **TIGHT).y[0, -1]
+        w = 0.0
+        assert leg.end == "turn"
+        assert leg.lam_end == pytest.approx(place, rel=ROUNDING)
 
 
 @pytest.mark.parametrize("in_space", [True, False])

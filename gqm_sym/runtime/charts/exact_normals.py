@@ -147,12 +147,6 @@ class ChartTrack:
             self._period = self._meeting_of(last, x, z, end + self._shifts[last]) - self._shifts[last] - begin
         return self._period
 
-    def elsewhere(self) -> Any:
-        """Return the farther end of the launch's piece, unless it is an end of the curve, which may be singular."""
-        k, last = self._piece(self.lam0), len(self._edges) - 1
-        ends = [self._edges[j] for j in (k, k + 1) if self._chart.period or 0 < j < last] or self._edges[k : k + 2]
-        return self._context.mpf(max(ends, key=lambda edge: abs(edge - self._near)))
-
     def joints(self, low: Any, high: Any) -> list[Any]:
         """Return the joints of pieces between two places, in their order."""
         if high < low:

@@ -4,7 +4,8 @@ middle.
 The mean height h(s) of a train of length l is the mean of z over [s - l/2, s + l/2], so that h' and h'' are the divided
 differences of z and dz/ds over its ends. These keep all their digits however short the train is. A piece of the chart
 of h ends where either end of the train passes from one piece of the track to the next. Other parts of a potential are
-charted along the track first, on pieces that resolve them, and have such means too.
+charted along the track first, on pieces that resolve them, and have such means too. With friction, the places at which
+the middle of a car passes a break of a rail are breaks too.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,6 +24,9 @@ from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_ch
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
+
+# The places of the ends of a train ahead of its middle, as shares of its length.
+ENDS = (-0.5, 0.5)
 
 # Edges nearer to each other than this share of the track count as one, because they differ by rounding only.
 SAME_EDGE = 1e-13
@@ -56,6 +60,8 @@ class TrackOfTrain:
         two derivatives.
     held : tuple of int
         The indices of the run-time parameters that they depend on.
+    friction : bool
+        Whether there is friction on the cars, which jumps where one of them passes a jump of the curvature.
     """
 
     track: ChartMaker
@@ -64,6 +70,7 @@ class TrackOfTrain:
     length: int
     parts: Callable[..., Any] | None = None
     held: tuple[int, ...] = ()
+    friction: bool = False
 
     @property
     def shaped_by(self) -> tuple[int, ...] | None:
@@ -91,18 +98,20 @@ class TrackOfTrain:
         height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
         others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 3
         charted, loads = (height, *others[:count]), others[count:]
-        edges = _graded(_edges(track, charted[-1].edges, length), track.period > 0.0)
+        edges = _graded(_passages(track, charted[-1].edges, length, ENDS), track.period > 0.0)
         block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
-        joints = _merged(np.concatenate([edges, _inside(track.edges, edges)]), whole)
-        kinks = np.concatenate([_edges(track, track.breaks, length)[1:-1], _inside(track.breaks, edges)])
-        breaks = joints[np.unique(np.abs(joints[:, None] - kinks).argmin(axis=0))] if kinks.size else kinks
+        # At the points of a spline only the fifth derivative jumps, which panels resolve faster than so many breaks.
+        rubs = self.friction and not track.from_points
+        cars = (np.arange(self.cars) + 0.5) / self.cars - 0.5 if rubs else np.empty(0)
+        kinks = _passages(track, track.breaks, length, [*ENDS, 0.0, *cars])[1:-1]
+        joints = _merged(np.concatenate([edges, _inside(track.edges, edges), kinks]), whole)
         return replace(
             track,
             block=np.concatenate([track.block, block, *(load.block for load in loads)]),
             low=float(edges[0]),
             high=float(edges[-1]),
             ends=("domain-end", "domain-end"),
-            breaks=breaks,
+            breaks=joints[np.unique(np.searchsorted(0.5 * (joints[:-1] + joints[1:]), kinks))],
             origins=np.empty((0, 3)),
             joints=joints,
         )
@@ -229,17 +238,28 @@ def _merged(places: Array, whole: float) -> Array:
     return merged
 
 
-def _edges(track: Chart, places: Array, length: float) -> Array:
-    """Return the places of the train's middle at which one of its ends passes given places, and the ends of the
+def _passages(track: Chart, places: Array, length: float, shares: Sequence[float]) -> Array:
+    """Return the places of the train's middle at which some points of it pass given places, and the ends of the
     middle's range.
+
+    Parameters
+    ----------
+    track
+        The chart of the track.
+    places
+        Arc lengths.
+    length
+        The length of the train.
+    shares
+        The distance of each point ahead of the middle, as a share of this length.
     """
-    ends = np.concatenate([places - 0.5 * length, places + 0.5 * length])
+    found = (places - length * np.array(shares)[:, None]).ravel()
     if track.period:
         low, high = track.low, track.low + track.period
-        ends = low + np.mod(ends - low, track.period)
+        found = low + np.mod(found - low, track.period)
     else:
         low, high = track.low + 0.5 * length, track.high - 0.5 * length
-    return _merged(np.concatenate([[low, high], _inside(ends, np.array([low, high]))]), high - low)
+    return _merged(np.concatenate([[low, high], _inside(found, np.array([low, high]))]), high - low)
 
 
 def _graded(edges: Array, is_closed: bool) -> Array:

@@ -2,10 +2,10 @@
 
 The means are those of the midpoint rule in phase angles, which converges as fast as the trapezoidal rule and needs no
 values at turning points, where V**2 and the divided differences of the potential vanish together. Near a separatrix it
-would need too many nodes; there Gauss's rules on the panels of the motion are used.
+would need too many nodes; there Gauss's rule is used on panels that are halved where the body is slow.
 """
 
-from math import fabs, inf
+from math import fabs, floor, inf
 
 import numpy as np
 from numba import types
@@ -14,11 +14,11 @@ from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS, RULE
-from gqm_sym.runtime.double_double.quadrature import MAX_PANELS, MIN_PANELS, fill_panel
-from gqm_sym.runtime.gradients.programs import Program
+from gqm_sym.runtime.double_double.quadrature import fill_panel
+from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
@@ -29,12 +29,18 @@ MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
 
-# The largest change of an integral over a panel when the panel is halved, as a share of the integral of the absolute
-# values.
-MAX_PANEL_CHANGE = 1e-20
+# A panel is resolved if the last two Legendre coefficients of each result are below this share of the mean of the
+# absolute values so far, or below its rounding: Gauss's rule is exact for twice as many powers, and its error about the
+# square of this. The smallest width of a panel as a share of the phase, and the largest number of panels.
+MAX_TAIL, MIN_PANEL, MAX_PANELS = 1e-10, 2.0**-48, 1024
 
-# The number of Newton steps to the turning points, starting from doubles.
-NEWTON_STEPS = 2
+# The largest rounding error of a mean by panels, as a share of the mean of the absolute values. The answer is rounded
+# to a double.
+MAX_PANEL_ROUNDING = 2.0**-54
+
+# The smallest number of Newton steps to the turning points, starting from doubles, and the largest, which few launches
+# beside a hilltop need.
+NEWTON_STEPS, MAX_NEWTON_STEPS = 2, 6
 
 # The codes in place of the number of nodes: digits were lost, or the nodes are too few with any number of digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
@@ -82,26 +88,44 @@ def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def set_variable(variables, k, high, low):  # type: ignore[no-untyped-def]
+    """Set one of the variables of a launch (`formula_orbit.variables_of`)."""
+    variables[0, k], variables[1, k], variables[2, k] = high, low, 0.25 * UNIT * fabs(high) if low != 0.0 else 0.0
+
+
+@Inner
 def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyped-def]
     """Fill the inputs of a libration: its variables, both turning points near ``span``, and of each the derivatives
     that `programs.turning_point_program` has.
+
+    A launch from rest is one of the turning points, and is not improved.
     """
     count, outputs = variables.shape[1], program[4]
-    rows = outputs.size - 1
-    places = np.zeros((2, 2))
-    places[0, 0], places[0, 1] = span[0], span[1]
+    rows, launch, rests = outputs.size - 1, count - LAUNCH_VARIABLES, variables[0, count - LAUNCH_VARIABLES + 1] == 0.0
+    places, is_done = np.zeros((2, 2)), False
+    for i in range(2):
+        is_launch = rests and span[i] == variables[0, launch]
+        places[0, i], places[1, i] = span[i], variables[1, launch] if is_launch else 0.0
     begin(program, work, variables)
-    for step in range(NEWTON_STEPS + 1):
+    for step in range(MAX_NEWTON_STEPS + 1):
         evaluate_block(program, work, places[0], places[1])
-        if step < NEWTON_STEPS:
-            for i in range(2):
-                at = outputs[0] + i
+        is_done = step >= NEWTON_STEPS
+        for i in range(2):
+            is_launch, at = rests and span[i] == variables[0, launch], outputs[0] + i
+            is_done = is_done and (is_launch or not fabs(work[at]) > work[at + ERROR])
+        if is_done:
+            break
+        for i in range(2):
+            at = outputs[0] + i
+            if not (rests and span[i] == variables[0, launch]):
                 places[0, i], places[1, i] = add(places[0, i], places[1, i], work[at], work[at + LOW])
     inputs[:, :count] = variables
     for i in range(2):
         at = outputs[0] + i
         inputs[0, count + i], inputs[1, count + i] = places[0, i], places[1, i]
         inputs[2, count + i] = fabs(work[at]) + work[at + ERROR] + UNIT * fabs(places[0, i])
+        if rests and span[i] == variables[0, launch]:
+            inputs[2, count + i] = variables[2, launch]
         for k in range(rows):
             at, to = outputs[1 + k] + i, count + 2 + i * rows + k
             inputs[0, to], inputs[1, to], inputs[2, to] = work[at], work[at + LOW], work[at + ERROR]
@@ -200,78 +224,85 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
 
 
 @Inner
-def integrate(program, work, kind, left, width, panels, rule, found):  # type: ignore[no-untyped-def]
-    """Fill the integrals of all results over an interval of phase angles, by Gauss's rule on panels of equal width."""
-    outputs, n = program[4], RULE * panels
-    step, nodes = (width[0] / panels, width[1] / panels), np.empty((4, n))
-    for panel in range(panels):
-        fill_panel(kind, left, step, panel, rule, nodes)
-    found[:, :] = 0.0
-    for start in range(0, n, BLOCK):
-        stop = min(start + BLOCK, n)
-        evaluate_block(program, work, nodes[0, start:stop], nodes[1, start:stop])
+def add_panels(program, work, kind, whole, rule, found):  # type: ignore[no-untyped-def]
+    """Add the means of all results over phases from 0 to ``whole`` by Gauss's rule on panels, which are halved until
+    polynomials resolve the results; return whether they do.
+    """
+    outputs, nodes, here = program[4], np.empty((4, RULE)), np.empty((program[4].size, MEAN))
+    start, width, panels, is_resolved = 0.0, 1.0, 0, True
+    while start < 1.0 and width >= MIN_PANEL and panels < MAX_PANELS:
+        left, step = multiply(whole[0], whole[1], start, 0.0), (width * whole[0], width * whole[1])
+        fill_panel(kind, left, step, 0, rule, nodes)
+        evaluate_block(program, work, nodes[0], nodes[1])
         for j in range(outputs.size):
-            for i in range(stop - start):
-                at, k = outputs[j] + i, (start + i) % RULE
-                value, low = multiply(work[at], work[at + LOW], rule[2, k], rule[3, k])
-                found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], value, low)
-                found[j, 2] += rule[2, k] * work[at + ERROR] + UNIT * fabs(found[j, 0])
-                found[j, 3] += fabs(value)
-    for j in range(outputs.size):
-        found[j, 0], found[j, 1] = multiply(found[j, 0], found[j, 1], step[0], step[1])
-        found[j, 2], found[j, 3] = step[0] * found[j, 2], step[0] * found[j, 3]
+            high, low, error, size, tail, next_tail = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(RULE):
+                at = outputs[j] + k
+                value, rest = multiply(work[at], work[at + LOW], rule[2, k], rule[3, k])
+                high, low = add(high, low, value, rest)
+                error += rule[2, k] * work[at + ERROR] + UNIT * fabs(high)
+                size += fabs(value)
+                tail, next_tail = tail + rule[4, k] * work[at], next_tail + rule[5, k] * work[at]
+            here[j, 0], here[j, 1], here[j, 2], here[j, 3] = width * high, width * low, width * error, width * size
+            tail = width * (fabs(tail) + fabs(next_tail))
+            is_resolved = tail <= max(MAX_TAIL * (found[j, 3] + here[j, 3]), here[j, 2])
+            if not is_resolved:
+                break
+        panels += 1
+        if not is_resolved:
+            width *= 0.5
+            continue
+        for j in range(outputs.size):
+            found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], here[j, 0], here[j, 1])
+            found[j, 2], found[j, 3] = found[j, 2] + here[j, 2], found[j, 3] + here[j, 3]
+        start += width
+        while start < 1.0 and 0.5 * start / width == floor(0.5 * start / width):
+            width *= 2.0  # both halves of a panel are done
+    return start == 1.0
 
 
-@entry(INTEGER(PROGRAM, VECTOR, MATRIX, INTEGER, VECTOR, MATRIX, MATRIX), checked=False)
-def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: ignore[no-untyped-def]
+@Inner
+def fill_panel_means_of(program, work, inputs, kind, rule, found):  # type: ignore[no-untyped-def]
+    """Fill the means of all results, as `fill_panel_means` does."""
+    sides = inputs.shape[0]
+    whole = (2.0 * HALF_PI[0] / sides, 2.0 * HALF_PI[1] / sides) if kind == LIBRATION else (1.0 / sides, 0.0)
+    found[:, :] = 0.0
+    for side in range(sides):
+        begin(program, work, inputs[side])
+        if not add_panels(program, work, kind, whole, rule, found):
+            return NOT_SMOOTH
+    rounding = 0.0
+    for j in range(found.shape[0]):
+        rounding = max(rounding, rounding_of(j, found[j, 3], found[j, 2], found[0, 3]))
+        for part in range(MEAN):
+            found[j, part] /= sides
+    clear_rounding(found)
+    return sides if rounding <= MAX_PANEL_ROUNDING else LOST_DIGITS
+
+
+@entry(INTEGER(PROGRAM, VECTOR, CUBE, INTEGER, MATRIX, MATRIX), checked=False)
+def fill_panel_means(program, work, inputs, kind, rule, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means` does, for a motion that passes near an equilibrium.
 
     Parameters
     ----------
-    program, work, inputs, found
+    program, work, found
         As for `fill_means`.
+    inputs : (1, 3, m) or (2, 3, m) array
+        The inputs of the program, whose phase then goes from 0 to its end; or those for each half of the phase, which
+        goes from 0 to the middle twice.
     kind : int
         LIBRATION or CIRCULATION.
-    edges : (n,) array
-        Phase angles, from the first to the last one, between which the integrands are smooth.
-    rule : (4, n) array
-        The nodes of a panel (`nodes.panel_rule`).
+    rule : (6, n) array
+        The nodes of a panel, and what finds the last two Legendre coefficients from values there
+        (`panels.rule_with_tails`).
 
     Returns
     -------
     int
-        The number of intervals, or a code of failure.
+        The number of sets of inputs, or a code of failure.
     """
-    begin(program, work, inputs)
-    now, before = np.empty((found.shape[0], MEAN)), np.empty((found.shape[0], MEAN))
-    found[:, :] = 0.0
-    for k in range(edges.size - 1):
-        # The upper turning point is at the angle pi itself.
-        right = edges[k + 1], 2.0 * HALF_PI[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
-        left, panels, change = (edges[k], 0.0), MIN_PANELS, inf
-        width = add(right[0], right[1], -left[0], 0.0)
-        while not change <= MAX_PANEL_CHANGE:
-            if panels > MAX_PANELS:
-                return NOT_SMOOTH
-            integrate(program, work, kind, left, width, panels, rule, now)
-            change = 0.0 if panels > MIN_PANELS else inf
-            for j in range(found.shape[0]):
-                size = now[j, 3] + found[j, 3]
-                if panels > MIN_PANELS and is_significant(j, size, now[j, 2]):
-                    step = max(0.0, fabs(add(now[j, 0], now[j, 1], -before[j, 0], -before[j, 1])[0]) - now[j, 2]) / size
-                    change = step if not step <= change else change
-                before[j, 0], before[j, 1] = now[j, 0], now[j, 1]
-            panels *= 2
-        for j in range(found.shape[0]):
-            found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], now[j, 0], now[j, 1])
-            found[j, 2], found[j, 3] = found[j, 2] + now[j, 2], found[j, 3] + now[j, 3]
-    rounding, whole = 0.0, (edges[edges.size - 1], 2.0 * HALF_PI[1] if kind == LIBRATION else 0.0)
-    for j in range(found.shape[0]):
-        rounding = max(rounding, rounding_of(j, found[j, 3], found[j, 2], found[0, 3]))
-        found[j, 0], found[j, 1] = divide(found[j, 0], found[j, 1], whole[0], whole[1])
-        found[j, 2], found[j, 3] = found[j, 2] / whole[0], found[j, 3] / whole[0]
-    clear_rounding(found)
-    return edges.size - 1 if rounding <= MAX_ROUNDING else LOST_DIGITS
+    return fill_panel_means_of(program, work, inputs, kind, rule, found)
 
 
 @entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, CUBE), checked=False)

@@ -9,12 +9,11 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
-from gqm_sym.runtime.double_double.nodes import LEVELS, panel_rule, trapezoidal_nodes
+from gqm_sym.runtime.double_double.nodes import LEVELS, trapezoidal_nodes
 from gqm_sym.runtime.double_double.orbit_time import Orbit
 from gqm_sym.runtime.gradients.evaluation import (
     LOST_DIGITS,
     MEAN,
-    NOT_SMOOTH,
     fill_means,
     fill_panel_means,
     values,
@@ -26,7 +25,8 @@ from gqm_sym.runtime.gradients.orbit import (
     pairs,
     without_formulas,
 )
-from gqm_sym.runtime.gradients.panels import Panels, resolved
+from gqm_sym.runtime.gradients.panels import Panels, resolved, rule_with_tails
+from gqm_sym.runtime.gradients.passages.from_turns import fill_other_side, from_turn_program
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
@@ -46,6 +46,10 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # What stands for a number of nodes that double-double arithmetic does not tell.
 UNKNOWN = -1
+
+# The largest error of a derivative, as a share of it, if equal steps of the phase angle lose digits. In a small swing
+# the values along the orbit all but cancel.
+MAX_SHARE = 2.0**-54
 
 # Pi as two doubles.
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
@@ -144,6 +148,17 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         """Return the integrand along the orbit."""
         return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
 
+    def _on_both_sides(self, inputs: Array) -> Array:
+        """Return the inputs of `_from_turns` for both halves of a libration."""
+        both = np.stack([inputs, inputs])
+        fill_other_side(both, self.source.inputs)
+        return both
+
+    @property
+    def _from_turns(self) -> Program | None:
+        """The integrand along half of a libration, from each turning point; None if there is none."""
+        return None if self.direction else from_turn_program(self.source)
+
     @cached_property
     def _rule(self) -> tuple[Array, Array]:
         """The inputs of the orbit's program in double-double arithmetic, and the table of nodes."""
@@ -194,11 +209,18 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
             return None, UNKNOWN
         (inputs, nodes), found = self._rule_with(ends()), np.zeros((program.outputs.size, MEAN))
         n = fill_means(program.operands, program.work, inputs, nodes, found)
-        if n != NOT_SMOOTH:
-            return (None, UNKNOWN) if n == LOST_DIGITS else (found, n)
-        kind = CIRCULATION if self.direction else LIBRATION
-        n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges(), panel_rule(), found)
-        return found if n > 0 else None, 0
+        if n > 0:
+            return found, n
+        kind, is_lost = CIRCULATION if self.direction else LIBRATION, n == LOST_DIGITS
+        ways = [] if is_lost else [(program, inputs[np.newaxis])]
+        if program is self._program and self._from_turns is not None:
+            ways.insert(0, (self._from_turns, self._on_both_sides(inputs)))
+        for program, sides in ways:
+            if fill_panel_means(program.operands, program.work, sides, kind, rule_with_tails(), found) > 0:
+                mean, _, error, _ = np.abs(found[1 : 1 + self.source.variables]).T
+                if not is_lost or (error <= MAX_SHARE * mean).all():
+                    return found, 0
+        return None, UNKNOWN if is_lost else 0
 
     def second_durations(self, rows: tuple[int, ...]) -> Array:
         """Return the derivatives that `OrbitDerivatives.second_durations` describes."""
@@ -243,11 +265,29 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return found if self.direction else np.hstack([found, found[:, ::-1]])
 
     def _on_panels(self) -> Panels:
-        """Return the results of the orbit's program in double-double arithmetic on panels of the phase."""
-        program, inputs = self._program, self._rule[0]
-        kind = CIRCULATION if self.direction else LIBRATION
-        everything = np.arange(program.outputs.size)
-        return resolved(kind, self._edges(), lambda s: values(program, inputs, *s), everything, everywhere=True)
+        """Return the results of the orbit's program on panels of the phase, in mpmath if double-double arithmetic
+        loses digits.
+        """
+        kind, everything = CIRCULATION if self.direction else LIBRATION, np.arange(self._program.outputs.size)
+        ways = [lambda shares: values(self._program, self._rule[0], *shares)]
+        if self._from_turns is not None:
+            ways.insert(0, self._values_from_turns)
+        for evaluate in ways:
+            with suppress(SolutionError):
+                return resolved(kind, self._edges(), evaluate, everything, everywhere=True)
+        return self._multiprecision.panels(everywhere=True)[0]
+
+    def _values_from_turns(self, shares: Array) -> Array:
+        """Return the results of `_from_turns` at shares of the orbit's width, which are two doubles each."""
+        program = self._from_turns
+        assert program is not None
+        found = np.empty((program.outputs.size, 3, shares.shape[1]))
+        rest = (1.0 - shares[0]) - shares[1]
+        from_upper = np.array([rest, ((1.0 - shares[0]) - rest) - shares[1]])
+        halves = shares[0] < 0.5, shares[0] >= 0.5
+        for half, places, inputs in zip(halves, (shares, from_upper), self._on_both_sides(self._rule[0]), strict=True):
+            found[:, :, half] = values(program, inputs, *np.ascontiguousarray(places[:, half]))
+        return found
 
     @property
     def width(self) -> float:

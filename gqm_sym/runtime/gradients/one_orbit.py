@@ -1,21 +1,21 @@
 """The derivatives of the half period or the time of a lap of one motion along a curve with formulas, in one call of
-compiled code.
+compiled code, or in two beside a hilltop.
 """
 
 from functools import lru_cache
-from math import fabs
 from typing import Any
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.elementary import HALF_PI
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, multiply
+from gqm_sym.runtime.double_double.arithmetic import multiply
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
-from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, fill_means_of, fill_turns
+from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, fill_means_of, fill_turns, set_variable
 from gqm_sym.runtime.gradients.formula_orbit import source_of
+from gqm_sym.runtime.gradients.passages.slow_orbits import slow_gradients
 from gqm_sym.runtime.gradients.programs import (
     LAUNCH_VARIABLES,
     Source,
@@ -25,12 +25,6 @@ from gqm_sym.runtime.gradients.programs import (
 )
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
-
-
-@Inner
-def set_variable(variables, k, high, low):  # type: ignore[no-untyped-def]
-    """Set one of the variables of a launch (`formula_orbit.variables_of`)."""
-    variables[0, k], variables[1, k], variables[2, k] = high, low, 0.25 * UNIT * fabs(high) if low != 0.0 else 0.0
 
 
 @entry(
@@ -105,9 +99,14 @@ def period_gradient(problem: Problem, direction: int, span: tuple[float, float],
     rows : tuple of int
         The variables of differentiation (`programs.Source`).
     """
-    programs, works, kind, nodes = _programs(source_of(problem.formulas), direction, rows)
+    source = source_of(problem.formulas)
+    programs, works, kind, nodes = _programs(source, direction, rows)
     lam0, v0 = problem.launch.lam0, problem.launch.v0
     launch, found = (lam0.value, lam0.low, v0.value, v0.low, *span), np.empty(len(rows))
     parameters = np.array([[n.value for n in problem.p], [n.low for n in problem.p]])
-    is_found = fill_period_gradient(programs, works, kind, parameters, launch, nodes, found)
-    return found if is_found else None
+    if fill_period_gradient(programs, works, kind, parameters, launch, nodes, found):
+        return found
+    ends = ((lam0.value,), (lam0.low,)) if direction else (span, (0.0, 0.0))  # a lap begins at the launch
+    given = [[*parameters[0], lam0.value, v0.value, 0.0, *ends[0]], [*parameters[1], lam0.low, v0.low, 0.0, *ends[1]]]
+    (found,) = slow_gradients(source, direction, rows, np.array(given)[:, :, np.newaxis])
+    return None if np.isnan(found).any() else found

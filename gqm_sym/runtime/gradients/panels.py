@@ -1,6 +1,7 @@
 """Integrands along an orbit on panels of the phase, which are halved until polynomials resolve them."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,14 @@ class Panels(NamedTuple):
         """The phase angle, or the share of a lap, at each node: an array of shape (m, RULE)."""
         found: Array = self.edges[:-1, None] + np.diff(self.edges)[:, None] * panel_rule()[0]
         return found
+
+
+@cache
+def rule_with_tails() -> Array:
+    """Return the nodes and weights of a panel (`nodes.panel_rule`), and the factors of values at the nodes in the last
+    two Legendre coefficients: an array of shape (6, RULE).
+    """
+    return np.vstack([panel_rule(), to_legendre()[:, -2:].T])
 
 
 @entry(types.void(INTEGER, MATRIX, MATRIX, MATRIX), checked=False)

@@ -1,6 +1,7 @@
 """The changes along an orbit as a series with its integrals: a Fourier series, or Legendre series on panels."""
 
 from collections.abc import Sequence
+from functools import cache
 from math import cos, pi, sin
 
 import numpy as np
@@ -200,6 +201,7 @@ def fill_polynomials(edges, table, phases, found):  # type: ignore[no-untyped-de
             found[0, j, i], found[1, j, i] = sums[j], sums[functions // 2 + j]
 
 
+@cache
 def to_legendre() -> Array:
     """Return the matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
     rule = panel_rule()

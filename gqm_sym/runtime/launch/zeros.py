@@ -47,6 +47,10 @@ POLE_GAIN, POLE_RATIO, POLE_BEGIN = 0.8, 256.0, 2.0**24
 # Width of the narrowest step as a share of the parameter: a few units in the last place.
 MIN_STEP_SHARE = 1e-15
 
+# The largest number of steps to a zero. Halving the bracket needs 1,100 of them between the smallest and the largest
+# double, and so many are taken only if a zero lies that near to the launch.
+MAX_ZERO_STEPS = 2200
+
 # Half-width of the surroundings of a zero that are searched for an equilibrium, as a share of the parameter.
 MAX_ZERO_ERROR_SHARE = 1e-6
 
@@ -104,8 +108,8 @@ def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-de
     bracket.
     """
     point, rows = arrays.point, arrays.rows
-    x = 0.5 * (lo + hi)
-    for _ in range(200):
+    x, moved = 0.5 * (lo + hi), fabs(hi - lo)
+    for _ in range(MAX_ZERO_STEPS):
         value, _size = speed_squared(fns, p, lam0, w0, x, arrays)
         if value == 0.0:
             return x
@@ -117,11 +121,12 @@ def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-de
         call_effective_potential(fns.effective_potential, 1, point, p, rows)
         slope = -2.0 * rows[1, 0]
         new = x - value / slope if slope != 0.0 else inf
-        if not (min(lo, hi) < new < max(lo, hi)):
+        # On an exponential wall the steps are all equal. Halving the bracket is faster than steps that shrink less.
+        if not (min(lo, hi) < new < max(lo, hi)) or fabs(new - x) > 0.5 * moved:
             new = 0.5 * (lo + hi)
         if new == x or new == lo or new == hi or fabs(new - x) <= 1e-16 * fabs(new):
             return new
-        x = new
+        x, moved = new, fabs(new - x)
     return x
 
 

@@ -12,7 +12,8 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import without_formulas
-from gqm_sym.runtime.gradients.passages.passage import PassageChanges, gradient
+from gqm_sym.runtime.gradients.passages.passage import PassageChanges
+from gqm_sym.runtime.gradients.passages.quantities import gradient
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import STATE_ROWS, Sensitivity
 from gqm_sym.runtime.interface import ExactFormulas

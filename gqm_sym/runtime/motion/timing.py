@@ -276,10 +276,11 @@ def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:
     """Return arithmetic in which V**2, by subtraction of potentials, keeps that many digits at every node."""
     working_digits = digits + 20 + (60 if segment.from_multiprecision else 0)
     rough = problem.exact.at(working_digits)
-    middle = 0.5 * (segment.a + segment.b)
-    while not (top := abs(rough.speed_squared(rough.mpf(middle))) / rough.size) and rough.digits < MAX_DIGITS:
+    middle = rough.mpf(0.5 * (segment.a + segment.b))
+    while not (v2 := abs(rough.speed_squared(middle))) and rough.digits < MAX_DIGITS:
         rough = problem.exact.at(2 * rough.digits)  # all digits cancel
-    lost = ceil(-rough.context.log10(top)) if 0 < top < 1 else 0
+    error = rough.error_of_speed_squared(middle)
+    lost = ceil(rough.digits + rough.context.log10(error / v2)) if v2 and error else 0
     return problem.exact.at(working_digits + lost) if lost > MAX_LOST_DIGITS else rough
 
 

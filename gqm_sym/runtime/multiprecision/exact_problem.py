@@ -29,6 +29,10 @@ PRECISIONS = (40, 80, 210)
 # The number of digits that rounding and cancellation may cost.
 GUARD_DIGITS = 15
 
+# The share of the way from the launch to a place at which the potential's size is evaluated. It is no round number,
+# because potentials may agree at round shares.
+SHARE_OF_WAY = 0.7390851332151607
+
 # A segment with more panels than this has a peak for which the trapezoidal rule would need too many nodes.
 MAX_SMOOTH_PANELS = 8
 
@@ -114,7 +118,7 @@ class ExactProblem:
                 w = a.speed_squared(top)
                 curvature = abs(a.potential_curvature(top))
                 guess = top - direction * a.sqrt(abs(w) / curvature) if curvature else here
-            lost = a.mpf(10) ** (2 * GUARD_DIGITS - digits) * a.size
+            lost = a.mpf(10) ** (2 * GUARD_DIGITS) * a.error_of_speed_squared(there if top is None else top)
             # So slow a body turns at a place where cancellation leaves fewer digits of the potential than a double has.
             if abs(w) <= lost or (0 < a.w0 <= lost and digits < PRECISIONS[-1]):
                 continue
@@ -140,8 +144,6 @@ class Arithmetic:
         The launch place, and V**2 there.
     base
         The effective potential at the launch place.
-    size
-        The size of V**2 and of the effective potential, with which rounding errors are compared.
     """
 
     problem: ExactProblem
@@ -151,7 +153,6 @@ class Arithmetic:
     lam0: Any = field(init=False)
     w0: Any = field(init=False)
     base: Any = field(init=False)
-    size: Any = field(init=False)
 
     def __post_init__(self) -> None:
         from mpmath.ctx_mp import MPContext
@@ -163,7 +164,6 @@ class Arithmetic:
         self.lam0 = self.track.lam0
         self.w0 = self.problem.v0.at(self.context) ** 2
         self.base = self.effective_potential(self.lam0)
-        self.size = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(self.track.elsewhere()) - self.base)
 
     def mpf(self, value: Any) -> Any:
         """Return a number of this precision."""
@@ -207,6 +207,18 @@ class Arithmetic:
     def speed_squared(self, lam: Any) -> Any:
         """Return V**2, by subtraction."""
         return self.w0 + 2 * self.base - 2 * self.effective_potential(lam)
+
+    def error_of_speed_squared(self, lam: Any) -> Any:
+        """Return how much rounding may change V**2 at a place: a rounding of its terms, and the change of both
+        potentials if they are evaluated with more digits.
+        """
+        finer, between = self.problem.at(self.digits + GUARD_DIGITS), self.lam0 + SHARE_OF_WAY * (lam - self.lam0)
+        size = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(between) - self.base)
+        changes = [
+            abs(finer.effective_potential(finer.mpf(place)) - finer.mpf(self.effective_potential(place)))
+            for place in (self.lam0, lam)
+        ]
+        return self.mpf(10) ** -self.digits * size + 2 * self.mpf(sum(changes))
 
     def equilibrium(self, near: Any, far: Any) -> Any | None:
         """Return the zero of the effective potential's slope near two places, or None if there is none."""

@@ -30,9 +30,6 @@ class Track(Protocol):
     def period(self) -> Any:
         """Return the period of lam on a closed curve."""
 
-    def elsewhere(self) -> Any:
-        """Return a place away from the launch, at which the size of the effective potential is evaluated."""
-
     def joints(self, low: Any, high: Any) -> Sequence[Any] | None:
         """Return the places between two others at which the curve is not analytic; None if there are none anywhere."""
 
@@ -75,12 +72,6 @@ class FormulaTrack:
     def period(self) -> Any:
         """Return the period of lam on a closed curve."""
         return self.domain(self.context, self.values)[2]
-
-    def elsewhere(self) -> Any:
-        """Return a place whose distance from the launch is not a round number, because potentials may agree at round
-        distances.
-        """
-        return self.lam0 + self.context.mpf("0.7390851332151607")
 
     def joints(self, low: Any, high: Any) -> None:
         """Return None, because formulas are analytic."""

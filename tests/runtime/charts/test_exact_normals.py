@@ -269,10 +269,11 @@ def test_spline(generated_folder: Path) -> None:
 
 def _spline_place(at: Callable[[mpf, int], tuple[mpf, mpf]], length: mpf, breaks: np.ndarray) -> mpf:
     """Return the place on a spline at a length that lies before its first break."""
-    place = length
-    for _ in range(8):
-        gone = mp.quad(lambda u: mp.hypot(*at(u, 1)), [mpf(0), place])
-        place += (length - gone) / mp.hypot(*at(place, 1))
+    place, step = length, length
+    while abs(step) > mpf(10) ** -25:  # the next one would be below rounding
+        gone = mp.quad(lambda u: mp.hypot(*at(u, 1)), [mpf(0), place], method="gauss-legendre")
+        step = (length - gone) / mp.hypot(*at(place, 1))
+        place += step
     assert place < breaks[1]
     return place
 

@@ -1,13 +1,14 @@
 """Rails put together from pieces agree with Fresnel integrals, closed forms and an integration in time."""
 
 import math
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from mpmath import ellipk, mp, mpf
+from mpmath import ellipk, mp, mpc, mpf
 from railed import LOOP, built, chart_of
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -18,13 +19,19 @@ ULP = 2.0**-52
 G = 9.81
 
 
+@cache
+def standard_step(angle: mpf, first: mpf, bent: mpf, part: mpf) -> mpc:
+    """Return the vector over a length of a segment, the same for all places behind the segment."""
+    steps = mp.linspace(0, part, 2 + int(abs(first) * part + abs(first + 2 * bent * part) * part))
+    return mp.quad(lambda t: mp.expj(angle + first * t + bent * t * t), steps, method="gauss-legendre")
+
+
 def standard_truth(segments: list[tuple[mpf, mpf, mpf]], s: mpf, x: mpf, z: mpf, angle: mpf) -> tuple[mpf, ...]:
     """Return x, z, angle and curvature along lengths with given end curvatures, by quadrature in 30 digits."""
     for length, first, last in segments:
         part = min(length, s)
         bent = (last - first) / (2 * length)
-        steps = mp.linspace(0, part, 2 + int(abs(first) * part + abs(last) * part))
-        step = mp.quad(lambda t, a=angle, k=first, b=bent: mp.expj(a + k * t + b * t * t), steps)
+        step = standard_step(angle, first, bent, part)
         x, z, angle, s = x + step.real, z + step.imag, angle + first * part + bent * part * part, s - part
         if s <= 0:
             break

@@ -24,6 +24,7 @@ ModuleOf = Callable[[str], ModuleType]
 G = 9.81
 # The tolerance of a turning point on a slope of order one: its last places, and those of V**2 over its slope.
 TURN_PLACE = 1e-13
+EPS = float(np.finfo(float).eps)
 # Sampled values closer to zero than this share of v0**2 are left to the exact tests.
 CLEAR = 1e-6
 
@@ -227,3 +228,24 @@ def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -
     motion = valley.solve(middle + 0.5, 0.0)
     assert motion.kind == "libration"
     assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("scale", [1e3, 1.0, 1e-3, 1e-6, 1e-12])
+def test_an_exponential_wall_of_any_width(generated_folder: Any, scale: float, direction: int) -> None:
+    """A body turns where it is due on walls far narrower than the first step of the search, on which Newton's steps are
+    all equal.
+    """
+    model = gqm.derive(gqm.Curve.graph("S*(cosh(x/S) - 1)", parameter="x"), gqm.Gravity())
+    module = gqm.build(model, name="wall", folder=generated_folder)
+    speed = math.sqrt(G * scale) * 1e-3
+    motion = module.solve(0.5 * scale, speed, direction, S=scale)
+    with mp.workdps(60):
+        s, place = mpf(scale), mpf(0.5 * scale)
+        turn = float(s * mp.acosh(mp.cosh(place / s) + mpf(speed) ** 2 / (2 * mpf(G) * s)))
+        fastest = float(mp.sqrt(mpf(speed) ** 2 + 2 * mpf(G) * s * (mp.cosh(place / s) - 1)))
+    assert motion.turning_points == pytest.approx((direction * turn, -direction * turn), rel=2 * EPS, abs=0.0)
+    assert [leg.lam_end for leg in motion.legs][:2] == pytest.approx(
+        [direction * turn, -direction * turn], rel=2 * EPS, abs=0.0
+    )
+    assert motion.v_max.value == pytest.approx(fastest, rel=4 * EPS, abs=0.0)

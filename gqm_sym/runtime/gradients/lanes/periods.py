@@ -45,6 +45,7 @@ from gqm_sym.runtime.gradients.lanes.programs import (
     turn_program,
 )
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
+from gqm_sym.runtime.gradients.passages.slow_orbits import slow_gradients
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -144,7 +145,20 @@ def period_gradients(formulas: Formulas, launches: Launches, values: Array, rows
     if circulates.any():
         everything = tuple(range(len(rows)))
         fill_by_stages(lap_stages(source, launches, rows), launches, everything, circulates, found)
+    if np.isnan(found.sum()):  # one sum is much faster than one for each
+        fill_slow_orbits(source, launches, rows, found)
     return found
+
+
+def fill_slow_orbits(source: Source, launches: Launches, rows: tuple[int, ...], found: Array) -> None:
+    """Fill the derivatives that are NaN by panels of the phase, which serve orbits beside hilltops."""
+    left, directions = np.isnan(found).any(axis=1), np.where(launches.circulates, launches.directions, 0.0)
+    for direction in (0, 1, -1):
+        which = np.flatnonzero(left & (directions == direction))
+        if which.size:
+            launched = laps_of(source, launches) if direction else launches.table
+            slopes = slow_gradients(source, direction, rows, launched[np.newaxis, :, which])
+            found[which] = np.where(np.isnan(found[which]), slopes, found[which])
 
 
 class Group(NamedTuple):
@@ -241,10 +255,15 @@ def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> 
     yield Stage(serves, exact_swing_program, (source, plan), table, inputs, True)
 
 
+def laps_of(source: Source, launches: Launches) -> Array:
+    """Return the inputs of the program of laps, which begin at lam0, a column for each launch."""
+    table = launches.table
+    return np.vstack([table[: source.variables], table[source.parameters]])
+
+
 def lap_stages(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
     """Yield the programs for the times of laps."""
-    n, table = source.parameters, launches.table
-    laps = np.vstack([table[: source.variables], table[n]])  # a lap begins at lam0
+    laps = laps_of(source, launches)
     for direction in (1, -1):
         chosen = launches.circulates & (launches.directions == direction)
         yield Stage(

@@ -8,7 +8,7 @@ time are then regular, and the rest of the change follows from the speed.
 
 from functools import cached_property
 from math import ceil, isfinite, log, log2
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
-from gqm_sym.runtime.gradients.panels import UNDECIDED
+from gqm_sym.runtime.gradients.panels import UNDECIDED, rule_with_tails
 from gqm_sym.runtime.gradients.path import (
     CURVATURE,
     DS,
@@ -40,20 +40,15 @@ from gqm_sym.runtime.gradients.programs import (
     turning_point_program,
 )
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
-from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
-# The number of Newton steps to a turning point, starting from doubles, and the ends of the phase.
-NEWTON_STEPS, WHOLE_PHASE = 2, np.array([0.0, np.pi])
+# The number of Newton steps to a turning point, starting from doubles.
+NEWTON_STEPS = 2
 
 # Changes along a motion are resolved if the last two Legendre coefficients on all panels of the phase are below this
 # share of the largest value; panels are doubled from the first to the second number.
 MAX_TAIL, MIN_PANELS, MAX_PANELS = 1e-14, 2, 128
-
-# An extreme this near to the end of a motion, as a share of its time, counts as the end; so does one this near to the
-# turning point.
-AT_END = 1e-12
 
 # The length of a path changes by an integral on panels, which are halved until it changes by less than this share of
 # the largest; at most so many times.
@@ -152,7 +147,7 @@ class PassageChanges:
         a, b = (a, b) if (a.high, a.low) < (b.high, b.low) else (b, a)
         program, inputs = self._program(a, b)
         found = np.zeros((program.outputs.size, MEAN))
-        given = (program.operands, program.work, inputs, LIBRATION, WHOLE_PHASE, panel_rule(), found)
+        given = (program.operands, program.work, inputs[np.newaxis], LIBRATION, rule_with_tails(), found)
         if fill_panel_means(*given) <= 0:
             raise SolutionError(UNDECIDED)
         slopes = PI * (found[:, 0] + found[:, 1])
@@ -231,19 +226,23 @@ class PassageChanges:
         """Return the derivatives of the times at which the body is at places that move with the base, and those of arc
         lengths from the launch at fixed places.
         """
-        (slopes, arcs), problem = self._from_base(lam), self._problem
-        arcs = arcs - self._from_base(np.array([self.launch.high]))[1]
+        slopes, arcs = self._from_base(lam)
+        return self._since_launch(slopes, has_turned), arcs - self._from_base(np.array([self.launch.high]))[1]
+
+    def _since_launch(self, slopes: Array, has_turned: Array) -> Array:
+        """Return the derivatives of times from the launch, given those of the times between places and the base."""
+        problem = self._problem
         if self._near is None:
-            return slopes, arcs
+            return slopes
         if problem.w0 != 0.0:
             if self._before_turn is None:
                 self._before_turn = self._time(self.launch, self.turn)
-            return self._before_turn[:, None] + np.where(has_turned, slopes, -slopes), arcs
+            return self._before_turn[:, None] + np.where(has_turned, slopes, -slopes)
         # With a speed the body passes the launch later than its turning point, or comes back to it.
         at = np.array([self.launch.high])
         half_slope, ds = self._local(at)[1, 0, 0], self._path(at)[DS, 0, 0]
         slopes[self.source.parameters + 1] -= problem.launch.direction * self._heading * ds / abs(half_slope)
-        return slopes, arcs
+        return slopes
 
     def _local(self, lam: Array) -> Array:
         """Return half of V**2 with its first two derivatives, and those by all variables, as two doubles each."""
@@ -255,8 +254,12 @@ class PassageChanges:
 
     def time_slopes(self, lam: float, v: float, moved: Array, *, has_turned: bool) -> Array:
         """Return the derivatives of the time at which the body is at a place that changes by ``moved``."""
-        at = np.array([lam])
-        slopes = self.arrivals(at, np.array([has_turned]))[0][:, 0]
+        at, base = np.array([lam]), self._base
+        try:
+            slopes = self._time(base, base.beside(lam))
+        except SolutionError:  # the place is rounded, and lies beyond the base, or digits are lost
+            slopes = self._from_base(at)[0][:, 0]
+        slopes = self._since_launch(slopes[:, np.newaxis], np.array([has_turned]))[:, 0]
         found: Array = slopes + (moved - self._base.moves[0]) * self._path(at)[DS, 0, 0] / v
         return found
 
@@ -334,65 +337,3 @@ class PassageChanges:
                 break
             last = now
         return now
-
-
-def gradient(motion: Any, changes: PassageChanges, quantity: str) -> Array:
-    """Return the derivatives of a quantity of a motion with respect to all variables; for turning points, a row for
-    each.
-
-    Parameters
-    ----------
-    motion : motion.aperiodic.AperiodicMotion
-        The motion.
-    changes : PassageChanges
-        Its changes.
-    quantity : str
-        One of `launch.kinds.QUANTITIES`.
-    """
-    if quantity == "turning_points":
-        turns = [changes.turn.moves[0] for _ in motion.turning_points]
-        return np.array(turns).reshape(-1, changes.source.variables)
-    if quantity in EXTREMES:
-        return _extreme(motion, changes, quantity)
-    if quantity in FINAL_QUANTITIES and not isfinite(motion.t_end):
-        raise SolutionError(f"gradient: this motion goes on for ever and has no {quantity}")
-    if quantity != "t_end":
-        raise SolutionError(f"gradient: this motion has no {quantity}; it is of kind {motion.kind!r}")
-    what, state = motion.legs[-1].end, motion.state(motion.t_end)
-    if what == "horizon" or motion.t_end == 0.0:
-        return np.zeros(changes.source.variables)
-    has_turned = motion._has_turned(motion.t_end)
-    moved = changes.end(what, state.lam, changes.direction(has_turned=has_turned))
-    return changes.time_slopes(state.lam, state.v, moved, has_turned=has_turned)
-
-
-def _extreme(motion: Any, changes: PassageChanges, quantity: str) -> Array:
-    """Return the derivatives of an extreme.
-
-    Where the quantity is stationary it changes as it does at a fixed place (envelope theorem). At the launch, the
-    turning point and the end, the place changes too.
-    """
-    found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
-    if of_speed and found.value == 0.0:
-        return np.zeros(changes.source.variables)
-    place, end, direction = found.lam, motion.t_end, changes.direction(has_turned=motion._has_turned(found.t))
-    rows = changes.extreme_rows(place, direction, of_speed=of_speed)
-    if found.t == 0.0:
-        moved = changes.launch.moves[0]
-    elif isfinite(end) and abs(found.t - end) <= AT_END * end:
-        what, state = motion.legs[-1].end, motion.state(end)
-        at_horizon = what == "horizon"
-        if at_horizon:
-            at = np.array([state.lam]), np.array([state.v]), np.array([motion._has_turned(end)])
-            moved = changes.states(*at)[0, :, 0]
-        else:
-            moved = changes.end(what, state.lam, direction)
-    elif motion.turning_points and abs(place - changes.turn.high) <= AT_END * abs(place - changes.launch.high):
-        moved = changes.turn.moves[0]
-    else:
-        moved = np.zeros(changes.source.variables)
-        for _ in range(NEWTON_STEPS):
-            place = place - rows[1] / rows[2] if rows[2] != 0.0 else place
-            rows = changes.extreme_rows(place, direction, of_speed=of_speed)
-    total: Array = (rows[3:] + rows[1] * moved) / (found.value if of_speed else 1.0)
-    return total
