@@ -98,7 +98,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
         orbit = orbit_that_leaves(curve, lam0, v2, direction, ahead, behind)
         if orbit.leaves == 0 and direction != 0 and ends_at_cusp(curve, lam0, v2, ahead, behind):
             return NOT_PERIODIC, orbit, nowhere
-        return ANSWERED if orbit.leaves != 0 else UNDECIDED, orbit, nowhere
+        return (ANSWERED, orbit, passage_of(curve, orbit)) if orbit.leaves != 0 else (UNDECIDED, orbit, nowhere)
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
     orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)

@@ -205,7 +205,7 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
     value = value_from_table(curve, orbit, passage, quantity, target, buffers.half_v2_at_edges) if tabulated else nan
     if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
         value = time_on_panel_of_both(curve, passage)
-    by_formulas = orbit.leaves == 0 or passage.panels == 0 or follows_formulas(curve)
+    by_formulas = orbit.leaves == 0 or not passage.is_polished or follows_formulas(curve)
     if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value != value:

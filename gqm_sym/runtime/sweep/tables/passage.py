@@ -126,22 +126,42 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def turns_of(orbit):  # type: ignore[no-untyped-def]
+    """Return which ends of a known orbit are turning points."""
+    if orbit.leaves == 0:
+        return BOTH
+    if orbit.leaves == orbit.direction and orbit.v2 > 0.0:
+        return NEITHER
+    return LOWER if orbit.leaves > 0 else UPPER
+
+
+@Inner
 def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
     """Return the panels that a known orbit passes; none if the curve is not tabulated."""
     table, count = curve.table, curve.levels.size
     if count == 0:
         return NOWHERE
-    first, x, near = locate(table, curve.period, orbit.lam0 + orbit.low)
+    begin, end = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    turns, v2 = turns_of(orbit), 0.0
+    if orbit.leaves != 0:
+        begin, end = max(begin, table.edges[0]), min(end, table.edges[-1])
+        v2 = orbit.v2
+        if turns == NEITHER and orbit.leaves < 0:
+            launch = locate(table, curve.period, orbit.lam0)
+            prepare(curve, launch[0], FAR | NEAR)
+            prepare(curve, 0, FAR)
+            v2 = end_ahead(curve, launch, orbit.v2, -1)[2]
+    first, x, near = locate(table, curve.period, begin)
     if orbit.circulates:
         rests = from_right(x, near), from_left(x, near)
         return Passage(first, count + 1, x, x, rests[0], rests[1], curve.period, NEITHER, orbit.v2, False, count)
-    last, y, close = locate(table, curve.period, orbit.lam0 + orbit.high)
+    last, y, close = locate(table, curve.period, end)
     if close == 0.0 and y < 0.0 and last > first:  # at an edge, the body passes nothing of the panel beyond
         last, y = last - 1, 1.0
-    inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
+    inside = table.edges[0] <= begin and end <= table.edges[-1]
     panels, rests = last - first + 1 if inside or curve.period > 0.0 else 0, (from_right(x, near), from_left(y, close))
-    middle = middle_of(curve, orbit, first, panels, BOTH)
-    return Passage(first, panels, x, y, rests[0], rests[1], orbit.high - orbit.low, BOTH, 0.0, False, middle)
+    middle = middle_of(curve, orbit, first, panels, turns)
+    return Passage(first, panels, x, y, rests[0], rests[1], orbit.high - orbit.low, turns, v2, False, middle)
 
 
 @Inner
