@@ -75,7 +75,7 @@ def dissipative() -> list[tuple[str, float]]:
     joints, records = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE), np.empty((1, 16 * COLUMNS))
 
     def leg() -> int:
-        return answers.drive(loss, p.values.reshape(1, -1), joints, answers.LEGS, launch.copy(), records)
+        return answers.drive(loss, p.values.reshape(1, -1), NOWHERE, joints, answers.LEGS, launch.copy(), records)
 
     run = Run(records[0], leg(), "turn", None)
     back, time = run.panels_back, float(run.record[TIME_FROM_END])

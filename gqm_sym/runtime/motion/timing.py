@@ -29,6 +29,8 @@ MAX_DIGITS = 1000
 # The number of digits of V**2 that may cancel over a whole segment before the working precision is raised.
 MAX_LOST_DIGITS = 4
 
+# V**2 has digits if it is larger than this multiple of its error.
+MIN_V2_ERRORS = 1e3
 
 # The largest error of a turning point in double-double arithmetic, as a share of the width of the libration.
 MAX_TURN_ERROR = 2.0**-54
@@ -275,12 +277,18 @@ def _check_digits(digits: int) -> None:
 def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:
     """Return arithmetic in which V**2, by subtraction of potentials, keeps that many digits at every node."""
     working_digits = digits + 20 + (60 if segment.from_multiprecision else 0)
-    rough = problem.exact.at(working_digits)
-    middle = rough.mpf(0.5 * (segment.a + segment.b))
-    while not (v2 := abs(rough.speed_squared(middle))) and rough.digits < MAX_DIGITS:
+    middle, rough = 0.5 * (segment.a + segment.b), problem.exact.at(working_digits)
+    while True:
+        place = rough.mpf(middle)
+        v2, error = abs(rough.speed_squared(place)), rough.error_of_speed_squared(place)
+        if v2 > MIN_V2_ERRORS * error or rough.digits >= MAX_DIGITS:
+            break
         rough = problem.exact.at(2 * rough.digits)  # all digits cancel
-    error = rough.error_of_speed_squared(middle)
-    lost = ceil(rough.digits + rough.context.log10(error / v2)) if v2 and error else 0
+    # The search for a turning point stops at half of the digits of its place. On a narrow orbit it needs twice the
+    # digits by which the place is larger than the orbit: V**2 is the curvature times the square of the orbit's width.
+    curvature = sum(abs(rough.potential_curvature(lam)) for lam in (place, rough.lam0))
+    size = error * rough.mpf(10) ** rough.digits + curvature * place**2
+    lost = ceil(rough.context.log10(size / v2)) if v2 and size else 0
     return problem.exact.at(working_digits + lost) if lost > MAX_LOST_DIGITS else rough
 
 

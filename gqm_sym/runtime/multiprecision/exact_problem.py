@@ -209,16 +209,17 @@ class Arithmetic:
         return self.w0 + 2 * self.base - 2 * self.effective_potential(lam)
 
     def error_of_speed_squared(self, lam: Any) -> Any:
-        """Return how much rounding may change V**2 at a place: a rounding of its terms, and the change of both
-        potentials if they are evaluated with more digits.
+        """Return how much rounding may change V**2 at a place: a rounding of its terms and of both places, and the
+        change of both potentials if they are evaluated with more digits.
         """
         finer, between = self.problem.at(self.digits + GUARD_DIGITS), self.lam0 + SHARE_OF_WAY * (lam - self.lam0)
-        size = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(between) - self.base)
+        terms = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(between) - self.base)
+        terms += sum(2 * abs(self.effective_potential_slope(place) * place) for place in (self.lam0, lam))
         changes = [
             abs(finer.effective_potential(finer.mpf(place)) - finer.mpf(self.effective_potential(place)))
             for place in (self.lam0, lam)
         ]
-        return self.mpf(10) ** -self.digits * size + 2 * self.mpf(sum(changes))
+        return self.mpf(10) ** -self.digits * terms + 2 * self.mpf(sum(changes))
 
     def equilibrium(self, near: Any, far: Any) -> Any | None:
         """Return the zero of the effective potential's slope near two places, or None if there is none."""

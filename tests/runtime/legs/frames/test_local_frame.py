@@ -151,6 +151,17 @@ def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.Te
     assert motion.turning_points == pytest.approx((1.0, 1.0), abs=10.0**-exponent + 2e-16)
 
 
+@pytest.mark.parametrize("exponent", [30, 45, 100, 120])
+def test_a_swing_far_below_the_rounding_of_its_place(exponent: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """About 7 the half period is that of small oscillations, where the first digits that are tried give V**2 as mere
+    rounding (it was a ZeroDivisionError at 1e-45 and 1e-100).
+    """
+    curve = gqm.Curve.graph("cosh(x - 7) + x**2/9 - 14*x/9", parameter="x")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="vase", folder=tmp_path_factory.getbasetemp() / "vase")
+    motion = module.solve(f"7 + 1e-{exponent}")
+    assert motion.half_period == pytest.approx(math.pi / math.sqrt(9.81 * 11 / 9), rel=2e-16)
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("exponent", [100, 115, 117, 140, 150])
 def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, law: str, pairs: Pairs) -> None:
