@@ -103,28 +103,28 @@ def fill_turns(program, work, variables, span, inputs):  # type: ignore[no-untyp
     count, outputs = variables.shape[1], program[4]
     rows, launch, rests = outputs.size - 1, count - LAUNCH_VARIABLES, variables[0, count - LAUNCH_VARIABLES + 1] == 0.0
     places, is_done = np.zeros((2, 2)), False
+    is_launch = rests and span[0] == variables[0, launch], rests and span[1] == variables[0, launch]
     for i in range(2):
-        is_launch = rests and span[i] == variables[0, launch]
-        places[0, i], places[1, i] = span[i], variables[1, launch] if is_launch else 0.0
+        places[0, i], places[1, i] = span[i], variables[1, launch] if is_launch[i] else 0.0
     begin(program, work, variables)
     for step in range(MAX_NEWTON_STEPS + 1):
         evaluate_block(program, work, places[0], places[1])
         is_done = step >= NEWTON_STEPS
         for i in range(2):
-            is_launch, at = rests and span[i] == variables[0, launch], outputs[0] + i
-            is_done = is_done and (is_launch or not fabs(work[at]) > work[at + ERROR])
+            at = outputs[0] + i
+            is_done = is_done and (is_launch[i] or not fabs(work[at]) > work[at + ERROR])
         if is_done:
             break
         for i in range(2):
             at = outputs[0] + i
-            if not (rests and span[i] == variables[0, launch]):
+            if not is_launch[i]:
                 places[0, i], places[1, i] = add(places[0, i], places[1, i], work[at], work[at + LOW])
     inputs[:, :count] = variables
     for i in range(2):
         at = outputs[0] + i
         inputs[0, count + i], inputs[1, count + i] = places[0, i], places[1, i]
         inputs[2, count + i] = fabs(work[at]) + work[at + ERROR] + UNIT * fabs(places[0, i])
-        if rests and span[i] == variables[0, launch]:
+        if is_launch[i]:
             inputs[2, count + i] = variables[2, launch]
         for k in range(rows):
             at, to = outputs[1 + k] + i, count + 2 + i * rows + k

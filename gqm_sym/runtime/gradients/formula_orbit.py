@@ -27,6 +27,7 @@ from gqm_sym.runtime.gradients.orbit import (
 )
 from gqm_sym.runtime.gradients.panels import Panels, resolved, rule_with_tails
 from gqm_sym.runtime.gradients.passages.from_turns import fill_other_side, from_turn_program
+from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
     Program,
@@ -46,10 +47,6 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # What stands for a number of nodes that double-double arithmetic does not tell.
 UNKNOWN = -1
-
-# The largest error of a derivative, as a share of it, if equal steps of the phase angle lose digits. In a small swing
-# the values along the orbit all but cancel.
-MAX_SHARE = 2.0**-54
 
 # Pi as two doubles.
 PI, PI_LOW = np.pi, 1.2246467991473532e-16

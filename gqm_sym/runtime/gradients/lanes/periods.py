@@ -45,7 +45,7 @@ from gqm_sym.runtime.gradients.lanes.programs import (
     turn_program,
 )
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
-from gqm_sym.runtime.gradients.passages.slow_orbits import slow_gradients
+from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE, slow_gradients
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -59,10 +59,6 @@ MAX_CODED = 48
 
 # The ranges of phases of half periods and laps, as two doubles.
 PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.0)}
-
-# The largest error of a derivative of a small swing as a share of it. The values at its nodes all but cancel, because
-# its turning points move much farther than its half period changes.
-MAX_SHARE = 2.0**-54
 
 # A program without results, and its work space.
 NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))

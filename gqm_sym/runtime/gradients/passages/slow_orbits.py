@@ -34,7 +34,8 @@ from gqm_sym.runtime.gradients.programs import (
 )
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
-# The largest error of a derivative as a share of it.
+# The largest error of a derivative as a share of it. In a small swing the values along the orbit all but cancel,
+# because its turning points move much farther than its half period changes.
 MAX_SHARE = 2.0**-54
 
 # The number of launches from which on a thread is worth starting.
