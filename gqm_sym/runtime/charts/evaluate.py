@@ -28,6 +28,9 @@ ROWS = 4
 EDGES = 6
 RECORD = 6 + ROWS * TERMS
 
+# The margin of an enclosure of alpha, as a share of the numbers that it is computed from.
+ALPHA_ERROR_SHARE = 1e-12
+
 # The number by which `chart_rows` is asked for the size of the terms of a coordinate in space whose slope is at most 1.
 SIZES = 4
 
@@ -312,10 +315,33 @@ def ichart_slope(chart, s):  # type: ignore[no-untyped-def]
 @Inlined
 def _ichart_alpha(chart, s, scale):  # type: ignore[no-untyped-def]
     low, high = s
+    first, left, laps = find(chart, low)
+    last, right, more = find(chart, high)
+    if first == last and laps == more:
+        return _ichart_alpha_on_piece(chart, first, left, right, laps)
     middle = 0.5 * (low + high)
     value, here = chart_row(chart, 2, middle), _turned(chart, middle)
     reach = max(here - _turned(chart, low), _turned(chart, high) - here)
-    margin = 1e-12 * (scale + fabs(value))
+    margin = ALPHA_ERROR_SHARE * (scale + fabs(value))
+    return value - reach - margin, value + reach + margin
+
+
+@Inner
+def _ichart_alpha_on_piece(chart, k, left, right, laps):  # type: ignore[no-untyped-def]
+    """Return an enclosure of alpha between two places u on one piece.
+
+    Rounding is compared with the terms of the piece's own polynomial, so that a straight line in the direction of an
+    axis has no slope at all.
+    """
+    count = int(chart[1])
+    start = EDGES + 3 * count + 2 + k * RECORD
+    constant = laps * chart[5]
+    value = constant + polynomial(powers_of(chart, start, 2), 0.5 * (left + right))
+    terms = fabs(constant)
+    for j in range(TERMS):
+        terms += fabs(chart[start + 6 + 2 * TERMS + j])
+    reach = 0.5 * (right - left) / chart[start + 1] * chart[EDGES + 2 * (count + 1) + k]
+    margin = ALPHA_ERROR_SHARE * terms
     return value - reach - margin, value + reach + margin
 
 

@@ -249,6 +249,13 @@ def search_beyond_barriers(
     raise _too_many_barriers(problem)
 
 
+def _speed_overflows(problem: Problem, offset: float) -> bool:
+    """Return whether V**2 is so large at an offset from the launch that numbers overflow beyond."""
+    f, offsets = problem.functions, np.array([offset])
+    v2 = speed_squared_at(f.addresses, f.p, problem.lam0, 0.0, problem.w0, problem.lam0 + offsets, offsets)[0]
+    return not v2 <= zeros.OVERFLOW_V2
+
+
 def _too_many_barriers(problem: Problem) -> SolutionError:
     """Return the error for a curve with too many places that doubles cannot decide."""
     return SolutionError(
@@ -274,6 +281,8 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     what, near, far = found
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
+    if what == zeros.STEPS_SPENT and isfinite(length) and not _speed_overflows(problem, near):
+        raise _too_many_barriers(problem)
     if what == zeros.LIMIT and period:
         return EndOfMotion("closed", lam0 + direction * period)
     place = lam0 + (near if what == zeros.STEPS_SPENT else far)

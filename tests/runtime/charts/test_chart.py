@@ -246,6 +246,15 @@ def test_bounds_enclose() -> None:
             assert hi - lo <= width * max(1.0, 1.0 / RADIUS) * 1.001 + 1e-11
 
 
+def test_a_line_along_an_axis_has_no_slope() -> None:
+    """The angle of such a line is known exactly within the line, whatever the rest of the chart is like."""
+    flat, bent = np.zeros(NODES.size), 0.5 * (1.0 + NODES)
+    chart = assemble([0.0, 1.0, 2.0], PieceData([[0.0, 0.0], [1.0, 0.0]], [flat, bent], [flat, np.ones(NODES.size)]))
+    assert evaluate.ichart_alpha(chart.block, (0.25, 0.75)) == (0.0, 0.0)
+    low, high = evaluate.ichart_alpha(chart.block, (0.75, 1.25))
+    assert low <= 0.0 <= 0.25 <= high <= 0.51
+
+
 def test_nearest_point() -> None:
     """The nearest point is the foot of the perpendicular, and its distance is right."""
     s, distance = Ring().chart((RADIUS,)).nearest(0.5, -0.9)

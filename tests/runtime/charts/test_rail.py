@@ -252,3 +252,25 @@ def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
         return G * math.cos(angle) + bend_at(s) * v**2
 
     assert abs(lost.t - brentq(force, run.t[0], 0.5 * (run.t[0] + run.t[-1]), xtol=1e-15)) <= 1e-10
+
+
+@pytest.mark.parametrize(("s0", "v0"), [(2.5, 1e-5), (2.5, 1e-8), (1.0 - 2.0**-30, 0.0)])
+def test_slow_motion_along_a_level_line(s0: float, v0: float, tmp_path: Path) -> None:
+    """Between two arcs a body turns after a pendulum's quarter period on each, however slowly it crosses the line.
+
+    On the arcs of radius R it is a pendulum, with sin(amplitude/2)**2 = E/(2 g R); on the line its speed is sqrt(2 E).
+    """
+    pieces = [gqm.arc(radius=2, angle="1/2"), gqm.line(length=3), gqm.arc(radius=2, angle="1/2")]
+    rail = gqm.Curve.piecewise(pieces, heading="-1/2")
+    motion = gqm.build(gqm.derive(rail, gqm.Gravity()), name="level_line", folder=tmp_path).solve(s0, v0, 1)
+    with mp.workdps(40):
+        g, before = mpf("9.81"), max(1 - mpf(s0), 0) / 2
+        energy = mpf(v0) ** 2 / 2 + 4 * g * mp.sin(before / 2) ** 2
+        k = mp.sqrt(energy / (4 * g))
+        truth = 2 * mp.sqrt(2 / g) * ellipk(k * k) + 3 / mp.sqrt(2 * energy)
+        away = 4 * mp.asin(k)
+        places = sorted(motion.turning_points)
+        assert motion.kind == "libration"
+        assert abs(places[0] - (1 - away)) <= ULP
+        assert abs(places[1] - (4 + away)) <= 4 * ULP
+        assert abs(motion.half_period / truth - 1) <= ULP
