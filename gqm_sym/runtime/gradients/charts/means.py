@@ -147,7 +147,7 @@ class _Potential:
 
     def __call__(self, op: Any, *arguments: Any) -> tuple[Any, ...]:
         *coordinates, p = arguments
-        _, gravity, _, *others = self.train.numbers(op, p)
+        _, gravity, _, _, *others = self.train.numbers(op, p)
         inertia = 1 if self.inertia is None else self.inertia(op, p)
         factors = [(gravity, *others)[mean] for mean in self.means if mean != BY_LENGTH]
         if BY_LENGTH in self.means:
