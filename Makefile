@@ -5,6 +5,9 @@ WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
+# What pytest is told beside how many processes it has; test-all tells it more.
+TESTS :=
+
 # Machine code is kept in one folder, where modules with the same functions share it.
 export NUMBA_CACHE_DIR ?= $(CURDIR)/$(VENV)/machine_code
 
@@ -19,7 +22,7 @@ export SYMPY_GROUND_TYPES ?= python
 .PHONY: help demo test test-all lint types current site generate docs soak fuzz bench coverage mutate
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, beside two integrators
 	$(BIN)/python scripts/demo.py
