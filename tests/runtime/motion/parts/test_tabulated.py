@@ -19,8 +19,8 @@ ModuleOf = Callable[[str], ModuleType]
 # The tolerance relative to the largest value: both ways round a few times. Worst measured: 1.9e-15.
 AGREE = 3e-15
 
-# The tolerance of a speed, relative to it, of which the place has the largest share. Worst measured: 1.1e-15.
-SPEED = 2e-15
+# The tolerance of a speed, relative to it, of which the place has the largest share. Worst measured: 5.3e-16.
+SPEED = 1e-15
 
 # A row has the track, the launch and the last time, of motions with segments of all kinds.
 MOTIONS: dict[str, tuple[str, dict[str, Any], float]] = {
