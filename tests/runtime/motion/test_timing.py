@@ -79,6 +79,7 @@ def test_a_fall_without_an_end(tmp_path: Path) -> None:
         motion.lam(1e120)
 
 
+@pytest.mark.extended
 def test_a_fall_to_a_singular_point(tmp_path: Path) -> None:
     """The graph of x**(3/2) is passed from 1 to 0, where its curvature is infinite and the curve ends."""
     motion = gqm.build(gqm.derive(gqm.Curve.graph("x*sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path).solve(
