@@ -82,6 +82,7 @@ CASES = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "launch"), CASES)
 def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
     """Durations have derivatives with respect to launch, forces and shape; at rest the one with respect to speed is
@@ -216,6 +217,7 @@ def quotient(duration: Any, given: dict[str, Any], name: str) -> float:
     return float((ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step))
 
 
+@pytest.mark.extended
 def test_an_exponent_of_negative_numbers(oval: ModuleType) -> None:
     """A curve with an integer exponent has all derivatives but that by the exponent, which alone is refused."""
     motion = oval.solve(lam0="9/10")
@@ -367,6 +369,7 @@ def test_motions_that_do_not_repeat(generated_folder: Path) -> None:
     }
 
 
+@pytest.mark.extended
 def test_a_slide_in_space(generated_folder: Path) -> None:
     """On a descending helix through points, derivatives agree with what units and the flow of time require.
 
