@@ -5,6 +5,9 @@ WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
+# What pytest is told beside how many processes it has; test-all tells it more.
+TESTS :=
+
 # Machine code is kept in one folder, where modules with the same functions share it.
 export NUMBA_CACHE_DIR ?= $(CURDIR)/$(VENV)/machine_code
 
@@ -16,17 +19,20 @@ export PYTHONDONTWRITEBYTECODE :=
 export SYMPY_GROUND_TYPES ?= python
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types current site generate docs soak fuzz bench coverage mutate
+.PHONY: help demo test test-all lint types current site generate docs soak fuzz bench coverage mutate
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, beside two integrators
 	$(BIN)/python scripts/demo.py
 
-test: $(VENV)/.dev ## run every test, notebooks included
+test: $(VENV)/.dev ## run the tests of every change, some notebooks included
 	$(BIN)/gqm warm --processes $(WORKERS)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(TESTS)
+
+test-all: TESTS := --extended
+test-all: test ## run every test, with all cases, examples and notebooks
 
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check
@@ -66,7 +72,7 @@ coverage: $(VENV)/.dev ## measure which branches the tests run, compiled code in
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.10'
 	rm -rf .mutants/cache .mutants/coverage.compiled*
 	WORKERS=$(WORKERS) $(BIN)/python scripts/mutate.py 0
-	-NUMBA_CACHE_DIR=$(CURDIR)/.mutants/cache $(BIN)/python -m coverage run -m pytest -n $(WORKERS) tests
+	-NUMBA_CACHE_DIR=$(CURDIR)/.mutants/cache $(BIN)/python -m coverage run -m pytest -n $(WORKERS) --extended tests
 	$(BIN)/python -m coverage combine --quiet --keep --data-file=.mutants/all .mutants/coverage.*
 	$(BIN)/python -m coverage report --data-file=.mutants/all --skip-covered --show-missing
 	$(BIN)/python -m coverage json --quiet --data-file=.mutants/all -o .mutants/all.json

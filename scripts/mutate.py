@@ -120,7 +120,7 @@ class Recorder:
 
 def options() -> list[str]:
     """Options of every run of pytest here."""
-    return ["-q", "--no-header", "-p", "no:cacheprovider", "-p", "no:nbmake", "-o", "addopts=", *IMPORTS]
+    return ["-q", "--no-header", "--extended", "-p", "no:cacheprovider", "-p", "no:nbmake", "-o", "addopts=", *IMPORTS]
 
 
 def in_tests(file: Path) -> str:

@@ -13,13 +13,15 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 from problems import PROBLEMS, TRACKS, Problem
+from selection import EXTENDED_EXAMPLES, USUAL_EXAMPLES, usual
 
 from gqm_sym.runtime.compiled import emitted, jit
 from gqm_sym.runtime.compiled import uncompiled as plain
 
 # The first example of a test may compile for seconds, and a failure must be reproducible.
-settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
-settings.load_profile("suite")
+settings.register_profile("usual", deadline=None, derandomize=True, print_blob=True, max_examples=USUAL_EXAMPLES)
+settings.register_profile("extended", settings.get_profile("usual"), max_examples=EXTENDED_EXAMPLES)
+settings.load_profile("usual")
 
 # Hypothesis also draws numbers from the text of all modules imported so far, so that what a test draws would depend on
 # the tests before it in the same worker.
@@ -42,6 +44,26 @@ if numba.config.DISABLE_JIT:
     import uncompiled
 
     uncompiled.install()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option of the extended run."""
+    parser.addoption("--extended", action="store_true", help="run every test, with all cases and examples")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let tests of Hypothesis draw all their examples in the extended run."""
+    if config.getoption("extended"):
+        settings.load_profile("extended")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what is for the extended run only, unless tests are chosen by name or mark."""
+    chosen = config.getoption("keyword") or config.getoption("markexpr") or any("::" in name for name in config.args)
+    if not config.getoption("extended") and not chosen:
+        kept = usual(items)
+        config.hook.pytest_deselected(items=[item for item in items if item not in set(kept)])
+        items[:] = kept
 
 
 @pytest.fixture(scope="session")

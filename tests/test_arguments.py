@@ -12,8 +12,9 @@ from itertools import count
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.arguments import nearest
@@ -466,7 +467,7 @@ def test_a_zigzag_is_refused(degrees, count):
 
 
 @pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.6), kind=st.sampled_from(["line", "ring"]))
 def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):
     """Noise of any size gives a chart whose pieces have lengths, or one clear error."""

@@ -10,6 +10,7 @@ import pytest
 import sympy as sp
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from selection import examples
 
 from gqm_sym.errors import ExpressionError, GQMError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_name, is_real_at, name_or_value, read_expression
@@ -165,6 +166,7 @@ def test_deep_sympy_expressions_are_refused_before_the_stack_ends():
         read_expression(deep, where="t")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("pattern", ["1+2*sin(", "x*sqrt(1+2*", "1+x*exp(-x*", "1/(x+2)/(1+x*"])
 def test_the_deepest_text_can_be_differentiated(pattern):
     """An expression that can be read must not exceed SymPy's limit of recursion later on."""
@@ -248,7 +250,7 @@ def _closed(text):
     return text + ")" * max(0, text.count("(") - text.count(")"))
 
 
-@settings(deadline=NO_HANG, max_examples=300)
+@settings(examples(300), deadline=NO_HANG)
 @given(st.one_of(PIECES.map(_closed), st.text(max_size=60)))
 @example("acosh(coth(acos(y)/atan((1 - 8)**(y + 10**50))))")
 @example("atan(tanh(log(((x - 1)**999)**-1)))")

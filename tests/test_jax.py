@@ -54,6 +54,7 @@ def test_values_and_derivatives(half_period: Callable) -> None:
     assert float(along) == 2.0 * float(slopes[0])
 
 
+@pytest.mark.extended
 def test_compiled_and_mapped(pendulum: ModuleType, half_period: Callable) -> None:
     """Under `jit` and `vmap`, nested too, the numbers are those of a sweep; NaN where there is no period."""
     import jax

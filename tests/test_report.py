@@ -116,6 +116,7 @@ def test_parentheses_of_older_printers_are_drawn() -> None:
     assert _with_written_parentheses(old) == new
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])
 def test_other_motions(launch: list[str], here: Path) -> None:
     """Rest, circulation and a horizon have pages; the options of the launch are those of gqm solve."""
@@ -144,6 +145,7 @@ launch: {lam0: 0, v0: 10, t_max: 3}
 """
 
 
+@pytest.mark.extended
 def test_a_coaster(here: Path) -> None:
     """A page on a banked track has the extremes of loads, of a train also those of three cars, and their pictures."""
     (here / "swing.yaml").write_text(TRAIN)

@@ -216,6 +216,7 @@ def derived(row: Row) -> gqm.Model:
     return gqm.derive(row.curve(), row.force())
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("row", CLOSED.values(), ids=[name.replace(" ", "-") for name in CLOSED])
 def test_closed_form_is_the_integral(row: Row) -> None:
     """W(λ) - v0² is the integral of the textbook's dW/dλ, and W(lam0) is v0²."""

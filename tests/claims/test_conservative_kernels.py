@@ -270,6 +270,7 @@ def test_a_harmonic_well_at_its_bottom_is_rest(module_named: ModuleNamed) -> Non
 SUM_LAUNCH = {"lam0": "-0.3", "v0": "1.1", "a": "2", "b": "1", "Omega": "0.8", "k": "5", "g": "9.81"}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("summed", "written", "more"),
     [

@@ -271,6 +271,7 @@ def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
     assert ulps(motion.period, famous.expect["loop_time"]) <= PERIOD_ULPS
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("famous", **of_kind("libration", "circulation"))
 def test_derivatives_of_periods(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
     """Derivatives by each parameter and the launch are those of differences of 30 digits; the mass does not matter, and
@@ -366,6 +367,7 @@ def first_launch(curve: FamousCurve) -> FamousMotion:
     return next(motion for motion in MOTIONS if motion.curve == curve)
 
 
+@pytest.mark.sample(5)
 @EVERY_CURVE
 def test_a_curve_file_gives_the_same_module(
     curve: FamousCurve, famous_module: ModuleOf, generated_folder: Path, tmp_path: Path
@@ -383,6 +385,7 @@ def test_a_curve_file_gives_the_same_module(
     assert spec.launch["direction"] == launch["direction"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SOLVED_FROM_YAML)
 def test_a_curve_file_gives_the_same_digits(name: str, tmp_path: Path) -> None:
     """The half period and a late position can be computed from the curve file alone."""

@@ -120,6 +120,7 @@ def test_kind_and_turning_points(edge: Edge, edge_motion: MotionOf) -> None:
         assert ulps(lam, truth) <= TURNING_POINT_ULPS
 
 
+@pytest.mark.extended
 def test_periods(edge_motion: MotionOf) -> None:
     """Half periods and loop times are right to the last place, a few of them to the last but one."""
     lost = []
@@ -155,6 +156,7 @@ def test_positions(edge: Edge, edge_motion: MotionOf) -> None:
             assert error(actual, expected) <= POSITION * extent + COORDINATE_ULPS * place
 
 
+@pytest.mark.sample(3)
 @EVERY_EDGE
 def test_the_error_bound_is_honest(edge: Edge, edge_motion: MotionOf) -> None:
     """No position has a larger error than ``error_bound`` says."""
@@ -192,6 +194,7 @@ def test_a_swing_that_almost_reaches_the_top(short: float, module_of: Callable[[
         assert abs(mpf(float(motion.lam(motion.period / 4))) - top) <= 2 * math.ulp(3.0)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("g", ["9.81", 9.81, 6.3221])
 @pytest.mark.parametrize("v0", [3e-3, 1.2e-7, 5.8e-12, 2.3e-14])
 def test_a_slow_launch_from_a_bottom(v0: float, g: Any, module_of: Callable[[str], ModuleType]) -> None:
@@ -231,6 +234,7 @@ def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], Module
             assert state.error <= 2.0 * POSITION
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("exponent", "side"), [(15, 1), (17, -1), (20, 1), (30, 1), (30, -1)])
 def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str], ModuleType]) -> None:
     """A launch next to the top is right on either side, whichever double is nearest (on one side it failed)."""

@@ -155,6 +155,7 @@ def test_work_of_friction_is_the_energy_lost(name: str, build: Build) -> None:
     assert np.abs(np.cumsum(lost) - np.cumsum(work)).max() <= ASKED * turned_over
 
 
+@pytest.mark.extended
 def test_ten_thousand_legs(dragged: ModuleType) -> None:
     """With drag alone the motion has no end; leg 10000 ends at the place of the closed form of V**2, as exactly as leg
     1.
@@ -405,6 +406,7 @@ def test_a_viscous_law_on_the_level(build: Build) -> None:
         assert np.all(motion.error_bound(t) <= 1e-12 * max(1.0, abs(lam0) + v0 / c))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("loss", ["friction", "drag"])
 def test_every_body_that_comes_to_a_cusp_ends_there(loss: str, build: Build) -> None:
     """Every body ends at a cusp, with losses too (one in ten went through if the nodes of its panels did not show the
@@ -433,6 +435,7 @@ LOSSES = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("name", CUSPED)
 def test_cusps_at_places_that_are_not_zero(name: str, loss: str, build: Build) -> None:

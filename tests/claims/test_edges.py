@@ -65,6 +65,7 @@ def test_from_end_to_end_of_planes(lam0: Any, built: Build) -> None:
     assert motion.half_period == pytest.approx(2 * math.sqrt(4 / 9.81), rel=1e-15)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
 )
@@ -76,6 +77,7 @@ def test_losses_keep_a_body_from_the_other_end(name: str, force: Any, built: Bui
     assert left[1] == pytest.approx(math.pi + 1.0 - right[1], abs=1e-14)
 
 
+@pytest.mark.extended
 def test_a_faster_body_leaves_over_the_end(built: Build) -> None:
     """A body with some speed at the end does not turn there; one that just reaches the end does."""
     module = built("half_pipe", HALF_PIPE, gqm.Gravity())
@@ -152,6 +154,7 @@ def test_a_ball_does_not_roll_over_corners(built: Build) -> None:
         built("ball_on_planes", VEE, BALL).solve("1/10")
 
 
+@pytest.mark.extended
 def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
     """Its motion ends there, although the curve goes on and is symmetric about the centre; so do sweeps say."""
     curve = gqm.Curve.graph("-cos(2*x)/3", parameter="x")
@@ -167,6 +170,7 @@ def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
             assert motion.half_period
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("loss", [None, gqm.QuadraticDrag(b="1/100")], ids=["free", "drag"])
 def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
     """Motions to it are refused with a remedy (there was a ZeroDivisionError, or times were wrong by 1e-9); what
@@ -190,6 +194,7 @@ def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
             module.solve(1, 0, -1)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("height", "domain", "lam0", "t"),
     [("log(x)", None, 0.9, 2.0), ("-1/x", None, 0.9, 2.0), ("x**(9/10)", (0, None), 1.0, None)],
@@ -247,6 +252,7 @@ def test_speeds_at_a_pole_are_infinite(built: Build) -> None:
 ACROSS = np.linspace(-3.0, 3.0, 30)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("slope", [0.0, 0.5, None])
 def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, built: Build) -> None:
     """On a straight line of points or of a rail it falls from a distance d in the time pi*sqrt(d**3/(8 k)), and does
@@ -287,6 +293,7 @@ def test_the_contact_force_before_a_pole(built: Build) -> None:
     assert module.solve(2, 3, contact="above").events[-1].kind == "singular-point"
 
 
+@pytest.mark.extended
 def test_a_fall_into_a_centre_with_drag(built: Build) -> None:
     """It is followed to the end where the distance from the centre is a coordinate; where it is a difference of rounded
     ones, the motion is had up to a time that the error names (it was said to end 4e-10 s before, or that terms cancel).
@@ -367,6 +374,7 @@ def calls(module: ModuleType, odd: Any) -> Iterator[tuple[str, Callable[[], Any]
     yield "digits", lambda: motion.period_to(odd)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["circle", "circle_coulomb", "track"])
 def test_odd_numbers_are_answered_or_refused(name: str) -> None:
     """Odd values for a number give an answer, or an error of this package that names the argument."""

@@ -310,6 +310,7 @@ def effective_potential(n, places, p, out):
 """
 
 
+@pytest.mark.extended
 def test_four_processes_at_once(tmp_path: Path) -> None:
     """Four processes write and compile the same module with one cache; each gets all of it, and no other files
     remain.
@@ -414,6 +415,7 @@ def test_interrupted_at_work(stage: str, tmp_path: Path, forked: Forked) -> None
     assert names_in(tmp_path) == ["ring.yaml"]
 
 
+@pytest.mark.extended
 def test_a_folder_that_cannot_be_written(yaml: Path) -> None:
     """If a folder cannot be written, the error names it, and its contents stay."""
     out = yaml.parent / "out"
@@ -437,6 +439,7 @@ def generated(tmp_path_factory: pytest.TempPathFactory, forked: Forked) -> bytes
     return (folder / "bowl.py").read_bytes()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "environment",
     [

@@ -26,6 +26,7 @@ def vectors(found: Any) -> Any:
     return np.stack([found.normal_x, found.normal_y, found.normal_z], axis=1)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_a_frame_that_turns(mu: float, built: Build) -> None:
     """Places and the contact force with its Coriolis part are right in both directions of motion, and friction includes
@@ -71,6 +72,7 @@ def test_a_frame_that_turns_has_extremes_of_its_contact_force(built: Build) -> N
         module.solve(-2, 4, contact="above")
 
 
+@pytest.mark.extended
 def test_a_hoop_that_turns_is_the_planar_one(built: Build) -> None:
     """A hoop in a plane through the axis moves as the planar curve; the track also balances the Coriolis force."""
     force = gqm.Gravity() + gqm.RotatingFrame(Omega=2)
@@ -104,6 +106,7 @@ def upright_on(track: Callable[[float], Any], u: float, roll: float) -> Vector:
     return np.cross(tangent, left) * np.cos(roll) + left * np.sin(roll)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mu", [0.0, 0.05])
 def test_a_track_that_pushes_upwards_only(mu: float, built: Build) -> None:
     """Contact is lost at the place that DOP853 finds, where the contact force has no component along the upward
@@ -148,6 +151,7 @@ def valley(u: float) -> tuple[Any, Any, Any]:
     )
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 8.0, 1, 2), (1.2, 6.7, -1, 1)])
 def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way: int, legs: int, built: Build) -> None:
     """In a frame that turns contact is lost on the way on which the Coriolis force lifts the body, although the other
@@ -180,6 +184,7 @@ def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way:
 TURNING_VALLEY = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter="u", roll="pi/3")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 10.0, 1, 2), (1.2, 6.7, -1, 1)])
 def test_a_rough_track_that_turns_and_pushes_upwards_only(
     lam0: float, v0: float, way: int, legs: int, built: Build
@@ -238,6 +243,7 @@ def test_a_ball_on_a_banked_track(built: Build) -> None:
     assert np.linalg.norm(gap, axis=0) == pytest.approx(np.full(5, 0.1), rel=1e-13)
 
 
+@pytest.mark.extended
 def test_random_space_curves_with_friction(built: Build) -> None:
     """On twelve curves, places, speeds, contact forces and the energy lost to friction are right up to the first
     turn.

@@ -7,10 +7,11 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from paths import ROOT
+from selection import examples
 
 from gqm_sym.loading import load
 
@@ -40,8 +41,9 @@ LAUNCHES = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", LAUNCHES)
-@settings(max_examples=2, deadline=None)
+@examples(2)
 @given(data=st.data())
 def test_gradients_of_periods(name: str, data: Any) -> None:
     """Gradients of periods are right to two units in the last place."""
@@ -63,8 +65,9 @@ def test_gradients_of_periods(name: str, data: Any) -> None:
         assert abs(found - truth) <= 2.0 * ULP * abs(truth) + 1e-20, (by, values)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", LAUNCHES)
-@settings(max_examples=2, deadline=None)
+@examples(2)
 @given(data=st.data())
 def test_gradients_of_swept_periods(name: str, data: Any) -> None:
     """Gradients in sweeps are right to two units in the last place of the integral of the absolute values, which is at

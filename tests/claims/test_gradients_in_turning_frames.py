@@ -96,6 +96,7 @@ GIVEN = {"lam0": -2, "v0": 4, "Omega": 1.5, "g": 9.81, "m": 2}
 
 
 # With 1/10 the least force is passed so close to a turn that it is sought in time.
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("omega", [1.5, -1.5, 0.25, 0.1])
 @pytest.mark.parametrize("quantity", ["normal_force_max", "normal_force_min"])
 def test_extremes(quantity: str, omega: float, built: Build) -> None:
@@ -136,6 +137,7 @@ def test_sensitivities(way: int, built: Build) -> None:
             assert slope == pytest.approx(difference(force, GIVEN, name), rel=1e-12, abs=1e-12), name
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("lossy", [False, True])
 def test_along_a_chart(lossy: bool, built: Build) -> None:
     """Along the same curve without its formulas the derivatives are the same."""

@@ -139,6 +139,7 @@ class OnLeaningRail(OnRail):
     is_leaning = True
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("way", [1, -1])
 def test_along_a_curve_with_formulas(way: int, built: Build) -> None:
     """All derivatives of the time of lift-off are right to rounding, on both ways in a frame that turns; so are those
@@ -204,6 +205,7 @@ def test_with_friction(built: Build) -> None:
     assert motion.gradient("t_end")["mu"] == pytest.approx((end(0.051) - end(0.049)) / 0.002, rel=1e-5)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("curve", "losses"), [(RAIL, ""), (RAIL, "drag"), (LEANING, "")])
 def test_along_a_rail(curve: Any, losses: str, built: Build) -> None:
     """Derivatives of the time of lift-off from a rail, by its shape and its roll too, are right to rounding, without

@@ -14,6 +14,7 @@ from confined import confined
 from emitted import audit, declared
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.building import write_module, write_text
@@ -155,6 +156,7 @@ def test_no_expression_does_harm(
         assert printed.err.replace("\n", "").isprintable()
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_expression_does_harm_in_python(attack: str, witness: Path) -> None:
     """In Python too, a curve, a potential and an argument of a family are read as arithmetic only."""
@@ -309,7 +311,7 @@ def _body_under(title: str) -> list[str]:
     return [ast.dump(node) for node in tree.body[1:]]
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(title=st.text(max_size=60))
 def test_any_title_is_text(title: str) -> None:
     """A module has the same syntax tree under any title."""
@@ -359,7 +361,7 @@ FRAGMENTS = (
 fragments = st.lists(st.one_of(st.sampled_from(FRAGMENTS), st.text(max_size=3)), max_size=120).map("".join)
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(text=fragments)
 def test_no_expression_takes_long(text: str) -> None:
     """Any text is read within a second and 200 MB, or refused."""
@@ -367,7 +369,7 @@ def test_no_expression_takes_long(text: str) -> None:
         read_expression(text, where="t")
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(examples(100), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=fragments, start=st.integers(0, 200), cut=st.integers(0, 60))
 def test_no_file_takes_long(text: str, start: int, cut: int, yaml: Callable[[str | bytes], Path]) -> None:
     """A file in which any part is replaced by anything is read within a second and 200 MB, or refused."""
@@ -385,6 +387,7 @@ GROWING = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("attack", GROWING)
 def test_what_grows_is_given_up(attack: str) -> None:
     """A curve with formulas too large for memory is refused by a message that says where and what to do."""

@@ -126,6 +126,7 @@ def test_a_second_process_imports_no_more_than_it_needs() -> None:
     assert not {f"gqm_sym.runtime.{name}" for name in unneeded} & set(loaded)
 
 
+@pytest.mark.extended
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:
     """One input gives one text, that of the committed modules, whatever order sets and dictionaries have."""
     paths = [f"curves/{name}.yaml" for name in CURVES]
@@ -173,6 +174,7 @@ def test_the_wheel_generates_outside_the_repository(unpacked_wheel: Path, tmp_pa
     assert text == run(GENERATE, yaml)
 
 
+@pytest.mark.extended
 def test_the_wheel_of_the_sdist_is_the_same(unpacked_wheel: Path, tmp_path: Path) -> None:
     """Whoever builds from the source distribution gets the same files as from the repository."""
     import tarfile

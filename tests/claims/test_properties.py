@@ -4,10 +4,11 @@ import math
 from collections.abc import Callable
 from types import ModuleType
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from naive import error, pendulum, pendulum_half_period, ulps
+from selection import examples
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -27,7 +28,7 @@ gravities = st.floats(0.5, 30.0)
 small = st.floats(-8.0, -1.0).map(lambda exponent: 10.0**exponent)
 amplitudes = st.one_of(small, st.floats(0.1, 3.0))
 fractions = st.floats(0.0, 1.0)
-some = settings(max_examples=40)
+some = examples(40)
 
 
 @some

@@ -12,9 +12,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from selection import examples
 
 import gqm_sym as gqm
 
@@ -167,7 +168,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(tmp_path_factory.mktemp("random"))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@examples(60)
 @given(
     shape=st.sampled_from(sorted(SHAPES)),
     force=st.sampled_from(sorted(FORCES)),

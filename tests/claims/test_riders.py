@@ -70,6 +70,7 @@ def newton(roll: str, u: Any, w: Any, way: int, mu: Any, b: Any) -> tuple[list[A
     return [dot(felt, axis) / g0 for axis in (upright, cross(upright, tangent), tangent)], along, upright
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("roll", ROLLS)
 @pytest.mark.parametrize("lossy", [False, True])
 def test_closed_forms_against_newton(roll: str, lossy: bool) -> None:
@@ -113,6 +114,7 @@ def loop(built: Callable[..., ModuleType]) -> ModuleType:
     return built("loop", curve, gqm.Gravity())
 
 
+@pytest.mark.extended
 def test_states_of_a_rough_track(rough: ModuleType) -> None:
     """States of a rough track have Newton's loads to the accuracy of doubles, in both directions, and the track lies
     below the rider.
@@ -184,6 +186,7 @@ def test_a_vertical_loop(loop: ModuleType) -> None:
     assert swept.values == pytest.approx([225 / 7 / G0 + 9.81 / G0, most.value], rel=1e-14)
 
 
+@pytest.mark.extended
 def test_levels_along_legs(rough: ModuleType) -> None:
     """At every crossing the load equals the level, with losses too, and the times above and below add up to the
     whole.

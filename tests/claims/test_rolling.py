@@ -66,6 +66,7 @@ def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: Modu
     assert np.abs(ours.normal_force - theirs.normal_force).max() <= 2e-13 * 9.81
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("rho", ["1/4", "-1/4", "-100", "0", "99/80"])
 @pytest.mark.parametrize("angle", ["1/1000", "2", "29/10", "157/50"])
 def test_times_and_turning_points_hold_their_bounds(angle: str, rho: str, loop: ModuleType) -> None:
@@ -80,6 +81,7 @@ def test_times_and_turning_points_hold_their_bounds(angle: str, rho: str, loop: 
             assert abs(mpf(high) + mpf(low) - truth) <= error <= USEFUL_ERROR * abs(truth)
 
 
+@pytest.mark.extended
 def test_in_extended_precision_beside_a_track(loop: ModuleType) -> None:
     """Extended precision is used where double-double arithmetic does not suffice, and for more digits than it has."""
     for angle, rho in (("1/1000000000", "-1/4"), ("1/1000", "1249999/1000000")):
@@ -105,6 +107,7 @@ def test_rounds_inside_and_outside_a_loop(loop: ModuleType) -> None:
             assert ulps(motion.period, 4 * size / 12 * mp.ellipk(m)) <= NEAREST
 
 
+@pytest.mark.extended
 def test_on_a_parabola_by_its_equation(generated_folder: Path) -> None:
     """Answers from the same points, and in sweeps, equal those on the parabola with formulas to the last place."""
     curve = gqm.Curve.implicit("a*x**2 - z", start=(0, 0), domain=(-2, 2), parameters={"a": "3/4"})
@@ -151,6 +154,7 @@ def test_on_a_flat_bottom(generated_folder: Path) -> None:
         assert ulps(motion.half_period, exact) <= NEAREST
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("share", ["1/2", "9/10", "99/100"])
 def test_small_swings_of_a_ball_that_all_but_fills_its_loop(share: str, loop: ModuleType, bowl: ModuleType) -> None:
     """The path of the centre has the rounding errors of the curve, magnified; places were up to seven bounds off."""
@@ -272,6 +276,7 @@ def test_without_a_coefficient_nothing_slips(bowl: ModuleType) -> None:
     assert [event.kind for event in bowl.solve(3, L=1, rho="1/4", beta=1).events].count("slip") == 0
 
 
+@pytest.mark.extended
 def test_a_ball_lifts_off_long_before_its_formulas_overflow(tmp_path: Path) -> None:
     """A ball that falls beside a hyperbolic sine loses contact, though the track goes on to where its slope has no
     square. Place and time are those of the laws of motion of its centre.

@@ -40,6 +40,7 @@ def test_on_a_helix_the_centre_moves_along_a_helix(built: Build) -> None:
         assert [state.track_x, state.track_y, state.track_z] == pytest.approx(on_track, rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.extended
 def test_it_is_the_declared_path_of_the_centre(built: Build) -> None:
     """Along Viviani's curve the answers are those along the path of the centre, declared by hand."""
     tracked = built("viviani_ball", gqm.Curve.space(**VIVIANI, roll=0), BALL)
@@ -91,6 +92,7 @@ def derivative(of: Callable[[Any], Any], u: Any, order: int = 1) -> Any:
     return mp.matrix([mp.diff(lambda w, k=k: of(w)[k], u, order) for k in range(3)])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("written", "track", "roll"), TRACKS)
 def test_forces_by_the_definition(
     written: dict[str, str], track: Callable[[Any], Any], roll: Callable[[Any], Any], built: Build
@@ -139,6 +141,7 @@ def test_rates_of_loads(built: Build) -> None:
         assert getattr(here, f"onset_{name}") == pytest.approx(rate, rel=1e-6, abs=1e-8)
 
 
+@pytest.mark.extended
 def test_contact_is_lost_where_the_track_no_longer_pushes(built: Build) -> None:
     """On a crest a ball that only lies on the track leaves it where the load along its upward direction vanishes."""
     curve = gqm.Curve.space(x="10*u", y="u**2", z="-3*u**2", parameter="u", roll="0")

@@ -136,6 +136,7 @@ def families(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     return soak_bounds.build(tmp_path_factory.mktemp("families"))
 
 
+@pytest.mark.extended
 def test_random_librations_keep_to_their_bounds(families: dict[str, ModuleType]) -> None:
     """Hundreds of places of random librations lie within their bounds, and no bound is uselessly large."""
     tally, failed = soak_bounds.soak(50, 19, families)
@@ -287,6 +288,7 @@ def test_small_swings_across_the_seam_of_a_ring(seed: int, kinds: dict[str, Modu
         assert soak_kinds.rims(random.Random(seed), kinds)[0] == []
 
 
+@pytest.mark.extended
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     """On slopes, springs, circles, rims and coils, closed forms, sweeps and threads agree; differences are reported."""
     modules = kinds

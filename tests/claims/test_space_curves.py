@@ -155,6 +155,7 @@ def test_a_helix_with_friction() -> None:
     assert [leg.end for leg in motion.legs] == ["horizon"]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mu", ["0.2", "0"])
 def test_sweeps_of_a_helix_in_pieces(mu: str, built: Build) -> None:
     """Along a rail of many pieces of a helix, with friction or with drag alone, sweeps agree with the closed forms."""
@@ -187,6 +188,7 @@ def test_sweeps_of_a_helix_in_pieces(mu: str, built: Build) -> None:
             assert found["normal_force_min"] == pytest.approx(9.81 * cosine, rel=4e-15)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", [gqm.CoulombFriction(), gqm.QuadraticDrag(b="1/20")])
 def test_a_length_that_almost_vanishes_is_not_negative(force: gqm.Kernel, built: Build) -> None:
     """On a vertical part of a rail N is zero, and its square has few digits beside that; further on a body begins with
@@ -240,6 +242,7 @@ def dop853(mu: float, b: float, lam0: float, v0: float, times: list[float]) -> A
     return solve_ivp(slopes, (0.0, max(times)), start, method="DOP853", rtol=1e-13, atol=1e-14, t_eval=times)
 
 
+@pytest.mark.extended
 def test_friction_and_drag_against_dop853(built: Build) -> None:
     """The place, V**2, and the work of friction and drag agree with DOP853 through a turn."""
     module = built("rough_viviani", generated_curve(), gqm.Gravity() + gqm.CoulombFriction() + gqm.QuadraticDrag())

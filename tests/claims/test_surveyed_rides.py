@@ -84,6 +84,7 @@ def newton(rows: Any, w: Any) -> tuple[list[Any], Any]:
     return loads, upright
 
 
+@pytest.mark.extended
 def test_loads_are_those_of_newton(banked: ModuleType) -> None:
     """Loads of states and of the load map, their rates and the track below the rider are right to rounding."""
     motion = banked.solve(0.0, 14.0)
@@ -114,6 +115,7 @@ def test_loads_are_those_of_newton(banked: ModuleType) -> None:
         assert np.cos(state.roll[k] - found[0, 3, k]) == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.extended
 def test_loads_and_levels_of_the_circle(banked: ModuleType) -> None:
     """Loads and levels are those of the circle itself, with known tangent, curvature and V**2, to the points' order."""
     motion = banked.solve(0.0, 14.0)
@@ -183,6 +185,7 @@ def test_planar_tracks_are_not_banked(roll: Any) -> None:
         gqm.Curve.sampled(ring(48)[:, [0, 2]], roll=roll)
 
 
+@pytest.mark.extended
 def test_work_of_friction_over_a_circuit() -> None:
     """Along a circuit of surveyed points the lost energy is the work of friction, by Gauss's rule between the points,
     with the contact force by Newton's law from the derivatives of the track.

@@ -342,6 +342,7 @@ def test_what_riders_feel_in_each_car(build: Build) -> None:
     assert not hasattr(build("train_on_circle", gqm.families.circle()).solve(1, length=1, L=1).cars(0), "n_vertical")
 
 
+@pytest.mark.extended
 def test_friction_on_a_helix(build: Build) -> None:
     """All cars press alike on a helix, so that the train slides as one body, to the same limit."""
     helix = gqm.families.helix(R=2, c="-2*tan(1/2)", domain=(0, 400))
@@ -356,6 +357,7 @@ def test_friction_on_a_helix(build: Build) -> None:
     assert np.abs(cars.coupling_force).max() < 1e-12
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("in_space", [True, False])
 def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     """Friction acts on each car by its own contact force, as in Newton's law for all cars by DOP853; couplings add
@@ -459,6 +461,7 @@ def test_cars_pass_jumps_of_curvature(build: Build) -> None:
         assert leg.lam_end == pytest.approx(place, rel=ROUNDING)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("in_space", [True, False])
 def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
     """A short train moves like a body with friction in the limit; at a length of a nanometre both move alike."""

@@ -32,6 +32,7 @@ def sinc(length: Any, radius: Any) -> Any:
     return mp.sinc(mpf(length) / mpf(radius))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("radius", "length", "place"), [(1, 1, 1.2), (2, 1.5, -0.7), (3, 2, 2.0), (1, 1e-6, 1.0), (1, 2.0**-40, 0.01)]
 )
@@ -153,6 +154,7 @@ def test_helix_in_a_rotating_frame(build_train: Build) -> None:
         np.testing.assert_allclose(found.coupling_force, 0, rtol=0, atol=4 * SHARE * 9.81)
 
 
+@pytest.mark.extended
 def test_drag_under_a_potential(build_train: Build) -> None:
     """With drag V**2 is linear in a known solution on a circle, which says where the train turns."""
     module = build_train(
@@ -172,6 +174,7 @@ def test_drag_under_a_potential(build_train: Build) -> None:
         assert abs(legs[0].lam_end / turn - 1) <= 2 * ROUNDING
 
 
+@pytest.mark.extended
 def test_friction_about_a_centre(build_train: Build) -> None:
     """On a circle about a centre of attraction all cars press alike, so that V**2 approaches that of a circular orbit
     exponentially in arc length, or moves away from it until the train rests.

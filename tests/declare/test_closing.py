@@ -5,9 +5,10 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError
@@ -64,7 +65,7 @@ def test_what_does_not_close_for_certain_stays_open(name):
     assert OPEN[name].period is None
 
 
-@settings(deadline=None, max_examples=40)
+@examples(40)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 6, max_denominator=6), min_size=1, max_size=3), polar=st.booleans())
 def test_random_waves_close_after_their_least_common_period(rates, polar):
     """The period is the least common multiple of the periods, which for a sum of single waves is the smallest."""
@@ -132,7 +133,7 @@ def test_rounds_of_a_ring_are_a_circulation(tmp_path):
     assert silent.solve(0, 2).kind == "libration"
 
 
-@settings(deadline=None, max_examples=25)
+@examples(25)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 5, max_denominator=6), min_size=2, max_size=3))
 def test_random_waves_are_derived_as_they_are(rates):
     """The line element of random waves agrees with mpmath (the common measure of 1, 3 and 7/6 is 1/6, and was taken for

@@ -118,6 +118,7 @@ def test_all_implicit_curves_are_here() -> None:
     assert len(MOTIONS) == 8
 
 
+@pytest.mark.sample(4)
 @EVERY_MOTION
 @BOTH_LAUNCHES
 def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
@@ -170,6 +171,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
             assert error(actual, row[name]) <= SAMPLE * largest, name
 
 
+@pytest.mark.sample(5)
 @EVERY_CURVE
 def test_a_curve_file_gives_the_same_module(
     famous: FamousMotion, famous_module: ModuleOf, generated_folder: Path, tmp_path: Path
@@ -268,6 +270,7 @@ def test_run_time_parameters(generated_folder: Path) -> None:
         module.solve(lam0=0, h=-1)
 
 
+@pytest.mark.sample(4)
 def test_motion_ends_at_a_singular_point(generated_folder: Path) -> None:
     """A body on the strophoid's loop that is fast enough reaches its node, where its motion ends."""
     curve = gqm.Curve.implicit(
@@ -376,6 +379,7 @@ def test_bad_file(text: str, message: str, tmp_path: Path) -> None:
     assert message in str(caught.value)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", [gqm.Gravity(), gqm.Gravity() + gqm.QuadraticDrag(b="c")], ids=["free", "drag"])
 def test_contact_force_that_touches_zero(force: gqm.Kernel, tmp_path: Path) -> None:
     """At the flat sides of x**4 + z**4 = 1 both parts of N vanish, so that N touches zero without changing its sign."""

@@ -64,6 +64,7 @@ def test_a_force_says_what_it_is(name):
         assert words in text
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("force", ["gravity", "losses", "law"])
 def test_a_model_says_what_it_is(curve, force):
@@ -78,6 +79,7 @@ def test_a_model_says_what_it_is(curve, force):
     assert len(text.splitlines()) <= 12
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("make", [copy.copy, copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
 def test_everything_declared_can_be_copied(make):
     """Everything that is declared can be copied, and the copy is the same."""
@@ -89,6 +91,7 @@ def test_everything_declared_can_be_copied(make):
         assert gqm.emit(make(model), name="copied") == gqm.emit(model, name="copied")
 
 
+@pytest.mark.extended
 def test_a_model_arrives_in_another_process(tmp_path):
     """A model can be sent to another process and gives the same module there, unknown functions and charts included."""
     models = [

@@ -34,6 +34,7 @@ def centre(height: str, place: float, radius: mpf) -> tuple[mpf, mpf, mpf]:
     return z(mpf(place)) + radius / root, kappa / (1 - kappa * radius), 1 / root
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("rolls", [False, True])
 @pytest.mark.parametrize("height", list(HEIGHTS))
 def test_speeds_and_contact_forces(height: str, rolls: bool, tmp_path: Path) -> None:
@@ -54,6 +55,7 @@ def test_speeds_and_contact_forces(height: str, rolls: bool, tmp_path: Path) -> 
             assert abs(found.normal_force[k] - (G * cosine + kappa * v2)) <= 2e-15 * (G + abs(kappa) * size), place
 
 
+@pytest.mark.extended
 def test_a_motion_that_needs_them(tmp_path: Path) -> None:
     """A body that rolls over the hills of a wavy graph with a step is found to leave, and not to turn 14 m away."""
     curve = gqm.Curve.graph("tanh(x)/6-cos(2*x)/3", parameter="x")

@@ -14,6 +14,7 @@ from gqm_sym.errors import GQMError
 TIMES = {("1", "-1"): 0.6757788612, ("1", "-0.6"): 0.7222327080, ("1", "-0.45"): 0.804359295}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("to", TIMES)
 def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
     """The body arrives at that time, and presses on the track all along."""

@@ -108,6 +108,7 @@ def test_derivatives_where_the_ends_decide(tmp_path: Path) -> None:
     assert sizes(gqm.least_speed_gradient(valley, 0, ("k", "lam0"), k=k, g=g), wanted)
 
 
+@pytest.mark.extended
 def test_derivatives_beyond_a_summit(tmp_path: Path) -> None:
     """A bead has to get over the summit of z = a sin(x) + x/5, where a cos(x) = -1/5."""
     curve = gqm.Curve.graph("a*sin(x) + x/5", domain=(-1, 3), parameters={"a": 1})
@@ -144,6 +145,7 @@ def test_questions_without_an_answer(module: object, arguments: dict, kind: type
         gqm.least_speed(module, 0, **arguments)
 
 
+@pytest.mark.extended
 def test_corkscrew(tmp_path: Path) -> None:
     """On a helix about a level axis the riders lean towards the axis, and v0**2 from the lowest point is
     4 g R + g (R**2 + c**2)/R; a slightly faster body passes the top, and a slower one lifts off.

@@ -11,6 +11,7 @@ from gqm_sym.errors import GQMError
 G = 9.81
 
 
+@pytest.mark.extended
 def test_constant_load(tmp_path: Path) -> None:
     """For 3 g from 12 m/s the loads are right to 1e-14, and top, shift and times are those of Kepler's equation."""
     track = gqm.design.constant_load(3, 12)
@@ -36,6 +37,7 @@ def test_constant_load_with_parameters(tmp_path: Path) -> None:
         assert np.abs(found.normal_force / g - n).max() <= 1e-14 * n
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("law", ["1 + 2*sin(pi*s/20)**2", "a*t*exp(-t) + 1/2"])
 def test_prescribed_load(law: str, tmp_path: Path) -> None:
     """The contact force is the prescribed function of arc length or of time."""
@@ -70,6 +72,7 @@ BAD = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", BAD)
 def test_loads_that_no_track_has(case: str) -> None:
     """Each load that no track has gives one clear error."""

@@ -45,6 +45,7 @@ def heights_of(places: np.ndarray, share: Any, period: Any) -> list[Any]:
     return found
 
 
+@pytest.mark.extended
 def test_a_period_that_grows(growing: ModuleType) -> None:
     """The prescribed period is met by declaration, chart and sweep to 3 ulp, and by `period_to` to 20 digits."""
     with mp.workdps(30):

@@ -102,6 +102,7 @@ def test_the_interface_is_the_runtimes() -> None:
     assert INTERFACE == interface.INTERFACE
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("head", HEADS)
 def test_numbers_of_every_head(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values, differences and bounds are those of the declared text; exact forms to 60 digits.
@@ -174,6 +175,7 @@ def test_the_exponential_of_the_height_of_a_rolling_body(folder: Path) -> None:
             assert abs(v2 - truth) <= 1e-14 * abs(height(place))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
 def test_taken_names_as_the_curves_parameter(name: str) -> None:
     """The curve's parameter may have any of these names too."""
@@ -182,6 +184,7 @@ def test_taken_names_as_the_curves_parameter(name: str) -> None:
     check_numbers(interpreted(emitted, "along"), text, values, name)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "name",
     [
@@ -204,6 +207,7 @@ def test_reserved_names_never_come_so_far(name: str) -> None:
         refuses(name)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("title", TITLES, ids=range(len(TITLES)))
 def test_a_title_changes_the_docstring_alone(title: str) -> None:
     """Any title is text of one line within the docstring, and nothing else changes."""

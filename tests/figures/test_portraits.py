@@ -57,6 +57,7 @@ def test_level_stretches_have_no_equilibria(tmp_path: Path) -> None:
     assert "stable equilibrium" not in marks
 
 
+@pytest.mark.extended
 def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:
     """The loops round both wells are closed, and all of their points have the energy of the barrier."""
     figure = gqm.figures.phase_portrait(wells, (-2, 2))

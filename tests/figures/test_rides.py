@@ -44,6 +44,7 @@ def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
     assert (tmp_path / "ride.svg").stat().st_size > 10_000
 
 
+@pytest.mark.extended
 def test_the_labels_of_a_flat_track_do_not_overlap(tmp_path: Path) -> None:
     """The numbers on all axes are apart from each other, although the track is 100 times as long as high."""
     track = gqm.Curve.space(x="20*u", y="8*sin(u/2)", z="cos(u)/2", parameter="u", roll="u/8")
@@ -61,6 +62,7 @@ def test_the_labels_of_a_flat_track_do_not_overlap(tmp_path: Path) -> None:
         assert np.linalg.norm(np.diff(shown, axis=0), axis=1).min() > axis.get_ticklabels()[0].get_size()
 
 
+@pytest.mark.extended
 def test_seats_and_their_animation(hills: ModuleType, tmp_path: Path) -> None:
     """Loads of three cars are drawn against their places; the frames of an animation show all cars in space."""
     track = gqm.Curve.space(

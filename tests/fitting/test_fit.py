@@ -156,6 +156,7 @@ def test_derivatives_are_the_difference_quotients(pendulum: ModuleType) -> None:
         assert exact == pytest.approx(quotients, rel=1e-6, abs=1e-7 * np.abs(exact).max())
 
 
+@pytest.mark.extended
 def test_coverage(pendulum: ModuleType) -> None:
     """Each true value lies within a standard deviation in 68 +- 7 % of 500 sets of measurements."""
     true = pendulum.solve(1, L=1.3)

@@ -7,6 +7,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from selection import examples
 
 from gqm_sym.errors import ExpressionError, GQMError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, MAX_LENGTH, parse
@@ -221,7 +222,7 @@ PIECES = st.lists(
 ).map("".join)
 
 
-@settings(deadline=NO_HANG, max_examples=400)
+@settings(examples(400), deadline=NO_HANG)
 @given(st.one_of(ATTACK, PIECES, st.text(max_size=100)))
 @example("9**9**9**9")
 @example("(" * 4000)

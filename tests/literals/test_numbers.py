@@ -16,6 +16,7 @@ import pytest
 import sympy as sp
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from selection import examples
 
 from gqm_sym.errors import GQMError, NumberError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
@@ -260,7 +261,7 @@ GROWN = st.recursive(
 )
 
 
-@settings(deadline=NO_HANG, max_examples=300)
+@settings(examples(300), deadline=NO_HANG)
 @given(GROWN)
 def test_values_agree_with_mpmath(grown):
     """At 450 digits mpmath, without intervals, must find the same two doubles."""
@@ -298,7 +299,7 @@ PIECES = st.lists(
 ).map(lambda pieces: "".join(pieces) + ")" * 12)
 
 
-@settings(deadline=NO_HANG, max_examples=300)
+@settings(examples(300), deadline=NO_HANG)
 @given(
     st.one_of(
         PIECES.map(lambda text: text[: len(text) - max(0, text.count(")") - text.count("("))]),

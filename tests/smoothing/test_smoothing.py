@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import KDTree
 from scipy.special import fresnel
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.cli.gen import main
@@ -129,6 +130,7 @@ def loads(truth: Truth, curve: gqm.Curve, s: np.ndarray | None = None) -> tuple[
     return np.cos(alpha) + 2.0 * (top - z) * kappa - right, 2.0 * (top - z)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("scatter", [0.001, 0.01, 0.1])
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("known", [True, False], ids=["known", "auto"])
@@ -152,6 +154,7 @@ def test_loads_are_within_their_error(name: str, scatter: float, known: bool) ->
     assert 0.2 < np.sqrt(np.mean(size**2)) < 1.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", TRACKS)
 def test_there_is_little_bias(name: str) -> None:
     """The bias of the curvature is less than half of the stated error.
@@ -172,6 +175,7 @@ def test_there_is_little_bias(name: str) -> None:
     assert np.mean(squared_bias / np.mean(errors, axis=0) ** 2) < 0.25
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("count", "interpolated", "smoothed"), [(160, 0.8, 0.06), (400, 5.0, 0.05)])
 def test_the_coaster_of_the_issue(tmp_path: Path, count: int, interpolated: float, smoothed: float) -> None:
     """With 1 cm of scatter, the error of contact forces is many g without smoothing, and hundredths of one with it."""
@@ -199,6 +203,7 @@ def test_the_coaster_of_the_issue(tmp_path: Path, count: int, interpolated: floa
     assert np.abs(found.normal_force / G - right)[8:-8].max() < 6.0 * smoothed
 
 
+@pytest.mark.extended
 def test_ends_do_not_swing() -> None:
     """The curvature's error at the ends is a few times that inside, and the stated error includes it."""
     truth = TRACKS["hills"]
@@ -260,7 +265,7 @@ def test_a_closed_track_closes(seed: int) -> None:
     assert np.ptp(bend) < 0.5 * np.abs(bend).max() + 1e-4
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(
     angle=st.floats(-3.2, 3.2),
     scale=st.floats(1e-3, 1e3),
@@ -296,6 +301,7 @@ def test_the_other_way_round() -> None:
     assert np.abs(one.smoothing.curvature + two.smoothing.curvature[::-1]).max() < 1e-5
 
 
+@pytest.mark.extended
 def test_many_points() -> None:
     """Tens of thousands of points closer together than their scatter leave few points, and a tenth of the error."""
     truth = TRACKS["hills"]

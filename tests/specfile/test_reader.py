@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from paths import ROOT
+from selection import examples
 
 from gqm_sym.errors import SpecFileError
 from gqm_sym.kernels import KERNELS
@@ -602,7 +603,7 @@ def test_reading_is_bounded_on_endless_devices() -> None:
 CHARACTERS = "abhxz019.*/+-^()[]{}:,#&!|>'\"%@` \n\t\\~λ"
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+@settings(examples(300), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_no_file_escapes(data: st.DataObject, tmp_path: Path) -> None:
     """However a file is changed, it is read, or refused with a place in it."""
@@ -622,7 +623,7 @@ def test_no_file_escapes(data: st.DataObject, tmp_path: Path) -> None:
             assert message.strip()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@settings(examples(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(junk=st.binary(max_size=200))
 def test_no_bytes_escape(junk: bytes, tmp_path: Path) -> None:
     """Bytes of any kind are refused by a SpecFileError, or are a right file."""

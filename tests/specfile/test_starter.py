@@ -59,6 +59,7 @@ def test_all_of_them_are_found() -> None:
     assert len(COMMENTED) == len(KEYS)
 
 
+@pytest.mark.extended
 def test_the_path_of_a_first_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -432,6 +432,7 @@ def test_a_worker_of_another_version_is_refused(client: Any, here: Path, monkeyp
         module.sweep("period", [0.1, 0.2], client=client)
 
 
+@pytest.mark.extended
 def test_no_scheduler(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """An address at which no scheduler answers gives an error."""
     pytest.importorskip("distributed")

@@ -26,7 +26,7 @@ from gqm_sym.runtime.gradients.orbit import (
     without_formulas,
 )
 from gqm_sym.runtime.gradients.panels import Panels, resolved, rule_with_tails
-from gqm_sym.runtime.gradients.passages.from_turns import fill_other_side, from_turn_program
+from gqm_sym.runtime.gradients.passages.from_turns import fill_other_side, from_turn_program, values_from_turns
 from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
@@ -148,7 +148,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     def _on_both_sides(self, inputs: Array) -> Array:
         """Return the inputs of `_from_turns` for both halves of a libration."""
         both = np.stack([inputs, inputs])
-        fill_other_side(both, self.source.inputs)
+        fill_other_side.py_func(both, self.source.inputs)
         return both
 
     @property
@@ -278,13 +278,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         """Return the results of `_from_turns` at shares of the orbit's width, which are two doubles each."""
         program = self._from_turns
         assert program is not None
-        found = np.empty((program.outputs.size, 3, shares.shape[1]))
-        rest = (1.0 - shares[0]) - shares[1]
-        from_upper = np.array([rest, ((1.0 - shares[0]) - rest) - shares[1]])
-        halves = shares[0] < 0.5, shares[0] >= 0.5
-        for half, places, inputs in zip(halves, (shares, from_upper), self._on_both_sides(self._rule[0]), strict=True):
-            found[:, :, half] = values(program, inputs, *np.ascontiguousarray(places[:, half]))
-        return found
+        return values_from_turns(program, self._rule[0], self.source.inputs, shares)
 
     @property
     def width(self) -> float:

@@ -90,6 +90,13 @@ def shares_on(kind: int, left: Array, right: Array) -> Array:
     return shares
 
 
+def shares_at(kind: int, phases: Array) -> Array:
+    """Return the shares of the orbit's width at phases, as two doubles each."""
+    shares = np.empty((2, RULE * phases.size))
+    fill_shares(kind, np.array([phases, 0.0 * phases, 0.0 * phases]), np.zeros((4, RULE)), shares)
+    return np.ascontiguousarray(shares[:, ::RULE])
+
+
 def resolved(
     kind: int, edges: Array, evaluate: Callable[[Array], Array], wanted: NDArray[np.intp], *, everywhere: bool
 ) -> Panels:
@@ -140,7 +147,7 @@ def resolved(
     panels, samples = np.concatenate([d[0] for d in done]), np.concatenate([d[1] for d in done], axis=2)
     order = np.argsort(panels[:, 0])
     panels, samples = panels[order], samples[:, :, order]
-    weights = _weights(*panels.T)
+    weights = weights_on(*panels.T)
     errors = np.einsum("kmj,mj->k", samples[:, 2], weights[0])
     if not (errors[wanted] <= MAX_ROUNDING * sizes[wanted, 0]).all():
         raise SolutionError(UNDECIDED)
@@ -149,8 +156,8 @@ def resolved(
     return Panels(np.append(panels[:, 0], edges[-1]), samples[:, 0], integrals)
 
 
-def _weights(left: Array, right: Array) -> tuple[Array, Array]:
-    """Return the weight of each node of panels, as two doubles."""
+def weights_on(left: Array, right: Array) -> tuple[Array, Array]:
+    """Return the weight of each node of panels between edges, as two doubles."""
     (width, low), rule = panel_widths(left, right), panel_rule()
     weight, rest = two_product.py_func(width[:, None], rule[2])
     return weight, rest + (width[:, None] * rule[3] + low[:, None] * rule[2])

@@ -1,9 +1,9 @@
 """The state of a body at any times on a trajectory of many segments, in one call from Python.
 
 The data of all segments are stored in one record (`records.record`), because passing many arrays would take longer than
-reading them. All segments are of the kinds FROM_TURN and REGULAR (`quadrature.substitution`), and have polynomials for
-the phase angle over time (`table`), and for arc length and speed over the phase angle. The intervals of time follow
-each other, beginning at launch.
+reading them. The segments are of all kinds but FROM_SLOW (`quadrature.substitution`), and have polynomials for the
+phase angle over time (`table`), and for arc length and speed over the phase angle. The intervals of time follow each
+other, beginning at launch.
 
 =================== ========================================================================================
 section             contents
@@ -21,24 +21,28 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.arithmetic.elementary import cos, exp, sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, item_at
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.inversion.records import error_of_place, section
 from gqm_sym.runtime.inversion.table import LAST, TERMS
+from gqm_sym.runtime.quadrature.substitution import TO_EQUILIBRIUM, TURN_TURN
 
 FUNCTION, LAUNCH, SLOTS, INTERVALS, STATES, PANELS = range(6)
 
 # Columns of an interval: its end; its middle as two doubles, and one over half its length; the last phase angle phi;
-# the coefficients of the share of the segment, phi (phi SQUARE + LINEAR); both ends of the segment, as two doubles, and
-# its width; the increase of the place by whole laps; and the coefficients of phi in powers of time.
-UNTIL, MIDDLE, MIDDLE_LOW, SCALE, STOP, SQUARE, LINEAR = range(7)
-PLACE_A, PLACE_A_LOW, PLACE_B, PLACE_B_LOW, WIDTH, LAPS, POWERS = range(7, 14)
+# the kind of the segment; for the kinds FROM_TURN and REGULAR the coefficients of the share of the segment,
+# phi (phi SQUARE + LINEAR); both ends of the segment, as two doubles, and its width; the increase of the place by whole
+# laps; and the coefficients of phi in powers of time.
+UNTIL, MIDDLE, MIDDLE_LOW, SCALE, STOP, KIND, SQUARE, LINEAR = range(8)
+PLACE_A, PLACE_A_LOW, PLACE_B, PLACE_B_LOW, WIDTH, LAPS, POWERS = range(8, 15)
 INTERVAL_COLUMNS = POWERS + TERMS
 
 # Columns of a state: its panel; the sign of dlam/dphi, and that of dlam/dt; the arc length at the end ``a``; the
-# coefficients of the speed, which is Y (GROWTH phi + FIRST_GROWTH); and the errors of the time and of the place.
+# coefficients of the speed, which is Y (GROWTH phi + FIRST_GROWTH), but Y sin(phi) between two turning points and
+# Y exp(-phi) towards an equilibrium; and the errors of the time and of the place.
 PANEL, DIRECTION, HEADING, ARC_A, GROWTH, FIRST_GROWTH, TIME_ERROR, PLACE_ERROR, STATE_COLUMNS = range(9)
 
 # Columns of a panel; the two series have WIDE terms each.
@@ -82,24 +86,38 @@ def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
 @Inlined
 def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
     """Return the curve parameter within a lap at a phase angle, from the nearer end."""
-    share = phi * fma(phi, item_at(intervals, at + SQUARE), item_at(intervals, at + LINEAR))
+    kind = item_at(intervals, at + KIND)
+    if kind == TO_EQUILIBRIUM:
+        rest = exp(-phi)
+        share = 1.0 - rest
+    elif kind == TURN_TURN:
+        s, c = sin(0.5 * phi), cos(0.5 * phi)
+        share, rest = s * s, c * c
+    else:
+        share = phi * fma(phi, item_at(intervals, at + SQUARE), item_at(intervals, at + LINEAR))
+        rest = 1.0 - share
     width, low_a = item_at(intervals, at + WIDTH), item_at(intervals, at + PLACE_A_LOW)
     low_b = item_at(intervals, at + PLACE_B_LOW)
     from_a = item_at(intervals, at + PLACE_A) + fma(width, share, low_a)
-    to_b = item_at(intervals, at + PLACE_B) - fma(width, 1.0 - share, -low_b)
+    to_b = item_at(intervals, at + PLACE_B) - fma(width, rest, -low_b)
     return choose(share <= 0.5, from_a, to_b)
 
 
 @Inlined
-def speed_at(states, panels, of, phi):  # type: ignore[no-untyped-def]
+def speed_at(states, panels, kind, of, phi):  # type: ignore[no-untyped-def]
     """Return the index of the panel of a phase angle, the place on it from -1 to 1, and the speed there.
 
-    ``of`` is the index at which the state of its interval begins.
+    ``kind`` is that of the segment, and ``of`` the index at which the state of its interval begins.
     """
     panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
     x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
     speed = legendre_sum(panels[panel + SERIES + WIDE : panel + SERIES + 2 * WIDE], x)
-    return panel, x, speed * fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+    growth = fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+    if kind == TO_EQUILIBRIUM:
+        growth = exp(-phi)
+    elif kind == TURN_TURN:
+        growth = sin(phi)
+    return panel, x, speed * growth
 
 
 @Inner
@@ -138,7 +156,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             time, j = t[start + i], start + i
             launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
             phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
-            panel, x, speed = speed_at(states, panels, of, phi)
+            panel, x, speed = speed_at(states, panels, item_at(intervals, at + KIND), of, phi)
             arc = panels[panel + ARC] + legendre_sum(panels[panel + SERIES : panel + SERIES + WIDE], x)
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
@@ -201,5 +219,5 @@ def phases_along_legs(record, t, out):  # type: ignore[no-untyped-def]
         at = interval_at(intervals, slots, rate, t[i])
         number, phi = at // INTERVAL_COLUMNS, phase_angle_at(intervals, at, t[i])
         of = number * STATE_COLUMNS
-        v = states[of + HEADING] * speed_at(states, panels, of, phi)[2]
+        v = states[of + HEADING] * speed_at(states, panels, item_at(intervals, at + KIND), of, phi)[2]
         out[0, i], out[1, i], out[2, i] = number, phi, choose(t[i] == 0.0, launch[1], v)

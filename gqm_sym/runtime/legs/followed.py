@@ -22,10 +22,11 @@ from gqm_sym.runtime.legs.runs.ends import END_TURN
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import computed_once
 from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.parts.tabulated import Tabulated
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 
 
-class FollowedMotion(Motion):
+class FollowedMotion(Tabulated, Motion):
     """A motion that loses energy, followed as far as required; `DissipativeMotion` answers the questions about it."""
 
     _whole: Trajectory | None = None

@@ -1,4 +1,4 @@
-"""Motions that do not repeat: those to an end of the curve, to an equilibrium, to infinity or to a pole, and rest."""
+"""Motions that do not repeat: those to an end of the curve, to an equilibrium, to infinity or to a pole."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
-from gqm_sym.runtime.motion.events import Event, Leg, liftoff, sided_force
+from gqm_sym.runtime.motion.events import liftoff
 from gqm_sym.runtime.motion.locking import computed_once, locked
 from gqm_sym.runtime.motion.motion import Motion
-from gqm_sym.runtime.motion.rows import Rows
+from gqm_sym.runtime.motion.parts.tabulated import Tabulated
 from gqm_sym.runtime.motion.segments.conditioning import v2_correction
 from gqm_sym.runtime.motion.segments.kinds import through, toward_equilibrium
 from gqm_sym.runtime.motion.segments.segment import Segment
-from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, stop_time
+from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory, stop_time
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 
 # The number of segments of a motion to infinity that `legs` and `events` cover, and the number of panels; its end is
@@ -80,7 +80,7 @@ class OpenEnd:
         return self.place + self.direction * self.step
 
 
-class AperiodicMotion(Motion):
+class AperiodicMotion(Tabulated, Motion):
     """A motion that does not repeat: its segments follow each other, and each is passed at most once in each direction.
 
     If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
@@ -359,13 +359,19 @@ class AperiodicMotion(Motion):
         self.open_end = None
 
     def _time_error(self, t: Array) -> Array:
-        trajectory = self._trajectory(float(np.abs(t).max()) if t.size else 0.0)
-        errors = [
-            abs(timed.r_stop[0] - timed.r_start[0]) * (timed.segment.relative_error + ULP)
-            for timed in trajectory.segments
-        ]
-        before: Array = np.cumsum([0.0, *errors])[trajectory.segment_indices(t)]
-        return before
+        return np.zeros_like(t)
+
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        before = 0.0
+        for earlier in self._segments:
+            if earlier is timed:
+                break
+            before += abs(earlier.r_stop[0] - earlier.r_start[0]) * (earlier.segment.relative_error + ULP)
+        return 0.0, np.full_like(phi, before)
+
+    @property
+    def _pieces(self) -> Sequence[TimedSegment]:
+        return self._segments
 
     def _end_text(self) -> str:
         last = self._segments[-1]
@@ -378,54 +384,3 @@ class AperiodicMotion(Motion):
 def _end_time(segments: Sequence[TimedSegment]) -> float:
     """Return the time in s at which the last of these segments ends the motion; infinity if it does not."""
     return segments[-1].t_stop[0] if segments[-1].end not in ("", "asymptote") else inf
-
-
-class MotionAtRest(Motion):
-    """A body that stays where it is."""
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem, "rest", problem.launch.direction)
-        self._lifts_off = _is_pulled(problem)
-        if self._lifts_off:
-            self.kind = "transit"
-
-    def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
-        return PhasePoints((), np.ones(t.shape, dtype=bool), np.zeros_like(t), self._trajectory(0.0))
-
-    def _trajectory(self, end_time: float) -> Trajectory:
-        return Trajectory(segments=(), period=None if self._lifts_off else ZERO)
-
-    def _known_end(self) -> float:
-        return 0.0 if self._lifts_off else super()._known_end()
-
-    def _time_error(self, t: Array) -> Array:
-        return np.zeros_like(t)
-
-    @property
-    def legs(self) -> tuple[Leg, ...]:
-        """Empty, or one leg of no length if contact is lost at once."""
-        lam0 = self.problem.lam0
-        return Rows([Leg(lam0, lam0, 0.0, 0.0, self.direction, "liftoff")] if self._lifts_off else [])
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """The one event at the launch: "rest", or "liftoff" if the track would have to pull the body."""
-        state = self.state(0.0)
-        return Rows([Event("liftoff" if self._lifts_off else "rest", 0.0, state.lam, state.x, state.z)])
-
-    def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
-        return list(self.events)
-
-    def _end_text(self) -> str:
-        return f"liftoff at {self.problem.formulas.parameter} = {self.problem.lam0!r}"
-
-    def _extent_text(self) -> str:
-        return f"it {'lifts off' if self._lifts_off else 'rests'} at {self.problem.lam0!r}"
-
-
-def _is_pulled(problem: Problem) -> bool:
-    """Return whether a track that can push from one side only would have to pull a body at rest at the launch place."""
-    f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
-    if not side:
-        return False
-    return bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1), 1)[0] < 0.0)

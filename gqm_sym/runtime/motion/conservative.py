@@ -27,7 +27,8 @@ from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
 from gqm_sym.runtime.launch.survey import survey
-from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, MotionAtRest, OpenEnd
+from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, OpenEnd
+from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 from gqm_sym.runtime.motion.segments.kinds import between_turns, from_turn, through

@@ -129,14 +129,13 @@ class Sampler:
             # the powers are those of -1 and 1.
             starts, stops = intervals @ ALTERNATING, intervals.sum(axis=1)
             both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
-            middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {
                 records.LAUNCH: np.array([problem.lam0, self._v0, *self._of_states()], dtype=np.float64),
                 records.SHAPE: np.array([segment.a, segment.b, segment.ref, segment.ref_v2, segment.width_ratio]),
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
-                records.TIME_ERRORS: errors.time_error(segment, middles),
+                records.TIME_ERRORS: errors.time_errors_of_panels(segment),
                 records.TABLE_ERRORS: errors.inversion_error(segment, both_ends).reshape(2, -1).max(axis=0),
                 records.OWNERS: owners.astype(np.int64),
             }

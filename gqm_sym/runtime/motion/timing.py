@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import accumulate
-from math import ceil, inf, nan
+from math import atan2, ceil, inf, nan, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,10 +10,20 @@ import numpy as np
 from gqm_sym.arguments import short
 from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, BoundedNumber, Orbit, find_turning_points, time_orbit
+from gqm_sym.runtime.double_double.orbit_time import (
+    MAX_ERROR,
+    NO_TIMES,
+    BoundedNumber,
+    Orbit,
+    find_turning_points,
+    time_orbit,
+)
+from gqm_sym.runtime.gradients.formula_orbit import source_of, variables_of
+from gqm_sym.runtime.gradients.passages.from_turns import time_beside, times_from_turns
+from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends
@@ -130,6 +140,37 @@ def orbit_of(
     return time_orbit(problem.tape, launch, sense, offsets, times)
 
 
+def orbit_beside_hilltop(problem: Problem, offsets: tuple[float, float], times: Array) -> Orbit | None:
+    """Return a libration along a curve with formulas that passes a hilltop slowly or turns beside one, and fill the
+    times at its launch and at the edges of its panels; None if double-double arithmetic does not suffice.
+
+    The duration in parts and the times of all panels, in which V**2 is a divided difference, have nothing in common,
+    and have to agree.
+    """
+    orbit = orbit_of(problem, "libration", 0, offsets)
+    if orbit is None or not isinstance(problem.formulas.exact, ExactFormulas):
+        return None
+    given = source_of(problem.formulas), variables_of(problem), np.array([orbit.low, orbit.high]).T
+    lam0, phase = (problem.launch.lam0.value, problem.launch.lam0.low), 0.0
+    edges = np.concatenate([[0.0], times[0, 1:]])
+    behind, ahead = minus(lam0, orbit.low[:2]), minus(orbit.high[:2], lam0)
+    if times[0, 0]:
+        if not min(behind[0], ahead[0]) > 0.0:
+            return None
+        phase = 2.0 * atan2(sqrt(behind[0]), sqrt(ahead[0]))
+    marks = np.unique(np.append(edges, phase))
+    found = times_from_turns(*given, marks, MAX_ERROR * orbit.duration.high)
+    if found is None:
+        return None
+    rows, error = found
+    off = (rows[0, -1] - orbit.duration.high) + (rows[1, -1] - orbit.duration.low)
+    times[1:, 1:] = rows[:, np.searchsorted(marks, edges[1:])]
+    if phase:
+        at_phase = rows[:, np.searchsorted(marks, phase)].tolist()
+        times[1:, 0] = plus(tuple(at_phase), (time_beside(*given, phase, behind), 0.0))
+    return orbit if abs(off) <= error + orbit.duration.error else None
+
+
 def true_turning_points(
     problem: Problem, segment: Segment, offsets: tuple[float, float], orbit: Orbit | None
 ) -> tuple[Pair, Pair] | None:
@@ -186,6 +227,8 @@ def in_double_double(
     else:
         times = times_along(segment, is_thrown=is_thrown)
         orbit = known if known is not None and not times.size else orbit_of(problem, kind, direction, offsets, times)
+        if orbit is None and times.shape[1] > 1 and kind == "libration":
+            orbit = orbit_beside_hilltop(problem, offsets, times)
         if orbit is None:
             return None
         a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:-1], times[1:, :1].ravel().tolist()

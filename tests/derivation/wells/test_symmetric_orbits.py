@@ -108,6 +108,7 @@ def by_heights(model: gqm.Model, half: mpf) -> mpf:
     return 2 * integral(rate)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", CASES)
 def test_the_time_is_that_of_the_motion(name: str) -> None:
     """Both integrals have the same value."""
@@ -191,6 +192,7 @@ FORCES = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("axis", ["x", "catenary"])
 @pytest.mark.parametrize("force", range(len(FORCES)))
 def test_powers_and_waves_together(axis: str, force: int) -> None:
@@ -263,6 +265,7 @@ def test_parameters_with_the_names_of_variables_of_an_orbit(tmp_path: Path) -> N
 
 
 # The times of these orbits were taken for converged when one change of the rule was small by accident.
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("track", "z", "places"),
     [
@@ -283,6 +286,7 @@ def test_half_periods_have_settled(track: str, z: str, places: list[float], modu
 WAVES = gqm.Curve.parametric(x="sin(2*t)", z="-cos(t) - cos(3*t)/2", parameter="t", period="2*pi")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", [GRAVITY, GRAVITY + gqm.Rolling(radius="rho")])
 def test_high_powers_of_a_square_are_not_evaluated(force: Any) -> None:
     """Three times a rate and its square in ds, also under a root, are not evaluated as such, because they cancel and
@@ -294,6 +298,7 @@ def test_high_powers_of_a_square_are_not_evaluated(force: Any) -> None:
     assert orbits.agm_arguments is None
 
 
+@pytest.mark.extended
 def test_a_ball_on_waves(tmp_path: Path) -> None:
     """The half period of a ball is that of its centre, which is at a distance of its radius from the track."""
     module = gqm.build(gqm.derive(WAVES, GRAVITY + gqm.Rolling(radius="rho")), name="ball_on_waves", folder=tmp_path)

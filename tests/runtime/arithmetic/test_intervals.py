@@ -69,6 +69,7 @@ def test_function_holds_every_value(name: str, data: st.DataObject) -> None:
         assert holds(bounds, true(mpf(x))), f"i{name}({interval}) = {bounds} misses {name}({x!r})"
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", UNARY)
 @given(data=st.data())
 def test_function_of_a_number_is_tight(name: str, data: st.DataObject) -> None:
@@ -90,6 +91,7 @@ BINARY: dict[str, Callable[[Fraction, Fraction], Fraction]] = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", BINARY)
 @given(data=st.data())
 def test_arithmetic_holds_every_value(name: str, data: st.DataObject) -> None:

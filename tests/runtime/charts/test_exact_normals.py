@@ -67,6 +67,7 @@ SWINGS = [
 ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("launch", "kind", "digits"), SWINGS, ids=lambda value: str(value))
 def test_pendulum(ring: ModuleType, launch: dict[str, Any], kind: str, digits: int) -> None:
     """Kind and period are right to many digits, up to the limits between swings and rounds."""

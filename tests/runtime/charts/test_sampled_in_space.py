@@ -38,6 +38,7 @@ def smooth() -> object:
     return transient(gqm.derive(gqm.Curve.space(**KNOT, parameter="u"), gqm.Gravity()))
 
 
+@pytest.mark.extended
 def test_points_converge_to_their_curve(smooth: object) -> None:
     """The period and the states converge at the sixth order, also of laps."""
     true, errors = smooth.solve(START), []
@@ -62,6 +63,7 @@ def test_points_converge_to_their_curve(smooth: object) -> None:
     assert lap.period == pytest.approx(smooth.solve(START, 12.0).period, rel=1e-13)
 
 
+@pytest.mark.extended
 def test_losses_along_points_in_space() -> None:
     """With friction and drag the motion is that along the formulas, as far as the spline is that curve."""
     force = gqm.CoulombFriction(mu="1/20") + gqm.QuadraticDrag(b="1/10")
@@ -108,6 +110,7 @@ def test_a_straight_track() -> None:
     assert np.abs(np.array([state.normal_x, state.normal_y, state.normal_z]) - wanted).max() <= noise
 
 
+@pytest.mark.extended
 def test_the_time_along_the_spline_itself() -> None:
     """The spline, evaluated with 30 digits by de Boor's algorithm, gives the same half period."""
     u = np.linspace(-2.0, 2.0, 97)

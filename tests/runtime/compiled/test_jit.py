@@ -45,6 +45,7 @@ ONE_OF_EACH_ROOM = sorted(
 )
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", ["compiled/jit.py", *ONE_OF_EACH_ROOM])
 def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path) -> None:
     """A changed character in a file of any room changes the stamp, though its time and size stay; a copy does not."""

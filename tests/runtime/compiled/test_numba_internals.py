@@ -277,6 +277,7 @@ print(ours(spare, values.copy()) == theirs(spare, values.copy()) == 5 * 2.0**60 
 """
 
 
+@pytest.mark.extended
 def test_a_function_of_a_user_may_call_what_only_compiled_callers_call(tmp_path: Path) -> None:
     """A user's function may call one that is not inlined and takes other arguments in the machine code of an entry
     point.

@@ -104,6 +104,7 @@ def _calls() -> dict[str, tuple[str, ...]]:
     return found
 
 
+@pytest.mark.extended
 def test_bits_of_the_arithmetic(tmp_path: Path) -> None:
     """The bits agree for each function of one or more numbers or intervals that a generated module can call."""
     calls = _calls()

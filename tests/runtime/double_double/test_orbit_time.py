@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from naive import pendulum, pendulum_half_period
 from paths import ROOT
 from problems import number
+from selection import examples
 
 from gqm_sym.loading import load
 from gqm_sym.runtime.double_double.nodes import LEVELS, panel_rule, trapezoidal_nodes
@@ -56,7 +57,7 @@ def is_within(found: Any, wanted: mpf) -> bool:
 
 
 @given(amplitude=AMPLITUDES)
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_a_swing_on_a_circle(amplitude: float, circle: ModuleType) -> None:
     """A swing's half period is 2 K(k) sqrt(L/g), correctly rounded and within the bound, at any amplitude."""
     motion = circle.solve(lam0=amplitude, L=1)
@@ -68,7 +69,7 @@ def test_a_swing_on_a_circle(amplitude: float, circle: ModuleType) -> None:
 
 
 @given(share=st.floats(1.001, 5.0), lam0=st.floats(-3.0, 3.0), direction=st.sampled_from([1, -1]))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: ModuleType) -> None:
     """A round with the speed v at the bottom takes 4 K(4 g L/v**2) L/v."""
     with mp.workdps(50):

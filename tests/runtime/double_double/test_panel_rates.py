@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from problems import number
+from selection import examples
 
 from gqm_sym.runtime.double_double.panel_rates import panel_rates
 from gqm_sym.runtime.motion import timing
@@ -38,7 +39,7 @@ def rates(motion: Any, kind: int, ends: tuple[Any, Any], panel: tuple[Any, Any])
 
 @pytest.mark.parametrize("name", KINDS)
 @given(amplitude=st.floats(0.01, 3.1), low=st.floats(0.01, 0.98), width=st.floats(1e-6, 1.0))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_the_last_bit(name: str, amplitude: float, low: float, width: float, circle: ModuleType) -> None:
     """Each rate is the double nearest to that with V**2 = 2 g (cos lam - cos amplitude) and ds = dlam."""
     motion, kind = circle.solve(lam0=amplitude, L=1), KINDS[name]
@@ -68,7 +69,7 @@ def test_what_cancels_is_left_alone(circle: ModuleType) -> None:
 
 
 @given(gap=st.floats(3.0, 11.0), lam0=st.floats(-2.5, 2.5), turns=st.booleans())
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_beside_the_separatrix(gap: float, lam0: float, turns: bool, circle: ModuleType) -> None:
     """For a swing nearly to the top, or a round that nearly stops there, the period is right to the last bit without
     mpmath.

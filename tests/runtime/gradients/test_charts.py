@@ -82,6 +82,7 @@ CASES = [
 ]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("name", "launch"), CASES)
 def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
     """Durations have derivatives with respect to launch, forces and shape; at rest the one with respect to speed is
@@ -367,6 +368,7 @@ def test_motions_that_do_not_repeat(generated_folder: Path) -> None:
     }
 
 
+@pytest.mark.extended
 def test_a_slide_in_space(generated_folder: Path) -> None:
     """On a descending helix through points, derivatives agree with what units and the flow of time require.
 

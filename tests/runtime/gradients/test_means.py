@@ -75,6 +75,7 @@ def derivative(time: Callable[..., Any], name: str, v0: Any, constants: dict[str
     return float(mp.diff(lambda value: time(**{**at, name: value}), at[name]))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("time", "quantity", "v0", "changed"),
     [

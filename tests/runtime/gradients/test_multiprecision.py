@@ -44,6 +44,7 @@ def test_launches_from_rest_in_the_middle() -> None:
     assert motion.gradient("period", "lam0")["lam0"] == pytest.approx(motion.period_slope * 9.81e-300, rel=4 * ULP)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "v0"), [("ellipse", 1.0), ("ellipse", 9.0), ("parabola_rolling", 0.5)])
 def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     """If both arithmetics have enough digits, all means, ends and samples agree."""
@@ -67,6 +68,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     np.testing.assert_allclose(slow_values, values(fast._program, fast._rule[0], *nodes)[:, 0], rtol=1e-15, atol=1e-20)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("launch", [{"lam0": "pi - 1/10**12"}, {"lam0": "3/10", "v0": 6.193843872478898}])
 def test_beside_the_separatrix(launch: dict[str, Any]) -> None:
     """Half periods of swings that end beside the top, and periods of laps that just pass it, have all derivatives."""
@@ -97,6 +99,7 @@ def test_the_time_is_limited() -> None:
         motion.gradient("half_period")
 
 
+@pytest.mark.extended
 def test_a_swing_that_comes_too_near_to_the_top() -> None:
     """A swing too near to the top is refused soon. A sweep has the derivatives as near as a double can be."""
     module = generated("circle")

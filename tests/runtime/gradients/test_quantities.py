@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from orbits import FORMULAS, by_differences, half_orbit
 from paths import ROOT
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError, InputError, SolutionError
@@ -61,7 +62,7 @@ def test_reference_numbers(circle: ModuleType, cubic: ModuleType) -> None:
 
 
 @given(amplitude=st.floats(1e-3, 3.1), length=st.floats(0.1, 10.0))
-@settings(max_examples=30)
+@examples(30)
 def test_a_pendulum(amplitude: float, length: float, circle: ModuleType) -> None:
     """With k = sin(A/2), dtau/dA is sqrt(L/g) cos(A/2) (E/(k (1 - k**2)) - K/k), and dtau/dL is tau/(2L)."""
     motion = circle.solve(lam0=amplitude, L=length, g="9.81")
@@ -79,7 +80,7 @@ def test_a_pendulum(amplitude: float, length: float, circle: ModuleType) -> None
 
 
 @given(gap=st.floats(1.0, 3.7))
-@settings(max_examples=20)
+@examples(20)
 def test_a_pendulum_nearly_to_the_top(gap: float, circle: ModuleType) -> None:
     """Gradients are right down to 2e-4 rad from the top, where the half period changes by thousands of seconds per
     radian.
@@ -95,7 +96,7 @@ def test_a_pendulum_nearly_to_the_top(gap: float, circle: ModuleType) -> None:
 
 
 @given(gap=st.floats(2.0, 8.0), lam0=st.floats(-2.0, 2.0))
-@settings(max_examples=20)
+@examples(20)
 def test_rounds_that_all_but_stop(gap: float, lam0: float, circle: ModuleType) -> None:
     """dT/dv0, and the change of the place after a round, are right for rounds whose energy exceeds that of the top by
     shares of 1e-2 to 1e-8.
@@ -112,7 +113,7 @@ def test_rounds_that_all_but_stop(gap: float, lam0: float, circle: ModuleType) -
 
 
 @given(share=st.floats(1.01, 5.0), lam0=st.floats(-3.0, 3.0), direction=st.sampled_from([1, -1]))
-@settings(max_examples=20)
+@examples(20)
 def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: ModuleType) -> None:
     """With the speed v at the bottom T is 4 K(4 g L/v**2) L/v, from which dT/dv0 and dT/dE follow."""
     with mp.workdps(50):

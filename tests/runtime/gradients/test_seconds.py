@@ -153,6 +153,7 @@ def test_along_a_chart(launch: tuple[str, str], generated_folder: Path) -> None:
             assert found[one][other] == found[other][one]
 
 
+@pytest.mark.extended
 def test_along_points_in_space(generated_folder: Path) -> None:
     """Along points, second derivatives agree with differences of first derivatives, which are exact."""
     turns = [0.4 * k for k in range(-8, 9)]

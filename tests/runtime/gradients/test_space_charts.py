@@ -41,6 +41,7 @@ def test_a_vertical_plane_is_the_planar_case(generated_folder: Path) -> None:
         assert getattr(other, field) == pytest.approx(getattr(one, field), rel=1e-12)
 
 
+@pytest.mark.extended
 def test_points_in_space(generated_folder: Path) -> None:
     """The derivatives with respect to the launch place are those of differences."""
     points = np.column_stack([GIVEN, 0.3 * np.sin(GIVEN), HEIGHT])
@@ -62,6 +63,7 @@ def test_points_in_space(generated_folder: Path) -> None:
     assert swept == pytest.approx([found["lam0"], found["G"]], rel=1e-14)
 
 
+@pytest.mark.extended
 def test_a_rail_that_parameters_shape(generated_folder: Path) -> None:
     """Lengths and rates of pieces in space displace the points of the rail and change its arc length."""
     pieces = [

@@ -39,6 +39,7 @@ def test_pendulums() -> None:
             assert abs(value - wanted) <= 2 * ULP * abs(wanted)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lam0", [0.6, 1.2, -0.5])
 def test_wells_of_two_shapes(lam0: float, generated_folder: Path) -> None:
     """An attraction in a turning frame has wells about both ends of an ellipse's axis, which have different shapes.
@@ -114,6 +115,7 @@ def test_turning_points_come_with_times() -> None:
     np.testing.assert_array_equal(columns[3, LOWER_END:], [np.nan, np.inf])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["ellipse", "rolling_circle", "double_well", "circle_spring"])
 def test_as_single_motions(name: str) -> None:
     """For random launches in both directions, sweeps and single motions agree on librations and circulations, for all
@@ -171,6 +173,7 @@ def test_turning_points_and_extremes_of_pendulums() -> None:
     np.testing.assert_allclose(lightest[swings].T, at_turn, rtol=8 * ULP)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["ellipse", "double_well", "rolling_circle"])
 def test_extremes_of_random_launches(name: str) -> None:
     """Extremes are those of single motions, which improve their places in another way; none is solved singly."""

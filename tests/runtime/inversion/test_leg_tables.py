@@ -12,8 +12,8 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.compiled import threads
-from gqm_sym.runtime.legs import dissipative
 from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.parts import tabulated
 
 G, K, MU = 9.81, 40.0, 0.02
 START = 0.5
@@ -82,8 +82,8 @@ def test_legs_one_after_the_other(spring: ModuleType, monkeypatch: pytest.Monkey
         made.append(len(args[2]))
         return original(*args)
 
-    original = dissipative.leg_record
-    monkeypatch.setattr(dissipative, "leg_record", counted)
+    original = tabulated.leg_record
+    monkeypatch.setattr(tabulated, "leg_record", counted)
     motion, other = spring.solve(START, k=K, mu=MU), spring.solve(START, k=K, mu=MU)
     t = np.linspace(0.0, other.t_end, 300)
     places = other.lam(t)
@@ -104,7 +104,7 @@ def test_the_same_bits_on_any_number_of_cores(spring: ModuleType, monkeypatch: p
     t = np.linspace(0.0, motion.t_end, 1000)
     whole = motion.lam(t), motion.state(t)
     monkeypatch.setattr(threads, "cores", lambda: 3)
-    monkeypatch.setattr(dissipative, "MIN_PLACES_PER_THREAD", 100)
-    monkeypatch.setattr(dissipative, "MIN_STATES_PER_THREAD", 100)
+    monkeypatch.setattr(tabulated, "MIN_PLACES_PER_THREAD", 100)
+    monkeypatch.setattr(tabulated, "MIN_STATES_PER_THREAD", 100)
     assert np.array_equal(motion.lam(t), whole[0])
     assert np.array_equal(np.array(motion.state(t)), np.array(whole[1]))

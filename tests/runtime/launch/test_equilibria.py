@@ -35,6 +35,7 @@ def test_a_pendulum() -> None:
     assert isnan(top.frequency)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("spin", [3.0, 4.0, 5.0, 12.0])
 def test_a_rotating_hoop(spin: float) -> None:
     """Below the critical speed the bottom is stable; above it two other places are, with the frequency
@@ -105,6 +106,7 @@ def test_rolling_slows_down() -> None:
     assert only.frequency == pytest.approx(sqrt(9.81 / 1.4), rel=TOLERANCE)
 
 
+@pytest.mark.extended
 def test_infinitely_many_want_a_range() -> None:
     """A wave on the open line has too many equilibria; between two places they are listed, and the ends are checked."""
     wave = model(gqm.Curve.graph("sin(x)"))

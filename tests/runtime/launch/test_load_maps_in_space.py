@@ -54,6 +54,7 @@ def test_the_contact_force_along_each_axis(v0: float) -> None:
     assert path.normal_force == pytest.approx(size, abs=OF_LENGTH * size.max(), rel=0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("v0", [0.0, 9.0])
 def test_the_contact_force_in_a_frame_that_turns(v0: float, tmp_path: Path) -> None:
     """The Coriolis part has the sign of the direction of launch, and from rest that of the side of the launch."""
@@ -117,6 +118,7 @@ def by_definition(
     return rows
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ["trefoil", "torus_knot", "saddle", "bowl_spiral", "catenary_weave", "tilted_ring"])
 def test_the_vector_of_sines_of_multiples(name: str, tmp_path: Path) -> None:
     """The contact force has all digits where sines of many multiples of the parameter would add up to it."""
@@ -141,6 +143,7 @@ def test_the_vector_of_sines_of_multiples(name: str, tmp_path: Path) -> None:
     assert np.max(errors) < SCALE * size
 
 
+@pytest.mark.extended
 def test_angles_are_not_rounded(tmp_path: Path) -> None:
     """Coordinates keep their last place where the angle is a large multiple of the parameter, with a phase or none."""
     curve = gqm.Curve.space(x="cos(k*u)", y="sin(1001*u + 1)", z="u", parameter="u", parameters={"k": "733"})

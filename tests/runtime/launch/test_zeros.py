@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.errors import LaunchError
@@ -59,6 +60,7 @@ def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: floa
     return what, lam0 + near, lam0 + far
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("width", [1e-3, 1e-4, 1e-5, 1e-6])
 @pytest.mark.parametrize("centre", [1.0, 0.123456789, -2.7182818])
 @pytest.mark.parametrize("above", [1e-3, 1e-6, 1e-9])
@@ -87,6 +89,7 @@ def test_no_narrow_barrier_is_jumped(
         assert abs(mpf(place) - truth) <= allowed
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("width", [1e-3, 1e-6])
 def test_a_motion_is_held_by_a_narrow_barrier(width: float, field: Callable[[str], ModuleType]) -> None:
     """In a wide bowl with a narrow spike the swing ends at the spike or goes on to the far side, as the energy
@@ -131,8 +134,9 @@ def first_turn(height: Callable[[Any], Any], start: float, v0: float, direction:
 NUMBERS = st.floats(-1.0, 1.0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["waves", "quintic"])
-@settings(max_examples=80)
+@examples(80)
 @given(
     abcdf=st.tuples(*[NUMBERS] * 5),
     start=st.floats(-2.0, 2.0),
@@ -230,6 +234,7 @@ def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -
     assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("scale", [1e3, 1.0, 1e-3, 1e-6, 1e-12])
 def test_an_exponential_wall_of_any_width(generated_folder: Any, scale: float, direction: int) -> None:

@@ -100,6 +100,7 @@ def test_terms_that_cancel_beside_a_viscous_law(size: float, build: Build) -> No
             assert abs(mpf(motion.lam(t)) - truth) <= motion.error_bound(t) <= 1e-12 * size
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("size", [1e6, 3e6, 1e7, 1e8, 1e10])
 def test_terms_that_cancel_too_far(size: float, build: Build) -> None:
     """No motion ends where terms cancel too far (it was said to end at a singular point, which this curve does not
@@ -311,6 +312,7 @@ def test_drag_alone(t: float, build: Build) -> None:
     assert error <= state.error <= 1e-9
 
 
+@pytest.mark.extended
 def test_charts_charge_their_own_rounding(build: Build) -> None:
     """Swings on a ring without formulas agree within their bounds with the circle with formulas.
 

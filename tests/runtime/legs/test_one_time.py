@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import generated.circle_drag
-from gqm_sym.runtime.legs import dissipative, inherited
+from gqm_sym.runtime.legs import inherited
+from gqm_sym.runtime.motion.parts import tabulated
 
 
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7, 4.9])
@@ -17,8 +18,8 @@ def test_the_state_at_one_time_tabulates_one_piece(t: float, monkeypatch: pytest
     known = generated.circle_drag.solve(1.0, 0)
     known.lam(np.linspace(0.0, 5.0, 50))
     made: list[Any] = []
-    real = dissipative.tabulated
-    monkeypatch.setattr(dissipative, "tabulated", lambda *given: made.append(given) or real(*given))
+    real = tabulated.tabulated
+    monkeypatch.setattr(tabulated, "tabulated", lambda *given: made.append(given) or real(*given))
     motion = generated.circle_drag.solve(1.0, 0)
     assert motion.state(t) == known.state(t)
     assert motion.lam(t) == known.lam(t)

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from selection import examples
 
 import gqm_sym as gqm
 
@@ -60,8 +61,9 @@ def asked(motion: Any, end: float) -> dict[str, Callable[[], Any]]:
     }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LAUNCHES)
-@settings(max_examples=12)
+@examples(12)
 @given(order=st.permutations(range(12)), launch=st.sampled_from([("1/2", 0), ("-1/3", 1), ("1/4", "7/3")]))
 def test_any_order(name: str, modules: dict[str, ModuleType], order: list[int], launch: tuple[Any, Any]) -> None:
     """Each question alone, of a motion that was asked nothing else, gives the same digits."""

@@ -155,6 +155,7 @@ def test_from_one_hilltop_to_the_other(gap: str, module_of: ModuleOf) -> None:
             assert off(state.v, 2 * w / mp.cosh(clock)) <= POSITION * 2 * float(w)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("start", ["0.25", "0.5", "0.9", "0.999", "0.999999"])
 def test_back_to_the_barrier_by_a_turn(start: str, module_of: ModuleOf) -> None:
     """In z = x**4 - x**2 with the energy of its barrier the body turns at 1 and comes back, ever slower, to 0."""
@@ -358,6 +359,7 @@ def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> 
             assert off(state.lam, 2 * mp.acos(sigma / 2)) <= state.error <= POSITION
 
 
+@pytest.mark.extended
 def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
     """A spiral winds for ever over a finite length; the motion ends, and says when (``make soak`` found that it took
     for ever).
@@ -385,6 +387,7 @@ def test_contact_lost_at_launch_ends_a_fall(generated_folder: Any) -> None:
         assert (motion.events[-1].kind, motion.t_end) == ("liftoff", 0.0) or held
 
 
+@pytest.mark.extended
 def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
     """The last turns take less time than two doubles resolve (``make soak`` found panels without end)."""
     spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound_up", folder=generated_folder)
@@ -413,6 +416,7 @@ def answers(motion: Any) -> list[Any]:
     return [motion.kind, motion.t_end, motion.turning_points, *motion.legs, *motion.events, motion.condition_number]
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 @pytest.mark.parametrize(
     ("track", "launch"),
@@ -510,6 +514,7 @@ def test_rest_with_friction_on_the_wrong_side() -> None:
     assert (motion.t_end, motion.events[0].kind) == (0.0, "liftoff")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("lam0", ["-1", "1", -1.0])
 def test_a_ridge_as_high_as_the_launch(lam0: Any, generated_folder: Any) -> None:
     """A ridge as high as the launch is never reached, from either side; one unit away the potential is that of the

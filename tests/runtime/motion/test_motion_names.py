@@ -12,7 +12,7 @@ from gqm_sym.arguments import ChecksArguments
 from gqm_sym.errors import ArgumentError, renamed
 from gqm_sym.runtime.launch import kinds
 from gqm_sym.runtime.launch.speed import Pass1
-from gqm_sym.runtime.motion.aperiodic import MotionAtRest
+from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.events import Event, Leg
 from gqm_sym.runtime.motion.extremes import grid_peaks
 from gqm_sym.runtime.motion.motion import Motion

@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import numpy as np
 import pytest
 from mpmath import mp, mpf
 from naive import ulps
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
+from gqm_sym.runtime.motion import timing
 
 # Twice the root of g L is the speed that leads from the lowest place exactly to the highest.
 TO_THE_TOP = "2*sqrt(9.81)"
@@ -76,6 +79,7 @@ def test_a_fall_without_an_end(tmp_path: Path) -> None:
         motion.lam(1e120)
 
 
+@pytest.mark.extended
 def test_a_fall_to_a_singular_point(tmp_path: Path) -> None:
     """The graph of x**(3/2) is passed from 1 to 0, where its curvature is infinite and the curve ends."""
     motion = gqm.build(gqm.derive(gqm.Curve.graph("x*sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path).solve(
@@ -125,3 +129,36 @@ def test_out_of_a_cusp_the_wrong_way(module_of: Callable[[str], ModuleType]) -> 
         module.solve(lam0=0, v0=1, R=1, direction=-1)
     assert module.solve(lam0=0, R=1).kind == "rest"
     assert math.isinf(module.solve(lam0=0, R=1).t_end)
+
+
+@pytest.mark.parametrize("launch", [(math.pi - 1e-7, 0.0, 1), (0.3, 6.193843872478277, -1)])
+def test_times_beside_a_hilltop(
+    circle: ModuleType, launch: tuple[float, float, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The times at the edges of all panels, and that of the launch, are elliptic integrals to 17 digits, although V**2
+    loses more than half of its 31 digits, and without mpmath.
+    """
+
+    def refused(*_: Any, **__: Any) -> None:
+        raise AssertionError("times are found in mpmath")
+
+    monkeypatch.setattr(timing, "_durations", refused)
+    lam0, v0, direction = launch
+    motion = circle.solve(lam0=lam0, v0=v0, direction=direction, L=1)
+    motion.state(0.4 * motion.period)
+    found = motion._times_until(motion.period).timing
+    with mp.workdps(50):
+        rate = mp.sqrt(mpf("9.81"))
+        square = (mpf(v0) / (2 * rate)) ** 2 + mp.sin(mpf(lam0) / 2) ** 2
+        top = 2 * mp.asin(mp.sqrt(square))
+
+        def time_to(place: Any) -> Any:
+            share = min(max(mp.sin(place / 2) / mp.sqrt(square), -1), 1)
+            return (mp.ellipk(square) + mp.ellipf(mp.asin(share), square)) / rate
+
+        angles = [*motion._segment.edges[:-1].tolist(), mp.pi]
+        exact = [time_to(top * (2 * mp.sin(mpf(angle) / 2) ** 2 - 1)) for angle in angles]
+        times = [mpf(high) + mpf(low) for high, low in zip(*map(np.ndarray.tolist, found.edge_times), strict=True)]
+        assert len(times) > 40
+        assert max(abs(a - b) for a, b in zip(times, exact, strict=True)) < 1e-17 * exact[-1]
+        assert abs(sum(map(mpf, found.phase_time)) - time_to(mpf(lam0))) < 1e-17 * exact[-1]

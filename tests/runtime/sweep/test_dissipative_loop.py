@@ -134,6 +134,7 @@ def of_solved(quantity: str, motion: Any, target: float) -> float:
         return math.nan
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None:

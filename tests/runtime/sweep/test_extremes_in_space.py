@@ -36,6 +36,7 @@ def extremes_of_wire(a: float, start: float, g: float) -> tuple[Any, Any]:
         return min(values), max(values)
 
 
+@pytest.mark.extended
 def test_on_a_wire_about_a_level_axis(build: Build) -> None:
     """Both extremes are exact to a few roundings of the largest force, also where the force almost vanishes."""
     module = build("level_wire_extremes", WIRE, gqm.Potential("0"))
@@ -74,6 +75,7 @@ def test_at_a_joint_both_sides_count(build: Build) -> None:
     assert module.sweep("normal_force_max", 0.5, v0).values == pytest.approx(np.sqrt(square), rel=4e-15)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("name", "curve", "force", "low", "high"),
     [
@@ -112,6 +114,7 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
             assert abs(largest - force) <= 2e-13 * force
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
 def test_with_friction_as_solved_motions(build: Build, name: str) -> None:
     """Bodies that slide to rest have the extremes of solved motions within roundings of the largest force."""

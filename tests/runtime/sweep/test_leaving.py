@@ -38,6 +38,7 @@ def motion_on_helix(lam0: float, v0: float, direction: int, omega: float) -> dic
     return dict(zip(names, ((end - begin) / fall, *speeds, *loads), strict=True))
 
 
+@pytest.mark.extended
 def test_down_a_helix_that_turns(build: Build) -> None:
     """Bodies that slide down, or up and back, or up and over the upper end, in frames that turn either way or not at
     all, have the times and the extremes of the closed forms.

@@ -74,6 +74,7 @@ def asked(motion: Any, quantity: str, place: float) -> Any:
     return found if np.isfinite(found) else None
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", HILLS)
 def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType]) -> None:
     """A sweep gives the same kinds of motion, and values that differ by roundings times the condition number."""
@@ -180,6 +181,7 @@ def test_half_periods_beside_a_hilltop_have_all_digits(modules: dict[str, Module
     assert swept.values == pytest.approx(truth, rel=TWO_ULPS, abs=0.0)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["uneven_wells", "two_wells", "waves"])
 def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[str, ModuleType]) -> None:
     """Compiled code finds correctly rounded half periods and lap times without solving."""

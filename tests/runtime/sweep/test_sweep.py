@@ -501,6 +501,7 @@ def test_bodies_that_leave_come_to_places(incline: ModuleType) -> None:
         assert swept.values == pytest.approx(np.where(never, np.nan, first), rel=1e-13, nan_ok=True)
 
 
+@pytest.mark.extended
 def test_a_narrow_peak_of_the_load(generated_folder: Path) -> None:
     """Where r = 1/sin(theta) - 2 turns round the origin, the grid of an orbit is much coarser than the peak."""
     curve = gqm.Curve.polar("1/sin(theta) - 2", parameter="theta", domain=("0.1", "3.04"))

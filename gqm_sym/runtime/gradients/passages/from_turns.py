@@ -9,20 +9,32 @@ half of the orbit that begins at a; the other half is that of the same program w
 
 from fractions import Fraction
 from functools import lru_cache
+from math import fsum, sin
 from typing import Any
 
+import numpy as np
+
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus, two_product
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.gradients.evaluation import values
 from gqm_sym.runtime.gradients.lanes.differences import Places
 from gqm_sym.runtime.gradients.lanes.exact_differences import SeriesRecorder, assembled
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.programs import total_change
+from gqm_sym.runtime.gradients.panels import shares_at, shares_on, weights_on
 from gqm_sym.runtime.gradients.programs import Program, Source
+from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The number of times that the argument of sinh(t)/t is halved before it is a series. The series serves up to 1.
 HALVINGS = 3
+
+# The number of times that panels are halved at most until the times at their edges do not change.
+MAX_PANEL_HALVINGS = 4
 
 
 class WaveRecorder(SeriesRecorder):
@@ -97,3 +109,92 @@ def fill_other_side(inputs, first):  # type: ignore[no-untyped-def]
             for k in range(rows):
                 to, source = first + 2 + side * rows + k, first + 2 + (1 - side) * rows + k
                 inputs[1, part, to] = inputs[0, part, source]
+
+
+def values_from_turns(program: Program, inputs: Array, first: int, shares: Array) -> Array:
+    """Return the results of the program at places of both halves of the orbit.
+
+    Parameters
+    ----------
+    program : Program
+        The result of `from_turn_program`.
+    inputs : (3, m) array
+        Its inputs for the half that begins at the lower turning point, as two doubles and a bound on the error each.
+    first : int
+        The number of inputs before the turning points.
+    shares : (2, n) array
+        The shares of the orbit's width at the places, as two doubles each.
+
+    Returns
+    -------
+    array
+        Of shape (k, 3, n): two doubles and a bound on the error for each of the k results.
+    """
+    found, both = np.empty((program.outputs.size, 3, shares.shape[1])), np.stack([inputs, inputs])
+    fill_other_side.py_func(both, first)
+    rest = (1.0 - shares[0]) - shares[1]
+    from_upper = np.array([rest, ((1.0 - shares[0]) - rest) - shares[1]])
+    halves = shares[0] < 0.5, shares[0] >= 0.5
+    for half, places, given in zip(halves, (shares, from_upper), both, strict=True):
+        found[:, :, half] = values(program, given, *np.ascontiguousarray(places[:, half]))
+    return found
+
+
+def time_beside(source: Source, variables: Array, ends: Array, phase: float, distance: Pair) -> float:
+    """Return the time from a phase angle to a place next to it, which differs only by the rounding of the angle.
+
+    The place is at a ``distance`` from the lower turning point; the other arguments are those of `times_from_turns`.
+    """
+    program = from_turn_program(source, ())
+    assert program is not None
+    shares, (width, low) = shares_at(LIBRATION, np.array([phase])), minus(tuple(ends[:2, 1]), tuple(ends[:2, 0]))
+    (share, rest), inputs = shares[:, 0].tolist(), np.ascontiguousarray(np.hstack([variables, ends]))
+    there, lost = two_product.py_func(share, width)
+    beyond, _ = minus(distance, (there, lost + (share * low + rest * width)))
+    rate = values_from_turns(program, inputs, source.inputs, shares)[0, 0, 0]
+    return float(rate * beyond / (0.5 * width * sin(phase)))
+
+
+def times_from_turns(
+    source: Source, variables: Array, ends: Array, edges: Array, most: float
+) -> tuple[Array, float] | None:
+    """Return the times from the lower turning point to phase angles of a libration, as two doubles each, and a bound on
+    their errors in s; None if there is no program, or the error is larger than ``most``.
+
+    Parameters
+    ----------
+    source : Source
+        The formulas.
+    variables : (3, n) array
+        The variables of the launch, as two doubles and a bound on the error each.
+    ends : (3, 2) array
+        The lower and the upper turning point, in the same form.
+    edges : array
+        The phase angles, from 0 to pi. The integrand is smooth between them.
+    most : float
+        The largest error in s.
+    """
+    program = from_turn_program(source, ())
+    if program is None:
+        return None
+    inputs, before, last = np.ascontiguousarray(np.hstack([variables, ends])), None, edges
+    for halving in range(MAX_PANEL_HALVINGS):
+        left, right = last[:-1], last[1:]
+        high, low, bound = values_from_turns(program, inputs, source.inputs, shares_on(LIBRATION, left, right))[0]
+        if not np.isfinite(bound).all():
+            return None
+        weight, rest = (part.ravel() for part in weights_on(left, right))
+        term, term_low = two_product.py_func(high, weight)
+        terms = np.stack([term, term_low + (high * rest + low * weight)]).reshape(2, -1, RULE)
+        totals = [ZERO]
+        for numbers in terms.swapaxes(0, 1).reshape(len(left), -1).tolist():
+            part = fsum(numbers)
+            totals.append(plus(totals[-1], (part, fsum([*numbers, -part]))))
+        times, error = np.array(totals).T[:, :: 2**halving], float(bound @ weight)
+        if before is not None:
+            error += float(np.abs((times[0] - before[0]) + (times[1] - before[1])).max())
+            if error <= most:
+                return times, error
+        before = times
+        last = np.sort(np.concatenate([last, 0.5 * (left + right)]))
+    return None

@@ -14,11 +14,11 @@ from gqm_sym.runtime.inversion.leg_tables import phases_along_legs
 from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, HEADING
-from gqm_sym.runtime.legs.tabulation import TabulatedPiece
 from gqm_sym.runtime.legs.variations.chain import ARC, DELAY, SIGMA
 from gqm_sym.runtime.legs.variations.changes import Changes, changes_of_turns
 from gqm_sym.runtime.legs.variations.law import LawRows
 from gqm_sym.runtime.motion.events import Leg
+from gqm_sym.runtime.motion.segments.tabulation import TabulatedPiece
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
 # An extreme inside a leg is improved by Newton's method, whose steps may be at most this share of the time of the
@@ -32,6 +32,9 @@ BLOCK = 2048
 # of the force, as a share of the place, counts as being at the jump. At a time later or earlier by the third share, it
 # is on one side of the jump.
 AT_END, AT_BREAK, SIDE_SHARE = 1e-12, 1e-9, 1e-13
+
+# Why there are no derivatives on an approach to an equilibrium.
+NEAR_EQUILIBRIUM = "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
 
 
 class Switch(NamedTuple):
@@ -79,12 +82,20 @@ class MarchPoints(NamedTuple):
 
 
 def points_by_record(record: Array, pieces: Sequence[TabulatedPiece], t: Array) -> MarchPoints:
-    """Return the points of a motion at times, from the record of some of its pieces."""
+    """Return the points of a motion at times, from the record of some of its pieces.
+
+    Raises
+    ------
+    SolutionError
+        As `points_of`.
+    """
     number, phi, v = rows = np.empty((3, t.size))
     phases_along_legs(record, t, rows)
     of_pieces = np.array([(2 * piece.leg + (piece.sense < 0), piece.last, piece.laps) for piece in pieces])
     counts = [len(piece.intervals) for piece in pieces]
     half, last, laps = np.repeat(of_pieces, counts, axis=0)[number.astype(np.intp)].T
+    if np.isnan(last).any():
+        raise SolutionError(NEAR_EQUILIBRIUM)
     return MarchPoints(half.astype(np.int64), phi * last, v, laps)
 
 
@@ -99,9 +110,7 @@ def points_of(found: PhasePoints, v: Array) -> MarchPoints:
     half, w = np.empty(v.size, dtype=np.int64), np.empty(v.size)
     for timed, here, phi in found.segments:
         if timed.segment.speed_series is None:
-            raise SolutionError(
-                "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
-            )
+            raise SolutionError(NEAR_EQUILIBRIUM)
         half[here], w[here] = 2 * timed.leg + (timed.sense < 0), phi * timed.segment.speed_series[0]
     return MarchPoints(half, w, v, found.laps)
 

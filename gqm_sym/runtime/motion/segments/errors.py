@@ -14,7 +14,7 @@ from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to Q there
-# (`_end_errors`); the largest measured error was 0.6.
+# (`end_errors`); the largest measured error was 0.6.
 MAX_END_ROUNDINGS = 2.0
 
 # The error of the potential's slope along a chart that has no formulas, in roundings of the largest slope; the same in
@@ -34,7 +34,13 @@ MAX_SLOPES = (0.5, 2.0, 1.0)
 
 
 def time_error(segment: Segment, phi: Array) -> Array:
-    """Return the estimated error in s of a segment's times at phase angles.
+    """Return the estimated error in s of a segment's times at phase angles, which is that of their panels."""
+    of_panels: Array = time_errors_of_panels(segment)[np.searchsorted(segment.edges[1:-1], phi, side="right")]
+    return of_panels
+
+
+def time_errors_of_panels(segment: Segment) -> Array:
+    """Return the estimated error in s of the times on each panel of a segment.
 
     It is a share of the whole duration, or of the panel's duration if the times at its edges are exact.
     """
@@ -42,13 +48,13 @@ def time_error(segment: Segment, phi: Array) -> Array:
     if segment.kind == TURN_TURN and segment.balance > 0.0 and not segment.from_multiprecision:
         # The rounding of the ends changes V**2 by a larger share if little of it is left after cancellation.
         error += 0.5 * ULP * max(abs(segment.a), abs(segment.b)) / (abs(segment.width) * segment.balance)
-    which, times = np.searchsorted(segment.edges[1:-1], phi, side="right"), segment.edge_times[0]
+    times = segment.edge_times[0]
     if segment.has_given_times:
-        spans: Array = np.diff(times)[which]
+        spans: Array = np.diff(times)
     elif segment.kind == TO_EQUILIBRIUM or segment.speed_series is not None:
-        spans = times[which + 1]  # its end is arbitrary, or the error grows from ``a``
+        spans = times[1:]  # its end is arbitrary, or the error grows from ``a``
     else:
-        spans = np.full_like(phi, segment.duration)
+        spans = np.full(len(times) - 1, segment.duration)
     return error * spans
 
 
@@ -65,12 +71,12 @@ def inversion_error(segment: Segment, phi: Array) -> Array:
     bounded: Array = width * (MAX_SLOPES[segment.kind] * errors + 3.0 * ULP)
     if segment.kind == REGULAR or segment.from_multiprecision:
         return bounded
-    at_a, at_b = _end_errors(segment)
+    at_a, at_b = end_errors(segment)
     share = phi**2 if segment.kind == FROM_TURN else np.sin(0.5 * phi) ** 2
     return bounded + at_a * (1.0 - share) + at_b * share
 
 
-def _end_errors(segment: Segment) -> tuple[float, float]:
+def end_errors(segment: Segment) -> tuple[float, float]:
     """Return bounds on the errors of a segment's turning points, in units of the curve parameter.
 
     V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from selection import examples
 
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
@@ -71,7 +72,7 @@ def pendulum(angle: Any, speed: Any) -> mpf:
 @given(
     angle=st.floats(1e-3, 3.1), speed=st.one_of(st.just(0.0), st.floats(1e-3, 9.0)), direction=st.sampled_from([1, -1])
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_an_implicit_circle(angle: float, speed: float, direction: int, ring: ModuleType) -> None:
     """Swings and rounds on x**2 + z**2 = 1 are those of a pendulum, wherever turning points lie on the pieces."""
     with mp.workdps(DIGITS):
@@ -116,7 +117,7 @@ def test_times_on_the_way(ring: ModuleType) -> None:
 
 
 @given(height=st.floats(0.01, 1.4), side=st.sampled_from([-1, 1]))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_two_planes(height: float, side: int, module_for: Callable[..., ModuleType]) -> None:
     """Between two planes the times are those of constant acceleration, from any height, to and over a corner."""
     module = module_for(gqm.Curve.sampled([("-3", "1.5"), ("0", "0"), ("1", "1.5")], kind="linear"), "true_planes")
@@ -131,7 +132,7 @@ def test_two_planes(height: float, side: int, module_for: Callable[..., ModuleTy
 
 
 @given(angle=st.floats(1e-2, 1.4))
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_an_arc_between_lines(angle: float, module_for: Callable[..., ModuleType]) -> None:
     """On an arc of a rail a body swings as a pendulum; the line beside it adds the time that the closed form gives."""
     rail = [gqm.line(length=2), gqm.arc(radius=1, angle="pi"), gqm.line(length=2)]
@@ -165,6 +166,7 @@ def test_a_spline(launch: dict[str, float], module_for: Callable[..., ModuleType
     assert np.abs(found.edge_times[0] - exact.edge_times[0]).max() <= 1e-15
 
 
+@pytest.mark.extended
 def test_a_curve_of_many_pieces(module_for: Callable[..., ModuleType]) -> None:
     """A passage over more pieces than mpmath would integrate has the half period of the same curve as a graph."""
     text = "x**2/200 + sin(9*x)/90"
@@ -205,6 +207,7 @@ def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -
     assert _chart_with.cache_info().misses == before + 2
 
 
+@pytest.mark.sample(1)
 @pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 @pytest.mark.parametrize("launch", [{"lam0": 2.0}, {"lam0": 5.0, "v0": 1.0}])
 def test_the_bound_along_a_track_of_scattered_points(
@@ -220,6 +223,7 @@ def test_the_bound_along_a_track_of_scattered_points(
         assert abs(mpf(duration.high) + mpf(duration.low) - truth) <= duration.error <= 1e-24 * truth
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("g", [0.4, 1.62, 9.81])
 def test_swings_too_small_for_doubles_along_a_chart(g: float, ring: ModuleType) -> None:
     """In doubles the bottom has an error of 1e-16, which the bound did not include if no extended precision was

@@ -49,6 +49,7 @@ def frame_truth(places: list[Any]) -> list[Any]:
     return [found(place) for place in places]
 
 
+@pytest.mark.extended
 def test_transition(tmp_path: Path) -> None:
     """With rates of degree 5, coordinates, tangents and the roll are those of the frame's equations in 25 digits."""
     rates = {"yaw": polynomial(YAW), "pitch": polynomial(PITCH), "roll": polynomial(ROLL)}
@@ -125,6 +126,7 @@ def test_a_tilted_circle(tmp_path: Path, radius: float, amplitude: float) -> Non
         assert module.solve(launch, R=radius).half_period == float(truth)
 
 
+@pytest.mark.extended
 def test_planar_rail_is_the_case_without_y(tmp_path: Path) -> None:
     """Lines, arcs and clothoids in space with y = 0 are the planar rail: its coordinates, curvature and times."""
     module = built(tmp_path, "flat", LOOP, start=(0, 0, 0))

@@ -69,6 +69,7 @@ def test_pendulums(low: float, high: float, answered: Counter[str]) -> None:
     np.testing.assert_array_equal(found.gradient[:, 3:], 0.0)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["ellipse", "parabola", "catenary", "double_well", "rolling_circle"])
 def test_random_launches(name: str, answered: Counter[str]) -> None:
     """For random launches on wells with and without symmetry, derivatives are within 4 ulp of differences in mpmath.
@@ -108,6 +109,7 @@ def test_neighbours_do_not_matter() -> None:
         np.testing.assert_allclose(column, wanted, rtol=4 * ULP)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["circle", "ellipse", "double_well", "rolling_circle"])
 def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Machine code for a program gives the same bits as the interpreters, for librations from rest and others, and for
@@ -123,6 +125,7 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(*found)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("quantity", ["turning_points", "v_min", "v_max", "normal_force_min", "normal_force_max"])
 def test_turning_points_and_extremes_in_any_company(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Derivatives of turning points and extremes have the same bits alone, anywhere among others, and by machine
@@ -155,6 +158,7 @@ def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> 
         np.testing.assert_array_equal(found[0], found[-1])
 
 
+@pytest.mark.extended
 def test_machine_code_that_is_not_used_any_more() -> None:
     """Machine code is removed from memory with its program, and is made again when it is needed."""
     source = source_of(generated("circle").MODEL)

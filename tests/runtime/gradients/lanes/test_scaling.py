@@ -76,6 +76,7 @@ def test_a_constant_of_the_potential(tmp_path: Path) -> None:
     assert (found.gradient[:, 0] != 0.0).all()
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("is_thrown", [False, True])
 @pytest.mark.parametrize("name", ["ellipse", "parabola", "catenary", "double_well", "circle_spring", "rolling_circle"])
 def test_random_launches(name: str, *, is_thrown: bool) -> None:
@@ -98,6 +99,7 @@ def test_random_launches(name: str, *, is_thrown: bool) -> None:
                 assert abs(found.gradient[k, column] - wanted) <= 4 * ULP * abs(wanted)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("rate", [1, 3])
 def test_thrown_along_waves(rate: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Multiples of half the width of an orbit are differentiated, whatever constants they are joined with."""

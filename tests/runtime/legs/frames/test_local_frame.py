@@ -63,6 +63,7 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Pairs:
     return make
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("shape", ["pendulum", "parabola"])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/2", "-1e-3", "1e-5", "-1e-9", "1e-13"])
@@ -86,6 +87,7 @@ def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: P
     assert begins[0] == pytest.approx(begins[1], rel=TURN_TIMES)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/10", "-1e-3", "1e-6", "-1e-9", "1e-13", "-1e-16", "1e-19"])
 def test_a_body_departs_from_any_hilltop_alike(lam0: str, law: str, pairs: Pairs) -> None:
@@ -151,6 +153,7 @@ def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.Te
     assert motion.turning_points == pytest.approx((1.0, 1.0), abs=10.0**-exponent + 2e-16)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("exponent", [30, 45, 100, 120])
 def test_a_swing_far_below_the_rounding_of_its_place(exponent: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """About 7 the half period is that of small oscillations, where the first digits that are tried give V**2 as mere
@@ -252,6 +255,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(model, name="viscous_ring", folder=tmp_path_factory.mktemp("ring"))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(6))
 def test_small_swings_where_a_chart_begins(seed: int, ring: ModuleType) -> None:
     """Down to a picometre the body swings like a damped spring (one swing in five was refused, or ended on its way)."""

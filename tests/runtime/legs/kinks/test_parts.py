@@ -79,6 +79,7 @@ def largest(function: Callable[[Any], Any], a: mpf, b: mpf) -> float:
 
 # The turns after the first of these launches lie beyond both kinks, and those after the others next to them or between
 # them.
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("start", [1.125, 0.6875, 0.5, 0.375])
 def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
     """Turns, times, extremes and places agree wherever the turns lie with respect to the kinks."""
@@ -166,6 +167,7 @@ class SpaceDroplet(Droplet):
         return mp.sqrt(parts[0] ** 2 + parts[1] ** 2 + (parts[2] + self.g) ** 2)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("start", "b"), [(1.125, 0.0625), (-1.0, 0.000625)])
 def test_droplet_past_branch_points(start: float, b: float, generated_folder: Path) -> None:
     """Extremes and times on a space curve that is almost straight at one place agree, as long as a droplet swings."""

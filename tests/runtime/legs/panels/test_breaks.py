@@ -74,6 +74,7 @@ def slide(points: Any, lam0: float, v0: float, way: int, mu: float) -> tuple[Any
     return np.array([*rows, (t, place, Long(0), Long(0), way)]), end
 
 
+@pytest.mark.sample(2)
 def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
     """Random launches come to rest, on planes and on corners, at the times and places of closed forms."""
     module, points = track
@@ -114,6 +115,7 @@ def test_sweeps_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
             assert abs(places[start] - rows[-1, 1]) <= PLACES * high
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_drag_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
     """Random launches with drag are followed and only lose energy; with friction as well they are followed to their

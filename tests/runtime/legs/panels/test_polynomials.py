@@ -124,6 +124,7 @@ def test_zero_touched_is_no_change() -> None:
     assert first_change(np.zeros(COUNT), 0, 0.0)[:2] == (2.0, 0)
 
 
+@pytest.mark.extended
 def test_a_triple_root_is_a_change() -> None:
     """At a triple root the sign changes, although the function is flat there."""
     x, before, _ = first_change(_series([0.3, 0.3, 0.3]), 0, NOISE)

@@ -105,6 +105,7 @@ class Pendulum:
         )
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("start", "mu"), [(1.4, 0.05), (-0.8, 0.04), (0.03, 0.004), (1.1, 0.2)])
 def test_a_pendulum_with_friction(start: float, mu: float) -> None:
     """The place and the time of rest, the legs, and places on the first and the last of them agree with the closed
@@ -244,6 +245,7 @@ LAWS: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("height", "slope", "start", "force"),
     [
@@ -328,6 +330,7 @@ IN_SPACE = [
 ]
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "curve", "given", "turns", "durations", "passage", "largest"), IN_SPACE)
 def test_friction_in_space(
     name: str,

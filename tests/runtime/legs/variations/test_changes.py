@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from paths import ROOT
 from scipy.integrate import solve_ivp
+from selection import examples
 
 from gqm_sym.loading import load
 
@@ -150,8 +151,9 @@ def integrated(name: str, launch: dict[str, float], times: Any) -> Any:
     return out
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", TRACKS)
-@settings(max_examples=2, deadline=None)
+@examples(2)
 @given(data=st.data())
 def test_states_follow_the_variational_equations(name: str, data: Any) -> None:
     """Random launches on tracks with all kinds of losses follow the equations through turns and changes of contact."""

@@ -101,6 +101,7 @@ def along_rail(lam0: Any, v0: Any, p: Any, r: Any, h: Any, g: Any, mu: Any) -> t
     return p + r * (end - begin) + up, p + r * (rest - begin), force
 
 
+@pytest.mark.extended
 def test_jumps_of_the_force(rail: ModuleType) -> None:
     """Turning points, the place of rest and the largest force have the right derivatives by launch, force and shape of
     the rail.
@@ -158,6 +159,7 @@ def test_a_track_through_points(generated_folder: Path) -> None:
         assert abs(slopes["lam0"] + 1 / mp.sqrt(exact["v0"] ** 2 - up)) <= TOLERANCE
 
 
+@pytest.mark.extended
 def test_a_rail_in_space_is_the_planar_one(generated_folder: Path) -> None:
     """A rail of transitions in a vertical plane has the derivatives of the planar rail of lines and arcs."""
     force, given = gqm.Gravity() + gqm.CoulombFriction(mu="1/10") + gqm.QuadraticDrag(b="1/50"), {"r": "3/2"}
@@ -185,6 +187,7 @@ def test_a_rail_in_space_is_the_planar_one(generated_folder: Path) -> None:
     assert np.abs(there.normal_force - here.normal_force).max() <= 4 * TOLERANCE * np.abs(here.normal_force).max()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["points", "rail"])
 def test_in_space_as_differences(name: str, generated_folder: Path) -> None:
     """Derivatives along points and rails in space are those of differences of answers, also by a shape."""

@@ -6,10 +6,11 @@ sgn(dtheta/dt), as long as the body presses outwards. So W is K exp(-2 mu v thet
 
 from typing import Any
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 from paths import ROOT
+from selection import examples
 
 from gqm_sym.loading import load
 
@@ -47,7 +48,7 @@ def turns(launch: dict[str, Any], direction: int, near: tuple[float, ...]) -> li
     mu=st.floats(0.01, 0.2),
     direction=st.sampled_from([1, -1]),
 )
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_turning_points(lam0: float, v0: float, length: float, g: float, mu: float, direction: int) -> None:
     """The derivatives of the first turning points by launch and parameters are those of the closed form."""
     launch = dict(zip(NAMES, (lam0, v0, length, g, mu), strict=True))

@@ -136,6 +136,7 @@ def test_small_swings_on_any_turn(turns: int, module_of: ModuleOf) -> None:
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
+@pytest.mark.extended
 def test_barriers_are_not_jumped(tmp_path: Path) -> None:
     """On a track of hills every orbit stays in its own valley, however narrow the next hill."""
     curve = gqm.Curve.graph("x**2/4 + 3*exp(-(x - 1)**2/w**2)", parameter="x", parameters={"w": 1})
@@ -211,6 +212,7 @@ def test_released_beside_the_top(module_of: ModuleOf) -> None:
 TWO_ULPS = 2.0 * 2.0**-52
 
 
+@pytest.mark.extended
 def test_half_periods_on_a_curve_of_several_waves(tmp_path: Path) -> None:
     """Also far from zero, half periods agree to the last places with `solve`, which rounds correctly, and most are in
     batches.
@@ -225,6 +227,7 @@ def test_half_periods_on_a_curve_of_several_waves(tmp_path: Path) -> None:
     assert swept.values == pytest.approx(truth, rel=TWO_ULPS, abs=0.0)
 
 
+@pytest.mark.extended
 def test_wells_about_neighbouring_axes_differ(tmp_path: Path) -> None:
     """Swings about both poles of a circle, also of a rolling body's centre, have the time of their own well."""
     law = gqm.Potential("G*z - k*z**2") + gqm.Rolling(radius="rho")

@@ -58,6 +58,7 @@ def true_orbit(lam0: mpf, v0: mpf, near: list[float]) -> tuple[float, list[float
         return float(mp.quad(rate, edges, method="gauss-legendre")), [float(low), float(high)]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("v0", [0.0, 1.5])
 def test_wells_between_hills(v0: float, spiral: ModuleType) -> None:
     """On a spiral with an axis of symmetry that is wells away, orbits turn at the first hill, not at the mirror
@@ -74,6 +75,7 @@ def test_wells_between_hills(v0: float, spiral: ModuleType) -> None:
         assert swept.values[k] == pytest.approx(half_period, abs=MAX_ERROR * np.spacing(half_period))
 
 
+@pytest.mark.sample(5)
 def test_no_answer_depends_on_the_other_launches(module_of: ModuleOf) -> None:
     """A launch has the same half period alone, with orbits beside the top in its batch, and with orbits elsewhere."""
     places = np.concatenate([np.linspace(-1.5, 2.0, 12), np.full(4, np.pi - 1e-5)])

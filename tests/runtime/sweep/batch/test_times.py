@@ -83,6 +83,7 @@ def half_period_of_ball(start: float, beta: float, rho: float) -> Any:
     return mp.pi * total / nodes
 
 
+@pytest.mark.extended
 def test_ball_with_a_radius(build: Callable[..., ModuleType]) -> None:
     """The speed of a ball's centre is a root less a small term, whose common divisor added roundings to the root."""
     curve = gqm.Curve.parametric(x="sin(2*t)", z="-cos(3*t)/2-cos(t)", parameter="t", period="2*pi")
@@ -109,6 +110,7 @@ def test_thrown_bodies_on_a_circle(tmp_path: Path) -> None:
     assert np.quantile(np.abs(found), 0.99) <= 2.1
 
 
+@pytest.mark.extended
 def test_released_at_rest_in_later_laps(build: Callable[..., ModuleType]) -> None:
     """The distance from the lowest point, which is not a double, has all digits many laps away too; half periods follow
     by elliptic integrals.

@@ -69,6 +69,7 @@ def test_half_periods_on_a_ring(ring: ModuleType) -> None:
         assert float(value) == pytest.approx(float(4 * mp.ellipk(4 * G / mpf(v) ** 2) / mpf(v)), rel=ROUNDING)
 
 
+@pytest.mark.extended
 def test_half_periods_of_a_ball_on_a_track_of_short_pieces(tmp_path: Path) -> None:
     """The path of a ball's centre depends on the curvature of the track, of which a chart of 200 pieces has few digits;
     half periods are those that `solve` rounds correctly.
@@ -314,6 +315,7 @@ def _largest_force(k: mpf, x0: float, z0: float) -> mpf:
         return force(mp.findroot(negative_slope, x0 - mpf("0.04")))
 
 
+@pytest.mark.extended
 def test_the_largest_force_on_a_small_swing(tmp_path: Path) -> None:
     """If the samples of a panel are far from the peak, parabolas follow it."""
     curve = gqm.Curve.implicit("x**4+z**4-x*z/5-1", start=(0, -1))
@@ -348,6 +350,7 @@ def _half_period_in_a_flat_well(lam0: float, a: mpf, b: mpf) -> mpf:
     return 2 * mp.quad(time, [0, mp.pi / 4, mp.pi / 2])
 
 
+@pytest.mark.extended
 def test_small_swings_in_a_flat_well(tmp_path: Path) -> None:
     """V**2 grows as the fourth power of the amplitude, and is far below its range on a panel."""
     curve = gqm.Curve.implicit("(x/a)**4 + (z/b)**4 - 1", start=(0, "-b"))

@@ -1,6 +1,7 @@
-"""The record of the segments of a motion with losses for compiled code: tables of places, states and panels."""
+"""The record of the timed segments of a motion for compiled code: tables of places, states and panels."""
 
 from collections.abc import Sequence
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -8,18 +9,27 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
+from gqm_sym.runtime.arithmetic.elementary import exp, sin
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.inversion import leg_tables, records
-from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, TERMS, tabulate
+from gqm_sym.runtime.inversion.leg_tables import WIDE
+from gqm_sym.runtime.inversion.table import TERMS, tabulate
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.panels.polynomials import WIDE
-from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES
+from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES, end_errors, time_errors_of_panels
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
-from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # The number of equal parts of the time for each interval; they serve to find the interval of a time.
 SLOTS_PER_INTERVAL = 4
+
+# The nodes of the Gauss-Legendre rule on [-1, 1], and the matrix from values at them to Legendre coefficients.
+NODES = np.polynomial.legendre.leggauss(WIDE)[0]
+TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(NODES, WIDE - 1)).T
+
+# The series of a speed is resolved if its last two coefficients are below this share of the largest one.
+MAX_SPEED_TAIL = 2e-15
 
 
 class TabulatedPiece(NamedTuple):
@@ -34,7 +44,9 @@ class TabulatedPiece(NamedTuple):
     leg, sense, laps : int
         As in `TimedSegment`.
     last : float
-        The march variable at the last phase angle, which is 1.
+        The march variable at the last phase angle, which is 1; NaN if the segment has none.
+    is_resolved : bool
+        Whether the series of the speed have all digits.
     has_all_errors : bool
         Whether the errors in STATES are those of times and places from launch, or of this piece alone.
     """
@@ -47,6 +59,7 @@ class TabulatedPiece(NamedTuple):
     sense: int
     laps: int
     last: float
+    is_resolved: bool = True
     has_all_errors: bool = False
 
     def with_errors(self, of_place: float, of_times: Array) -> "TabulatedPiece":
@@ -62,17 +75,17 @@ class Timing(NamedTuple):
 
     Attributes
     ----------
-    from_turn : float
-        1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
+    kind : float
+        The kind of the segment.
     last, turn_offset : float
         As in `Segment.speed_series` and in `Segment`.
-    relative_error : float
-        The relative error of its times.
+    error_a, error_b : float
+        The errors of the ends that are turning points, in units of the curve parameter.
     lam_before : float
         The growth of the curve parameter over all laps before it.
     """
 
-    from_turn: float
+    kind: float
     last: float
     turn_offset: float
     a: float
@@ -88,7 +101,8 @@ class Timing(NamedTuple):
     t_start: float
     t_start_low: float
     t_stop: float
-    relative_error: float
+    error_a: float
+    error_b: float
 
 
 @Inner
@@ -97,6 +111,26 @@ def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
     s, e = two_sum(r, -timing.r_start)
     high, rounding = two_sum(timing.t_start, timing.sense * s)
     return two_sum(high, rounding + timing.t_start_low + timing.sense * (e + r_low - timing.r_start_low))
+
+
+@Inner
+def largest_place_error(timing, start, stop, error):  # type: ignore[no-untyped-def]
+    """Return the largest error of places on an interval, as `errors.inversion_error` has it at phase angles.
+
+    The interval is from the phase angle ``start`` to ``stop``, the rounding of which is not counted; ``error`` is that
+    of its polynomial.
+    """
+    kind, width = int(timing.kind), abs(timing.width)
+    if kind == TO_EQUILIBRIUM:
+        # phi exp(-phi) is largest at 1.
+        farthest = min(max(start, 1.0), stop)
+        return width * (exp(-start) * (error + 3.0 * ULP) + 3.0 * ULP * farthest * exp(-farthest))
+    bounded = width * (MAX_SLOPES[kind] * error + 3.0 * ULP)
+    if kind == REGULAR:
+        return bounded
+    low = start * start if kind == FROM_TURN else sin(0.5 * start) ** 2
+    high = stop * stop if kind == FROM_TURN else sin(0.5 * stop) ** 2
+    return bounded + timing.error_a * (1.0 - low) + timing.error_b * high
 
 
 TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)
@@ -108,19 +142,21 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
 
     Parameters
     ----------
-    marks : (4, n+1) array
-        Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths.
+    marks : (5, n+1) array
+        Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths; and for each panel
+        the error of its times.
     time_terms, length_terms, speed_terms : arrays
-        As in `read_panels`.
+        Legendre coefficients of time, arc length and of the regular factor of the speed on each panel.
     timing : Timing
     """
     edges, times, lengths = marks[0], marks[1], marks[3]
     middles, lows, scales, powers, _, ends, errors = tabulate(edges, times, marks[2], time_terms)
     count, panel_count, sense, width = ends.size, edges.size - 1, timing.sense, timing.width
     intervals, states = np.empty((count, leg_tables.INTERVAL_COLUMNS)), np.empty((count, leg_tables.STATE_COLUMNS))
-    share, is_from_turn = 1.0 / (1.0 + 2.0 * timing.turn_offset), timing.from_turn > 0.0
+    kind, share = timing.kind, 1.0 / (1.0 + 2.0 * timing.turn_offset)
+    is_from_turn = kind == FROM_TURN
     linear = 2.0 * timing.turn_offset * share if is_from_turn else 1.0
-    direction, slope = (1.0 if width > 0.0 else -1.0), MAX_SLOPES[FROM_TURN if is_from_turn else REGULAR]
+    direction = 1.0 if width > 0.0 else -1.0
     growth = (timing.last, timing.last * timing.turn_offset) if is_from_turn else (0.0, 1.0)
     kept = 0
     for k in range(count):
@@ -138,7 +174,8 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         row[leg_tables.UNTIL] = until
         row[leg_tables.MIDDLE], row[leg_tables.MIDDLE_LOW] = time_from_launch(middles[i], lows[i], timing)
         row[leg_tables.SCALE], row[leg_tables.STOP] = sense * scales[i], edges[-1]
-        row[leg_tables.SQUARE], row[leg_tables.LINEAR] = timing.from_turn * share, linear
+        row[leg_tables.SQUARE], row[leg_tables.LINEAR] = (share if is_from_turn else 0.0), linear
+        row[leg_tables.KIND] = kind
         row[leg_tables.PLACE_A], row[leg_tables.PLACE_A_LOW] = timing.a, timing.a_low
         row[leg_tables.PLACE_B], row[leg_tables.PLACE_B_LOW] = timing.b, timing.b_low
         row[leg_tables.WIDTH], row[leg_tables.LAPS] = width, timing.lam_before
@@ -146,10 +183,8 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         state[leg_tables.PANEL], state[leg_tables.DIRECTION] = panel, direction
         state[leg_tables.HEADING], state[leg_tables.ARC_A] = sense * direction, timing.s_a
         state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = growth
-        state[leg_tables.TIME_ERROR] = (timing.relative_error + ULP + MAX_TIME_ERROR) * times[panel + 1]
-        # The error due to a turn, as in `Segment`, is largest next to it.
-        of_turn = MAX_END_ROUNDINGS * ULP * (1.0 - start * start) if is_from_turn else 0.0
-        state[leg_tables.PLACE_ERROR] = abs(width) * (slope * errors[i] + 3.0 * ULP + of_turn)
+        state[leg_tables.TIME_ERROR] = marks[4, panel]
+        state[leg_tables.PLACE_ERROR] = largest_place_error(timing, start, stop, errors[i])
         kept += 1
     intervals[kept - 1, leg_tables.UNTIL] = timing.t_stop
     panels = np.empty((panel_count, leg_tables.PANEL_COLUMNS))
@@ -162,19 +197,49 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
 
 
 def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
-    """Return the record of a piece, which is not an approach to an equilibrium, with its own errors."""
+    """Return the record of a piece with its own errors."""
     segment = timed.segment
-    assert segment.speed_series is not None
-    edges, _, lengths, time_terms, length_terms, error = segment.panels[:6]
-    last, speed_terms = segment.speed_series
+    edges, _, lengths, time_terms, length_terms = segment.panels[:5]
+    if segment.speed_series is None:
+        (last, speed_terms), of_ends = (1.0, _speed_terms(segment)), _errors_of_ends(segment)
+        tails, largest = np.abs(speed_terms[:, -2:]).max(axis=1), np.abs(speed_terms).max(axis=1)
+        # In extended precision speeds are slopes of the series of time and arc length, with as many digits as these.
+        is_resolved = segment.from_multiprecision or bool((tails <= MAX_SPEED_TAIL * largest).all())
+        wider = np.zeros_like(speed_terms)
+        wider[:, : length_terms.shape[1]] = length_terms
+        lengths, length_terms = segment.width_ratio * lengths, segment.width_ratio * wider
+    else:
+        (last, speed_terms), is_resolved = segment.speed_series, True
+        of_ends = (MAX_END_ROUNDINGS * ULP * abs(segment.width) if segment.kind == FROM_TURN else 0.0, 0.0)
     timing = Timing(
-        *(float(segment.kind == FROM_TURN), last, segment.turn_offset, segment.a, segment.low_parts[0], segment.b),
+        *(float(segment.kind), last, segment.turn_offset, segment.a, segment.low_parts[0], segment.b),
         *(segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a, *timed.r_start),
-        *(*timed.t_start, timed.t_stop[0], error),
+        *(*timed.t_start, timed.t_stop[0], *of_ends),
     )
-    marks = np.array([edges, *segment.edge_times, lengths])
+    marks = np.array([edges, *segment.edge_times, lengths, np.append(time_errors_of_panels(segment), 0.0)])
     intervals, states, panels = tabulate_piece(marks, time_terms, length_terms, speed_terms, timing)
-    return TabulatedPiece(intervals, states, panels, edges, timed.leg, timed.sense, timed.laps, last)
+    if segment.speed_series is None:
+        last = nan
+    return TabulatedPiece(intervals, states, panels, edges, timed.leg, timed.sense, timed.laps, last, is_resolved)
+
+
+def _speed_terms(segment: Segment) -> Array:
+    """Return the Legendre coefficients of the regular factor of the speed on each panel of a segment."""
+    halves = 0.5 * np.diff(segment.edges)
+    phi = ((segment.edges[:-1] + halves)[:, None] + halves[:, None] * NODES).ravel()
+    speeds, growth = segment.speeds(phi), {FROM_TURN: phi, TURN_TURN: np.sin(phi), TO_EQUILIBRIUM: np.exp(-phi)}
+    factors = (speeds / growth.get(segment.kind, np.ones_like(phi))).reshape(-1, WIDE)
+    # Without the differences the rounding of the matrix would be that of the largest speed.
+    middles = factors[:, WIDE // 2 :][:, :1]
+    terms: Array = (factors - middles) @ TO_LEGENDRE
+    terms[:, :1] += middles
+    return terms
+
+
+def _errors_of_ends(segment: Segment) -> tuple[float, float]:
+    """Return the errors of the ends of a conservative segment that are turning points in doubles."""
+    is_exact = segment.kind in (REGULAR, TO_EQUILIBRIUM) or segment.from_multiprecision
+    return (0.0, 0.0) if is_exact else end_errors(segment)
 
 
 def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:
