@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 18, input b87305fcd75e, body 1d7aef523de8
+# interface 19, input b87305fcd75e, body afd1730c0c0a
 """A train of five cars on hills
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=18)
+compiled = compiler(__file__, interface=19)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
@@ -176,9 +176,9 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_train(op, p):
-    """Length of the train, acceleration of gravity, and coefficient of friction."""
+    """Length of the train, acceleration of gravity, coefficient of friction, and rate of the rotating frame."""
     length, g = p[0], p[1]
-    return length, g, 0
+    return length, g, 0, 0
 
 def exact_factors(op, p):
     """Factors of the parts of U, then of the parts of n0."""

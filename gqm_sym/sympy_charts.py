@@ -87,61 +87,67 @@ def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
 
 class TrainLoad(sp.Function):  # type: ignore[misc]
     """The mean of |N|/m over the cars of a train, as a function of the place of its middle, V**2, length, number of
-    cars, g, and whether other potentials than gravity act (1) or not (0).
+    cars, g, twice the rate of a rotating frame times the sign of ds/dt, and whether other potentials than gravity act
+    (1) or not (0).
 
     Attributes
     ----------
-    by_speed, by_place
-        The functions for its derivatives with respect to V**2 and the place; None if they are not known.
+    by_speed
+        The function for its derivative with respect to V**2; None if it is not known.
+    rows
+        The name of the runtime's function for it and this derivative at many places.
+    row
+        Which of the two it is.
+    track, loads
+        The charts that it reads: those of the track, and those of loads if other potentials act.
     """
 
-    nargs = 6
+    nargs = 7
     is_real = True
     by_speed: "ClassVar[type[TrainLoad] | None]" = None
-    by_place: "ClassVar[type[TrainLoad] | None]" = None
+    rows: ClassVar[str]
+    row: ClassVar[int]
+    track: ClassVar[tuple[str, ...]]
+    loads: ClassVar[tuple[str, ...]]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative with respect to the place, or V**2."""
-        head = (self.by_place, self.by_speed)[argindex - 1] if argindex <= 2 else None
-        if head is None:
+        """Return the derivative with respect to V**2."""
+        if argindex != 2 or self.by_speed is None:
             raise DerivationError(f"{self}: no derivative of it is known")
-        return head(*self.args)
+        return self.by_speed(*self.args)
+
+
+LOADS_IN_SPACE, LOAD_IN_PLANE = ("load_x", "load_y", "load_z"), ("load",)
+"""The charts of the static load per unit mass on a body across the track under other potentials than gravity."""
 
 
 class train_load_slope(TrainLoad):
     """The derivative of `train_load` with respect to V**2."""
 
-
-class train_load_rate(TrainLoad):
-    """The derivative of `train_load` with respect to the place."""
+    rows, row, track, loads = "train_loads", 1, ("along_x", "along_y", "along_z"), LOADS_IN_SPACE
 
 
 class train_load(TrainLoad):
     """The mean of |N|/m for a track in space."""
 
-    by_speed, by_place = train_load_slope, train_load_rate
+    by_speed, rows, row = train_load_slope, "train_loads", 0
+    track, loads = train_load_slope.track, LOADS_IN_SPACE
 
 
 class train_load_slope_in_plane(TrainLoad):
     """The derivative of `train_load_in_plane` with respect to V**2."""
 
+    rows, row, track, loads = "train_loads_in_plane", 1, ("chart",), LOAD_IN_PLANE
+
 
 class train_load_in_plane(TrainLoad):
     """The mean of |N|/m for a planar track."""
 
-    by_speed = train_load_slope_in_plane
+    by_speed, rows, row = train_load_slope_in_plane, "train_loads_in_plane", 0
+    track, loads = train_load_slope_in_plane.track, LOAD_IN_PLANE
 
 
-LOADS_IN_SPACE, LOAD_IN_PLANE = ("load_x", "load_y", "load_z"), ("load",)
-"""The charts of the static load per unit mass on a body across the track under other potentials than gravity."""
-TRAIN_LOADS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    **{
-        head.__name__: (("along_x", "along_y", "along_z"), LOADS_IN_SPACE)
-        for head in (train_load, train_load_slope, train_load_rate)
-    },
-    **{head.__name__: (("chart",), LOAD_IN_PLANE) for head in (train_load_in_plane, train_load_slope_in_plane)},
-}
-"""The charts that each of these functions reads: those of the track, and those of loads if there are any."""
+TRAIN_LOADS = (train_load, train_load_slope, train_load_in_plane, train_load_slope_in_plane)
 
 ROLL = "roll"
 AXES = ("x", "y", "z")

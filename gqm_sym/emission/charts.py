@@ -192,9 +192,9 @@ def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
     whole = potential_parts(train.potential)
     numbers = lowering.constants(
         "exact_train",
-        "Length of the train, acceleration of gravity, and coefficient of friction"
+        "Length of the train, acceleration of gravity, coefficient of friction, and rate of the rotating frame"
         + (", then the factors of the other parts of the potential." if whole.parts else "."),
-        (train.train_length, whole.gravity, train.friction, *whole.factors),
+        (train.train_length, whole.gravity, train.friction, train.spin, *whole.factors),
     )
     arguments = [track.statement, f"cars={train.cars}", f"numbers={numbers.name}"]
     arguments.append(f"length={lowering.order[train.train_length.name]}")

@@ -12,7 +12,17 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import SPACE_CHARTS, TERMS_SIZES, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import (
+    SPACE_CHARTS,
+    TERMS_SIZES,
+    TRAIN_LOADS,
+    ChartFunction,
+    TrainLoad,
+    chart_alpha,
+    chart_kappa,
+    chart_x,
+    chart_z,
+)
 
 # The names of the arrays of charts in emitted functions, each with its functions and their rows. In space each
 # coordinate has a chart, and possibly the roll angle.
@@ -93,7 +103,8 @@ class _ChartReading(NamedTuple):
 
 
 class _ChartCall(NamedTuple):
-    """A row of a chart at the places of a function, or its divided difference over a fixed place and these.
+    """A row of a chart at the places of a function, its divided difference over a fixed place and these, or one of the
+    loads on the cars of a train there.
 
     Attributes
     ----------
@@ -103,6 +114,9 @@ class _ChartCall(NamedTuple):
         The name of the place.
     start, offset
         The names of the fixed place and of the distance of the other from it; empty for the row itself.
+    train
+        For the loads on cars: the name of the function that fills both rows, that of V**2 or 0, the numbers that it
+        needs, and the names of the charts that it reads.
     """
 
     row: int
@@ -110,6 +124,7 @@ class _ChartCall(NamedTuple):
     place: str = ""
     start: str = ""
     offset: str = ""
+    train: tuple[str, Expr, Sequence[Expr], Sequence[str]] | None = None
 
 
 def _read_together(function: FunctionIR) -> _ChartReading:
@@ -129,24 +144,33 @@ def _read_together(function: FunctionIR) -> _ChartReading:
     first = last - len(calls)
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read = {call: names.get(call, Symbol(f"_{call.func.__name__}", real=True)) for call in calls}
-    rows = [Assignment(name=name.name, value=at(out, first + j)) for j, name in enumerate(read.values())]
     inside = [Assignment(name=a.name, value=a.value.xreplace(read)) for a in function.inside if a.value not in read]
     outputs = tuple(value.xreplace(read) for value in function.outputs)
     needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
     kept = [a for a in inside if a.name in needed]
+    given_rows = ((name.name, at(out, first + j)) for j, name in enumerate(read.values()))
+    rows = [Assignment(name=name, value=value) for name, value in given_rows if name in needed]
     end, used = first, set()
-    for (chart, place, start, offset), group in groupby(calls.values(), lambda call: call[1:]):
+    for (chart, place, start, offset, train), group in groupby(calls.values(), lambda call: call[1:]):
         found = tuple(call.row for call in group)
         end += len(found)
         filled = out if end == last else f"{out}[:{end}]"
-        if offset:
+        if train:
+            fill, speed, numbers, charts_read = train
+            speeds = given[str(speed)] if speed else f"speeds_at_rest({function.arguments[0]})"
+            printer = CodePrinter()
+            texts = [given[place], speeds, *map(printer.doprint, numbers), filled]
+            used |= {fill, *printer.used} | (set() if speed else {"speeds_at_rest"})
+            several = f"({', '.join(charts_read)}{',' * (len(charts_read) == 1)})"
+            lines.append(f"{fill}({several}, {', '.join(texts)})")
+        elif offset:
             used.add("chart_differences")
             lines.append(f"chart_differences({chart}, {found}, {start}, {given[place]}, {given[offset]}, {filled})")
         else:
             used.add("chart_rows")
             lines.append(f"chart_rows({chart}, {found}, {given[place]}, {filled})")
     used |= set() if in_out else {"spare_rows"}
-    charts = {call.chart for call in calls.values()}
+    charts = {name for call in calls.values() for name in (call.train[3] if call.train else (call.chart,))}
     return _ChartReading(replace(function, inside=(*rows, *kept), outputs=outputs), lines, charts, used, in_out)
 
 
@@ -156,29 +180,43 @@ def _is_element(value: Expr) -> bool:
 
 
 def _calls_of_charts(function: FunctionIR, given: Collection[str]) -> dict[Expr, _ChartCall]:
-    """Return the rows of charts, and then their differences over a fixed place, that a function takes at its places.
+    """Return the rows of charts, then their differences over a fixed place, and then the loads on the cars of a train
+    that a function takes at its places.
 
     ``given`` are the names of the elements of its arrays.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     heads = {head.__name__: _ChartCall(row, chart) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
     assigned = {a.name for a in function.inside}
+    made = {Symbol(a.name, real=True): a.value for a in function.inside if a.name not in given}
     plain: dict[Expr, _ChartCall] = {}
     gaps: dict[Expr, _ChartCall] = {}
+    loads: dict[Expr, _ChartCall] = {}
     for call in {call for value in values for call in value.atoms(Function)}:
         name, arguments = call.func.__name__, [str(argument) for argument in call.args]
-        if name in heads and arguments[0] in given:
+        if isinstance(call, TrainLoad):
+            place, speed, *numbers, others = call.args
+            while any(symbol in made for number in numbers for symbol in number.free_symbols):
+                numbers = [number.xreplace(made) for number in numbers]
+            read = (*call.track, *(call.loads if others else ()))
+            loads[call] = _ChartCall(call.row, read[0], str(place), train=(call.rows, speed, tuple(numbers), read))
+        elif name in heads and arguments[0] in given:
             plain[call] = heads[name]._replace(place=arguments[0])
         elif (head := heads.get(name.removeprefix("divdiff1_"))) and name not in heads:
             start, place, offset = arguments
             if start not in assigned and place in given and offset in given:
                 gaps[call] = head._replace(place=place, start=start, offset=offset)
+    if loads:  # both rows are filled, whether or not both are read
+        call, found = next(iter(loads.items()))
+        both = [head for head in TRAIN_LOADS if head.rows == call.rows]
+        loads = {head(*call.args): found._replace(row=head.row) for head in both}
     order = list(heads)
-    return {
+    rows = {
         call: found[call]
         for found, prefix in ((plain, ""), (gaps, "divdiff1_"))
         for call in sorted(found, key=lambda call: order.index(call.func.__name__.removeprefix(prefix)))
     }
+    return rows | loads
 
 
 def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:

@@ -42,7 +42,7 @@ FUNCTIONS = {
 CHARTED = frozenset(
     {"chart_x", "chart_z", "chart_alpha", "chart_kappa"}
     | {head.__name__ for rows in SPACE_CHARTS.values() for head in rows}
-    | set(TRAIN_LOADS)
+    | {head.__name__ for head in TRAIN_LOADS}
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
 # In space each coordinate has a chart, whose height is the coordinate and whose rows of angle, curvature and x are its
@@ -135,11 +135,6 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         if in_space or _CHART_CALL.fullmatch(name.removeprefix("i")):
             texts.insert(0, chart)
             self.charts.add(chart)
-        if name in TRAIN_LOADS:
-            track, loads = TRAIN_LOADS[name]
-            read = (*track, *(loads if arguments[-1] else ()))
-            self.charts.update(read)
-            texts = [f"({', '.join(read)},)" if len(read) == 1 else f"({', '.join(read)})", *texts[:-1]]
         return f"{self.prefix}{name}({', '.join(texts)})"
 
     def _print_Function(self, expr: Expr) -> str:

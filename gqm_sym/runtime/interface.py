@@ -97,7 +97,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, or of a number that runtime code puts into generated
 # modules.
-INTERFACE = 18
+INTERFACE = 19
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

@@ -306,6 +306,7 @@ def test_a_sum_of_forces_is_the_potential_written_out(
 # Off its own orbit -------------------------------------------------------------------------------
 
 
+@pytest.mark.sample(2)
 @ECCENTRICITIES
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 def test_a_planet_never_changes_sides(e: str, contact: str, module_named: ModuleNamed) -> None:

@@ -252,7 +252,7 @@ def test_speeds_at_a_pole_are_infinite(built: Build) -> None:
 ACROSS = np.linspace(-3.0, 3.0, 30)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("slope", [0.0, 0.5, None])
 def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, built: Build) -> None:
     """On a straight line of points or of a rail it falls from a distance d in the time pi*sqrt(d**3/(8 k)), and does

@@ -151,7 +151,7 @@ def valley(u: float) -> tuple[Any, Any, Any]:
     )
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 8.0, 1, 2), (1.2, 6.7, -1, 1)])
 def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way: int, legs: int, built: Build) -> None:
     """In a frame that turns contact is lost on the way on which the Coriolis force lifts the body, although the other

@@ -205,7 +205,7 @@ def test_with_friction(built: Build) -> None:
     assert motion.gradient("t_end")["mu"] == pytest.approx((end(0.051) - end(0.049)) / 0.002, rel=1e-5)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("curve", "losses"), [(RAIL, ""), (RAIL, "drag"), (LEANING, "")])
 def test_along_a_rail(curve: Any, losses: str, built: Build) -> None:
     """Derivatives of the time of lift-off from a rail, by its shape and its roll too, are right to rounding, without

@@ -49,6 +49,7 @@ def loop(generated_folder: Path) -> ModuleType:
     return gqm.build(gqm.derive(curve, force), name="ball_in_a_loop", folder=generated_folder)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("angle", ["1/1000000", "6/5", "29/10"])
 def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: ModuleType, angle: str) -> None:
     """Both are the pendulum, with the same places at the same times but for the rounding of the tangent's angle."""

@@ -92,7 +92,7 @@ def derivative(of: Callable[[Any], Any], u: Any, order: int = 1) -> Any:
     return mp.matrix([mp.diff(lambda w, k=k: of(w)[k], u, order) for k in range(3)])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("written", "track", "roll"), TRACKS)
 def test_forces_by_the_definition(
     written: dict[str, str], track: Callable[[Any], Any], roll: Callable[[Any], Any], built: Build

@@ -162,6 +162,7 @@ NEAR_HILLTOP = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", SMALL)
 def test_small_swings_where_large_forces_cancel(name: str, families: dict[str, ModuleType]) -> None:
     """The turning points in doubles have an error of one rounding of the forces over their small sum."""
@@ -183,6 +184,7 @@ def test_forces_that_cancel_along_a_track_but_not_across_it(families: dict[str, 
     assert soak_bounds.faults(families["track"], soak_bounds.FAMILIES["track"], call) == ([], len(soak_bounds.SHARES))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("c2", [-25.952397021578278, -60.0, -8.0])
 def test_a_sharp_bottom_of_the_valley_is_resolved(c2: float, families: dict[str, ModuleType]) -> None:
     """Within a thousandth of the swing ds/dx changes; on a coarse scale this was taken for noise of 1e-10."""

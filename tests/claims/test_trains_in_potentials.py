@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError, ParameterError
@@ -197,12 +198,72 @@ def test_friction_about_a_centre(build_train: Build) -> None:
     assert places == pytest.approx(wanted, rel=1e-13)
 
 
-def test_what_is_refused() -> None:
-    """A train without a potential, and friction of its cars in a rotating frame, are refused."""
-    circle, train = gqm.families.circle(), gqm.Train(length=1)
-    for force, message in (
-        (gqm.QuadraticDrag(), "no potential acts on it"),
-        (gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction(), "friction on the cars"),
-    ):
-        with pytest.raises(DeclarationError, match=message):
-            gqm.derive(circle, train + force)
+def test_without_a_potential() -> None:
+    """A train without a potential is refused."""
+    with pytest.raises(DeclarationError, match="no potential acts on it"):
+        gqm.derive(gqm.families.circle(), gqm.Train(length=1) + gqm.QuadraticDrag())
+
+
+def test_friction_on_a_rotating_hoop(build_train: Build) -> None:
+    """The Coriolis force presses the cars against the side of the hoop, which DOP853 integrates in time."""
+    law = gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction()
+    module = build_train("rubbing_train_on_rotating_hoop", gqm.families.circle(), law, 3)
+    radius, length, rate, mu, cars = 2.0, 1.5, 1.75, 0.1, 3
+    shares = (np.arange(cars) + 0.5) / cars - 0.5
+    lesser, least = (float(sinc(length, size)) for size in (2 * radius, radius))
+
+    def loads(s: float, v: float) -> tuple[Any, Any]:
+        angles = (s + length * shares) / radius
+        inwards = v**2 / radius + 9.81 * np.cos(angles) + rate**2 * radius * np.sin(angles) ** 2
+        return inwards, 2 * rate * v * np.cos(angles)
+
+    def law_of_motion(_: float, y: Any) -> list[float]:
+        s, v = y
+        pull = -9.81 * lesser * np.sin(s / radius) + rate**2 * radius * least * np.sin(2 * s / radius) / 2
+        return [v, float(pull - mu * np.sign(v) * np.hypot(*loads(s, v)).mean())]
+
+    motion = module.solve(-1, 3, L=radius, length=length, Omega=rate, mu=mu, t_max=3)
+    stop = solve_ivp(law_of_motion, (0, 0.6), [-1, 3], "DOP853", rtol=3e-14, atol=1e-14).y[:, -1]
+    state = motion.state(0.6)
+    assert state.lam == pytest.approx(stop[0], rel=1e-13)
+    assert state.v == pytest.approx(stop[1], rel=1e-13)
+    force, aside = loads(*stop)
+    found = motion.cars(0.6)
+    assert found.normal_force == pytest.approx(force / cars, rel=1e-12)
+    # Cars behind a coupling are as fast as the train; their own friction differs from its mean.
+    rubbing = mu / cars * np.hypot(force, aside)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    places = (stop[0] + length * (shares[:, None] + nodes / (2 * cars))) / radius
+    pulls = (9.81 * np.sin(places) - rate**2 * radius * np.sin(2 * places) / 2) @ weights / (2 * cars)
+    lacking = np.cumsum(pulls + rubbing - np.mean(pulls + rubbing))
+    assert found.coupling_force == pytest.approx(lacking[:-1], rel=0, abs=1e-12)
+
+
+def test_friction_on_a_rotating_helix(build_train: Build) -> None:
+    """On a helix about the axis all cars press alike, so that time and place are integrals over the speed, which mpmath
+    has in 30 digits; upwards and downwards the Coriolis force has opposite signs.
+    """
+    radius, rise, rate, mu, start = 2, 0.75, 0.5, 0.08, 9
+    helix = gqm.families.helix(R="2", c="3/4", domain=(0, 40))
+    law = gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction()
+    module = build_train("rubbing_train_on_rotating_helix", helix, law, 2)
+    with mp.workdps(30):
+        size = mp.hypot(radius, mpf(rise))
+        across, slope, g = radius / size, mpf(rise) / size, mpf("9.81")
+
+        def acceleration(v: Any) -> Any:  # V > 0 is upwards and turns with the frame
+            inwards = radius * (v / size) ** 2 + 2 * mpf(rate) * across * v + radius * mpf(rate) ** 2
+            return -g * slope - mp.sign(v) * mpf(mu) * mp.hypot(inwards, g * across)
+
+        def spent(before: Any, after: Any) -> tuple[Any, Any]:
+            time = mp.quad(lambda v: 1 / acceleration(v), [before, after])
+            return time, mp.quad(lambda v: v / acceleration(v), [before, after])
+
+        rises, up = spent(mpf(start), mpf("0"))
+        passes, some = spent(mpf(start), mpf(5))
+        falls, down = spent(mpf("-1e-25"), mpf(-4))
+        motion = module.solve(10, start, length=1.5, mu=mu, Omega=rate, t_max=float(rises + falls + 1))
+        for time, place, v in ((passes, some, 5), (rises + falls, up + down, -4)):
+            state = motion.state(float(time))
+            assert state.v == pytest.approx(v, rel=2e-14)
+            assert state.lam == pytest.approx(float(10 + place), rel=2e-14)

@@ -118,7 +118,7 @@ def dissipation(
     if linear:
         slope = sp.expand(slope)
     constant_part = sp.expand(other - slope * W) if linear else other - slope * W
-    load = sp.Abs(LOAD) if mean_car_load is None else mean_car_load.xreplace({W: sp.S.Zero})
+    load = sp.Abs(LOAD) if mean_car_load is None else mean_car_load.xreplace({W: sp.S.Zero, v: sp.S.One})
     resisting, rubbing_slope = v * resistance.xreplace({KAPPA: TURN}), differentiate(rubbing, W)
     return Dissipation(
         pieces=tuple(pieces.items()),

@@ -15,7 +15,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.separate import separate
 from gqm_sym.derivation.forces.forces import Forces, Place
 from gqm_sym.errors import DeclarationError
-from gqm_sym.kernels.base import Kernel, W, X, Y, Z
+from gqm_sym.kernels.base import DIRECTION, Kernel, W, X, Y, Z
 from gqm_sym.sympy_charts import MEAN_HEIGHT, MEAN_PARTS, SpaceFunction, train_load, train_load_in_plane
 
 
@@ -112,22 +112,11 @@ def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
 
 
 def load_of_cars(kernel: Kernel, lam: sp.Symbol, *, in_space: bool) -> sp.Expr:
-    """Return the mean of |N|/m over the cars of a train, to which friction is proportional.
-
-    Raises
-    ------
-    DeclarationError
-        If there is friction in a rotating frame.
-    """
+    """Return the mean of |N|/m over the cars of a train, to which friction is proportional."""
     whole = potential_parts(kernel.potential)
-    if kernel.friction and kernel.spin:
-        raise DeclarationError(
-            "derive: coulomb: the friction on the cars of a train is not known in a rotating frame; leave it out, or "
-            "the rotating frame"
-        )
-    head = train_load if in_space else train_load_in_plane
-    others = sp.Integer(bool(whole.parts))
-    return head(lam, W, kernel.train_length, sp.Integer(kernel.cars), whole.gravity, others)
+    head, cars = train_load if in_space else train_load_in_plane, sp.Integer(kernel.cars)
+    turning, others = 2 * kernel.spin * DIRECTION, sp.Integer(bool(whole.parts))
+    return head(lam, W, kernel.train_length, cars, whole.gravity, turning, others)
 
 
 def loads_along(

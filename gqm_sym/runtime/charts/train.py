@@ -49,8 +49,8 @@ class TrackOfTrain:
     cars : int
         The number of equal cars of the train.
     numbers
-        ``f(op, p)``: the length of the train, the acceleration of gravity, the coefficient of friction, and the factors
-        of the other parts of the potential.
+        ``f(op, p)``: the length of the train, the acceleration of gravity, the coefficient of friction, the rate of the
+        rotating frame, and the factors of the other parts of the potential.
     length : int
         The index of the length among the run-time parameters.
     parts, optional
@@ -96,7 +96,7 @@ class TrackOfTrain:
             )
         size = int(track.block[0])
         height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
-        others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 3
+        others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 4
         charted, loads = (height, *others[:count]), others[count:]
         edges = _graded(_passages(track, charted[-1].edges, length, ENDS), track.period > 0.0)
         block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
@@ -197,7 +197,7 @@ class TrackOfTrain:
         s : array
             Arc lengths, of any shape.
         """
-        _, gravity, _, *factors = self.numbers(FLOATS, p)
+        _, gravity, _, _, *factors = self.numbers(FLOATS, p)
         places = s.ravel()
         height, slope = chart.points(places)[1:3]
         if not isinstance(chart, SpaceChart):  # there it is an angle

@@ -1,117 +1,117 @@
 """The contact force on the cars of a train, which determines the friction on each car. Generated modules call these
-functions.
+functions, for many places of the train at once.
 
 The first argument of each is the charts of the track. If other potentials than gravity act, they are followed by those
 of the static load per unit mass on a body across the track under these potentials: along x, y and z, or along the
-normal of a planar track. The angle of such a chart is the load, and its curvature the derivative of that.
+normal of a planar track. The angle of such a chart is the load.
 """
 
 from math import fabs, sqrt
 
+import numpy as np
+
 from gqm_sym.runtime.arithmetic.elementary import cos
-from gqm_sym.runtime.charts.evaluate import derivatives_at, find
+from gqm_sym.runtime.charts.evaluate import chart_rows
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 
-@Inlined
-def _place_of_car(s, length, cars, car):  # type: ignore[no-untyped-def]
-    """Return the arc length at the middle of a car of a train with its middle at s."""
-    return s + length * ((car + 0.5) / cars - 0.5)
-
-
 @Inner
-def train_load(charts, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the mean of |N|/m over the cars of a train with its middle at s, where V**2 = w."""
-    total = 0.0
-    for car in range(cars):
-        force, _, _ = _force_on_car(charts, _place_of_car(s, length, cars, car), w, g)
-        total += sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-    return total / cars
-
-
-@Inner
-def train_load_slope(charts, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load` with respect to w."""
-    return _change_of_load(charts, s, w, length, cars, g, 0)
-
-
-@Inner
-def train_load_rate(charts, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load` with respect to s."""
-    return _change_of_load(charts, s, w, length, cars, g, 1)
-
-
-@Inner
-def _change_of_load(charts, s, w, length, cars, g, which):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for car in range(cars):
-        force, bend, change = _force_on_car(charts, _place_of_car(s, length, cars, car), w, g)
-        more = bend if which == 0 else change
-        size = sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-        if size > 0.0:
-            total += (force[0] * more[0] + force[1] * more[1] + force[2] * more[2]) / size
-    return total / cars
+def speeds_at_rest(n):  # type: ignore[no-untyped-def]
+    """Return V**2 of a train that rests at n places."""
+    return np.zeros(n)
 
 
 @Inlined
-def _force_on_car(charts, s, w, g):  # type: ignore[no-untyped-def]
-    """Return N/m at a place, and its derivatives with respect to w and s without their components along the track."""
-    along_z = charts[2]
-    k, u, laps = find(along_z, s)
-    tx, kx, cx = derivatives_at(charts[0], k, u, laps)
-    ty, ky, cy = derivatives_at(charts[1], k, u, laps)
-    tz, kz, cz = derivatives_at(along_z, k, u, laps)
-    load_x, change_x = _other_load(charts, 3, s)
-    load_y, change_y = _other_load(charts, 4, s)
-    load_z, change_z = _other_load(charts, 5, s)
-    force = (
-        w * kx - g * tz * tx + load_x,
-        w * ky - g * tz * ty + load_y,
-        w * kz + g * (tx * tx + ty * ty) + load_z,
-    )
-    change = (
-        w * cx - g * (kz * tx + tz * kx) + change_x,
-        w * cy - g * (kz * ty + tz * ky) + change_y,
-        w * cz - 2.0 * g * tz * kz + change_z,
-    )
-    return force, (kx, ky, kz), change
+def _shift_of_car(length, cars, car):  # type: ignore[no-untyped-def]
+    """Return how far the middle of a car is ahead of that of the train."""
+    return length * ((car + 0.5) / cars - 0.5)
 
 
 @Inlined
-def _other_load(charts, which, s):  # type: ignore[no-untyped-def]
-    """Return a component of the load under other potentials and its derivative with respect to s; zeros if there are
-    none.
+def _divided_by_speed(turning, root):  # type: ignore[no-untyped-def]
+    """Return the derivative of ``turning*sqrt(w)`` with respect to w; 0 at rest, where it is infinite."""
+    return 0.5 * turning / root if root > 0.0 else 0.0
+
+
+@Inner
+def train_loads(charts, places, speeds, length, cars, g, turning, out):  # type: ignore[no-untyped-def]
+    """Fill the last two rows of ``out`` with the mean of |N|/m over the cars of a train on a track in space, and its
+    derivative with respect to V**2.
+
+    Parameters
+    ----------
+    charts : tuple of array
+        As above.
+    places, speeds : (n,) array
+        The place of the middle of the train, and V**2.
+    length, g : float
+        The length of the train and the acceleration of gravity.
+    cars : int
+        The number of cars.
+    turning : float
+        The Coriolis acceleration across the track for each unit of horizontal speed: 2*Omega, negative for a train that
+        moves backwards.
+    out : (m, n) array
+        At least two rows.
     """
-    load, change = 0.0, 0.0
-    if which < len(charts):
-        chart = charts[min(which, len(charts) - 1)]
-        load, change, _ = derivatives_at(chart, *find(chart, s))
-    return load, change
+    n, load, slope = places.size, out.shape[0] - 2, out.shape[0] - 1
+    at, rows, other = np.empty(n), np.empty((6, n)), np.zeros((3, n))
+    sums = np.zeros((2, n))
+    for car in range(cars):
+        shift = _shift_of_car(length, cars, car)
+        for i in range(n):
+            at[i] = places[i] + shift
+        chart_rows(charts[0], (2, 3), at, rows[:2])
+        chart_rows(charts[1], (2, 3), at, rows[:4])
+        chart_rows(charts[2], (2, 3), at, rows)
+        if len(charts) > 3:
+            for axis in range(3):
+                chart_rows(charts[min(3 + axis, len(charts) - 1)], (2,), at, other[: axis + 1])
+        for i in range(n):
+            w, tx, ty, tz = speeds[i], rows[0, i], rows[2, i], rows[4, i]
+            kx, ky, kz = rows[1, i], rows[3, i], rows[5, i]
+            root = sqrt(w) if turning != 0.0 else 0.0
+            aside, change = turning * root, _divided_by_speed(turning, root)
+            force_x = w * kx - g * tz * tx + other[0, i] - aside * ty
+            force_y = w * ky - g * tz * ty + other[1, i] + aside * tx
+            force_z = w * kz + g * (tx * tx + ty * ty) + other[2, i]
+            size = sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
+            bent = force_x * (kx - change * ty) + force_y * (ky + change * tx) + force_z * kz
+            sums[0, i] += size
+            sums[1, i] += bent / size if size > 0.0 else 0.0
+    for i in range(n):
+        out[load, i] = sums[0, i] / cars
+        out[slope, i] = sums[1, i] / cars
 
 
 @Inner
-def train_load_in_plane(charts, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the mean of |N|/m over the cars of a train on a planar track."""
-    total = 0.0
+def train_loads_in_plane(charts, places, speeds, length, cars, g, turning, out):  # type: ignore[no-untyped-def]
+    """Fill the last two rows of ``out`` with the same for a planar track, whose contact force has a component out of
+    the plane if the frame turns.
+    """
+    n, load, slope = places.size, out.shape[0] - 2, out.shape[0] - 1
+    at, rows, other = np.empty(n), np.empty((2, n)), np.zeros((1, n))
+    sums = np.zeros((2, n))
     for car in range(cars):
-        force, _ = _force_in_plane(charts, _place_of_car(s, length, cars, car), w, g)
-        total += fabs(force)
-    return total / cars
-
-
-@Inner
-def train_load_slope_in_plane(charts, s, w, length, cars, g):  # type: ignore[no-untyped-def]
-    """Return the derivative of `train_load_in_plane` with respect to w."""
-    total = 0.0
-    for car in range(cars):
-        force, kappa = _force_in_plane(charts, _place_of_car(s, length, cars, car), w, g)
-        total += kappa if force >= 0.0 else -kappa
-    return total / cars
-
-
-@Inlined
-def _force_in_plane(charts, s, w, g):  # type: ignore[no-untyped-def]
-    """Return N/m at a place of a planar track, and the curvature."""
-    angle, kappa, _ = derivatives_at(charts[0], *find(charts[0], s))
-    load, _ = _other_load(charts, 1, s)
-    return kappa * w + g * cos(angle) + load, kappa
+        shift = _shift_of_car(length, cars, car)
+        for i in range(n):
+            at[i] = places[i] + shift
+        chart_rows(charts[0], (2, 3), at, rows)
+        if len(charts) > 1:
+            chart_rows(charts[len(charts) - 1], (2,), at, other)
+        if turning == 0.0:
+            for i in range(n):
+                kappa = rows[1, i]
+                force = kappa * speeds[i] + g * cos(rows[0, i]) + other[0, i]
+                sums[0, i] += fabs(force)
+                sums[1, i] += kappa if force >= 0.0 else -kappa
+            continue
+        for i in range(n):
+            kappa, level = rows[1, i], cos(rows[0, i])
+            force, aside = kappa * speeds[i] + g * level + other[0, i], turning * level
+            size = sqrt(force * force + aside * aside * speeds[i])
+            sums[0, i] += size
+            sums[1, i] += (force * kappa + 0.5 * aside * aside) / size if size > 0.0 else 0.0
+    for i in range(n):
+        out[load, i] = sums[0, i] / cars
+        out[slope, i] = sums[1, i] / cars

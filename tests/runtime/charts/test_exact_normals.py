@@ -79,6 +79,7 @@ def test_pendulum(ring: ModuleType, launch: dict[str, Any], kind: str, digits: i
         assert ulps(motion.period, wanted) <= PERIOD_ULPS
 
 
+@pytest.mark.extended
 def test_what_does_not_swing(ring: ModuleType) -> None:
     """Rest on top and at the bottom, and the separatrix between swings and rounds, are decided for the given
     numbers.

@@ -19,7 +19,7 @@ def built(folder: Path, name: str, points: Any, force: Any, **more: Any) -> Any:
     return gqm.build(gqm.derive(gqm.Curve.sampled(points, kind="linear", **more), force), name=name, folder=folder)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "force",
     [gqm.Gravity(), gqm.Gravity() + gqm.CoulombFriction(mu="1/10"), gqm.Gravity() + gqm.QuadraticDrag(b="1/20")],

@@ -227,6 +227,7 @@ def repeated(x):
 """
 
 
+@pytest.mark.extended
 def test_a_function_for_compiled_callers_is_compiled_once_and_only_linked(tmp_path: Path) -> None:
     """A function is compiled once, whatever integers its callers pass; Python can call it, and callers are read from
     the cache without it.

@@ -217,6 +217,7 @@ def quotient(duration: Any, given: dict[str, Any], name: str) -> float:
     return float((ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step))
 
 
+@pytest.mark.extended
 def test_an_exponent_of_negative_numbers(oval: ModuleType) -> None:
     """A curve with an integer exponent has all derivatives but that by the exponent, which alone is refused."""
     motion = oval.solve(lam0="9/10")

@@ -118,6 +118,7 @@ def test_turning_points_and_times(hoop: ModuleType) -> None:
     assert motion.gradient("time_at", "v0", lam=0)["v0"] == pytest.approx(truth, rel=ROUNDING)
 
 
+@pytest.mark.extended
 def test_a_train_that_leaves_a_helix(tmp_path_factory: pytest.TempPathFactory) -> None:
     """The time to the end of the track has derivatives too, although it does not repeat."""
     helix = gqm.families.helix(R="2", c="3/4", domain=(0, 12))

@@ -164,6 +164,7 @@ def test_a_cycloid_is_isochronous() -> None:
         assert abs(motion.period_slope) <= 1e-25
 
 
+@pytest.mark.extended
 def test_an_epicycloid_absorber(generated_folder: Path) -> None:
     """In a frame with the angular velocity 3, swings along an epicycloid of the radii 1 and 1/4 have the order
     1/(2 sqrt(5)/4) at any amplitude.

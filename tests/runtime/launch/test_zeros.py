@@ -134,7 +134,7 @@ def first_turn(height: Callable[[Any], Any], start: float, v0: float, direction:
 NUMBERS = st.floats(-1.0, 1.0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["waves", "quintic"])
 @examples(80)
 @given(

@@ -98,7 +98,7 @@ def _means_of(train: TrackOfTrain, parameters: int) -> tuple[int, ...]:
     """Return the numbers of the means that the potential has: 0 for the height, then those of other parts. If there is
     only one, `BY_LENGTH` follows.
     """
-    _, gravity, _, *factors = train.numbers(FLOATS, (nan,) * parameters)
+    _, gravity, _, _, *factors = train.numbers(FLOATS, (nan,) * parameters)
     means = tuple(range(0 if gravity != 0 else 1, len(factors) + 1))
     if len(means) > MOST_MEANS:
         raise without_formulas()
@@ -147,7 +147,7 @@ class _Potential:
 
     def __call__(self, op: Any, *arguments: Any) -> tuple[Any, ...]:
         *coordinates, p = arguments
-        _, gravity, _, *others = self.train.numbers(op, p)
+        _, gravity, _, _, *others = self.train.numbers(op, p)
         inertia = 1 if self.inertia is None else self.inertia(op, p)
         factors = [(gravity, *others)[mean] for mean in self.means if mean != BY_LENGTH]
         if BY_LENGTH in self.means:

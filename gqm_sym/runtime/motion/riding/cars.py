@@ -88,7 +88,7 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     if not isinstance(track, TrackOfTrain):
         raise InputError("cars: this body is not a train; add Train(length=..., cars=...) to its forces")
     state, values = motion.state(t), problem.p.values.tolist()
-    length, _, friction, *_ = (float(number) for number in track.numbers(FLOATS, values))
+    length, _, friction, rate, *_ = (float(number) for number in track.numbers(FLOATS, values))
     chart = formulas.charted(problem.p)
     mass, count = f.mass, track.cars
     middle, v2 = np.atleast_1d(state.lam), np.atleast_1d(state.v2)
@@ -116,7 +116,11 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     coupling = mass / length * behind
     if friction:
         # The same holds for the friction on the cars behind, which is unknown for a train at rest.
-        rubbing = np.cumsum(friction * np.sign(np.atleast_1d(state.v)) * np.abs(found[4]), axis=0)
+        velocity, size = np.atleast_1d(state.v), np.abs(found[4])
+        if rate and formulas.path_in_space is None:  # the frame pushes the cars out of the plane too
+            aside = 2.0 * rate * velocity * np.cos(chart.points(found[0].ravel())[2]).reshape(size.shape)
+            size = vector_length(np.stack([size, mass / count * aside]))
+        rubbing = np.cumsum(friction * np.sign(velocity) * size, axis=0)
         coupling += rubbing[:-1] - share * rubbing[-1]
     rows: list[Array] = [*found, coupling]
     kind: type[Cars] | type[CarsOfRiders] = Cars

@@ -1,7 +1,7 @@
 """The record of the timed segments of a motion for compiled code: tables of places, states and panels."""
 
 from collections.abc import Sequence
-from math import nan
+from math import isnan, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +28,15 @@ SLOTS_PER_INTERVAL = 4
 NODES = np.polynomial.legendre.leggauss(WIDE)[0]
 TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(NODES, WIDE - 1)).T
 
+# The matrices from the coefficients of a series to those on its halves, and to its value in the middle.
+LEFT_HALF, RIGHT_HALF = (
+    np.polynomial.legendre.legvander(0.5 * (NODES + side), WIDE - 1).T @ TO_LEGENDRE for side in (-1.0, 1.0)
+)
+AT_MIDDLE = np.polynomial.legendre.legvander(np.zeros(1), WIDE - 1)[0]
+
 # The series of a speed is resolved if its last two coefficients are below this share of the largest one.
-MAX_SPEED_TAIL = 2e-15
+# Panels are halved so often until it is.
+MAX_SPEED_TAIL, MAX_HALVINGS = 2e-15, 6
 
 
 class TabulatedPiece(NamedTuple):
@@ -199,34 +206,68 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
 def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
     """Return the record of a piece with its own errors."""
     segment = timed.segment
-    edges, _, lengths, time_terms, length_terms = segment.panels[:5]
+    _, _, lengths, time_terms, length_terms = segment.panels[:5]
+    marks = np.array([segment.edges, *segment.edge_times, lengths, np.append(time_errors_of_panels(segment), 0.0)])
+    last, is_resolved = nan, True
     if segment.speed_series is None:
-        (last, speed_terms), of_ends = (1.0, _speed_terms(segment)), _errors_of_ends(segment)
-        tails, largest = np.abs(speed_terms[:, -2:]).max(axis=1), np.abs(speed_terms).max(axis=1)
-        # In extended precision speeds are slopes of the series of time and arc length, with as many digits as these.
-        is_resolved = segment.from_multiprecision or bool((tails <= MAX_SPEED_TAIL * largest).all())
-        wider = np.zeros_like(speed_terms)
-        wider[:, : length_terms.shape[1]] = length_terms
-        lengths, length_terms = segment.width_ratio * lengths, segment.width_ratio * wider
+        of_ends = _errors_of_ends(segment)
+        marks, *series, is_resolved = _with_speeds(segment, marks, time_terms, length_terms)
     else:
-        (last, speed_terms), is_resolved = segment.speed_series, True
+        last, speed_terms = segment.speed_series
+        series = [time_terms, length_terms, speed_terms]
         of_ends = (MAX_END_ROUNDINGS * ULP * abs(segment.width) if segment.kind == FROM_TURN else 0.0, 0.0)
     timing = Timing(
-        *(float(segment.kind), last, segment.turn_offset, segment.a, segment.low_parts[0], segment.b),
-        *(segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a, *timed.r_start),
-        *(*timed.t_start, timed.t_stop[0], *of_ends),
+        *(float(segment.kind), 1.0 if isnan(last) else last, segment.turn_offset, segment.a, segment.low_parts[0]),
+        *(segment.b, segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a),
+        *(*timed.r_start, *timed.t_start, timed.t_stop[0], *of_ends),
     )
-    marks = np.array([edges, *segment.edge_times, lengths, np.append(time_errors_of_panels(segment), 0.0)])
-    intervals, states, panels = tabulate_piece(marks, time_terms, length_terms, speed_terms, timing)
-    if segment.speed_series is None:
-        last = nan
-    return TabulatedPiece(intervals, states, panels, edges, timed.leg, timed.sense, timed.laps, last, is_resolved)
+    intervals, states, panels = tabulate_piece(marks, *series, timing)
+    return TabulatedPiece(
+        intervals, states, panels, marks[0], timed.leg, timed.sense, timed.laps, last, is_resolved=is_resolved
+    )
 
 
-def _speed_terms(segment: Segment) -> Array:
-    """Return the Legendre coefficients of the regular factor of the speed on each panel of a segment."""
-    halves = 0.5 * np.diff(segment.edges)
-    phi = ((segment.edges[:-1] + halves)[:, None] + halves[:, None] * NODES).ravel()
+def _with_speeds(
+    segment: Segment, marks: Array, time_terms: Array, length_terms: Array
+) -> tuple[Array, Array, Array, Array, bool]:
+    """Return the arguments of `tabulate_piece` for a segment without `Segment.speed_series`, and whether the series of
+    its speed are resolved; panels are halved until they are.
+    """
+    series = np.zeros((2, len(time_terms), WIDE))
+    series[0, :, : time_terms.shape[1]] = time_terms
+    series[1, :, : length_terms.shape[1]], marks[3] = segment.width_ratio * length_terms, segment.width_ratio * marks[3]
+    for _ in range(MAX_HALVINGS):
+        speed_terms = _speed_terms(segment, marks[0])
+        # In extended precision speeds are slopes of the series of time and arc length, with as many digits as these.
+        if segment.from_multiprecision:
+            return marks, *series, speed_terms, True
+        tails, largest = np.abs(speed_terms[:, -2:]).max(axis=1), np.abs(speed_terms).max(axis=1)
+        coarse = ~(tails <= MAX_SPEED_TAIL * largest)
+        if not coarse.any():
+            return marks, *series, speed_terms, True
+        marks, series = _halved(marks, series, coarse)
+    return marks, *series, _speed_terms(segment, marks[0]), False
+
+
+def _halved(marks: Array, series: Array, which: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the marks and the series of time and arc length after some panels have been halved."""
+    edges, times, lows, lengths, errors = marks
+    cut = np.flatnonzero(which)
+    passed = series[:, cut] @ AT_MIDDLE
+    time, rounding = two_sum.py_func(times[cut], passed[0])
+    columns = [0.5 * (edges[cut] + edges[cut + 1]), time, lows[cut] + rounding, lengths[cut] + passed[1], errors[cut]]
+    left = cut + np.arange(len(cut))
+    series = np.repeat(series, 1 + which, axis=1)
+    series[:, left + 1] = series[:, left] @ RIGHT_HALF
+    series[:, left + 1, 0] -= passed
+    series[:, left] = series[:, left] @ LEFT_HALF
+    return np.insert(marks, cut + 1, columns, axis=1), series
+
+
+def _speed_terms(segment: Segment, edges: Array) -> Array:
+    """Return the Legendre coefficients of the regular factor of the speed on panels with these edges."""
+    halves = 0.5 * np.diff(edges)
+    phi = ((edges[:-1] + halves)[:, None] + halves[:, None] * NODES).ravel()
     speeds, growth = segment.speeds(phi), {FROM_TURN: phi, TURN_TURN: np.sin(phi), TO_EQUILIBRIUM: np.exp(-phi)}
     factors = (speeds / growth.get(segment.kind, np.ones_like(phi))).reshape(-1, WIDE)
     # Without the differences the rounding of the matrix would be that of the largest speed.

@@ -148,6 +148,7 @@ def test_an_arc_between_lines(angle: float, module_for: Callable[..., ModuleType
         holds(on_line, swing + 2 * mp.sqrt(w) / g)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("launch", [{"lam0": 3.3}, {"lam0": 4.05}, {"lam0": 2.2, "v0": 2.5}])
 def test_a_spline(launch: dict[str, float], module_for: Callable[..., ModuleType]) -> None:
     """Extended precision, which knows the spline by other formulas and integrates it by other rules, agrees."""
@@ -207,7 +208,7 @@ def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -
     assert _chart_with.cache_info().misses == before + 2
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 @pytest.mark.parametrize("launch", [{"lam0": 2.0}, {"lam0": 5.0, "v0": 1.0}])
 def test_the_bound_along_a_track_of_scattered_points(

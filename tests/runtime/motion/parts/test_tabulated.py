@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 
+import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.parts import tabulated
@@ -16,6 +18,9 @@ ModuleOf = Callable[[str], ModuleType]
 
 # The tolerance relative to the largest value: both ways round a few times. Worst measured: 1.9e-15.
 AGREE = 3e-15
+
+# The tolerance of a speed, relative to it, of which the place has the largest share. Worst measured: 5.3e-16.
+SPEED = 1e-15
 
 # A row has the track, the launch and the last time, of motions with segments of all kinds.
 MOTIONS: dict[str, tuple[str, dict[str, Any], float]] = {
@@ -77,6 +82,17 @@ def test_speeds_without_a_resolved_series_are_those_of_the_segments(
     assert (motion.state(t).v == Motion.state(motion, t).v).all()
     assert motion.state(0.5).v == Motion.state(motion, 0.5).v
     assert motion.lam(0.5) == motion.lam(np.array([0.5]))[0]
+
+
+def test_panels_are_halved_until_speeds_are_resolved(generated_folder: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind a hump, where panels are too wide for the speed, it is that of the energy."""
+    hump = gqm.build(gqm.derive(gqm.Curve.graph("exp(-x**2)"), gqm.Gravity()), name="hump", folder=generated_folder)
+    monkeypatch.delattr(Positions, "_rows_of_states")
+    state = hump.solve(-2, 5).state(np.linspace(0.0, 3.0, 200))
+    with mp.workdps(30):
+        for place, v in zip(state.lam.tolist(), state.v.tolist(), strict=True):
+            truth = mp.sqrt(25 - 2 * mpf("9.81") * (mp.exp(-(mpf(place) ** 2)) - mp.exp(-4)))
+            assert abs(mpf(v) - truth) <= SPEED * truth
 
 
 def test_times_after_the_horizon_are_refused(module_of: ModuleOf) -> None:
