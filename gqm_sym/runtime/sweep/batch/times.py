@@ -78,6 +78,9 @@ MIN_EXACT_RATIO = 0.03
 # The distance of an end from zero, in widths of the orbit, from which on its rounding counts.
 FAR = 2.0
 
+# The share of an orbit over which the slope of the potential changes in proportion to the distance from an end.
+NEAR = 2.0**-20
+
 # The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
 # MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
 # exact to half an ulp, because its error is the square of that.
@@ -95,7 +98,7 @@ def contains_nan(row):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-untyped-def]
-    """Fill the roundings of one end of each orbit, and dU/dlam there if any of them is not 0.
+    """Fill the roundings of one end of each orbit, and dU/dlam there if any of them counts; return whether any does.
 
     They count as 0 where the end is nearer to zero than some widths of the orbit.
     """
@@ -113,6 +116,7 @@ def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-un
         offsets[:] = 0.0
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, ends, offsets, p, out)
         slopes[:] = out[2]
+    return any_far
 
 
 @Inner
@@ -123,19 +127,26 @@ def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no
     that turning point is far from zero, its rounding is taken into account.
     """
     from_below = NODE_SHARES[node] <= 0.5
-    fill_end_roundings(fns, n, from_below, rows, p, work)
+    any_far = fill_end_roundings(fns, n, from_below, rows, p, work)
     ends = rows[END_LOW if from_below else END_HIGH, :n]
     da, db, places, offsets = work[0, :n], work[1, :n], work[8, :n], work[9, :n]
     roundings, slopes = work[2, :n], work[5, :n]
     out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
+    at_end = any_far and (OFFSETS_FROM_A[node] if from_below else OFFSETS_TO_B[node]) == 0.0
+    share = NEAR if at_end else 0.0
     for j in range(n):
-        offsets[j] = da[j] if from_below else -db[j]
+        offsets[j] = da[j] + share * db[j] if from_below else -(db[j] + share * da[j])
         places[j] = ends[j] + offsets[j]
     call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, places, offsets, p, out)
+    if any_far:
+        for j in range(n):
+            roundings[j] = choose(roundings[j] == 0.0, 0.0, roundings[j] * (out[2, j] - slopes[j]) / offsets[j])
+    if at_end:
+        offsets[:] = 0.0
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, ends, offsets, p, out)
     for j in range(n):
         wide = two[0, j] != two[0, j]
-        moved = choose(roundings[j] == 0.0, 0.0, roundings[j] * (out[2, j] - slopes[j]) / offsets[j])
-        first = out[0, j] + moved
+        first = out[0, j] + roundings[j]
         q = -first / db[j] if from_below else first / da[j]
         two[0, j] = choose(wide, q, two[0, j])
         two[1, j] = choose(two[1, j] == two[1, j], two[1, j], out[1, j])
