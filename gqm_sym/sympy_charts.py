@@ -92,12 +92,12 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
 
     Attributes
     ----------
-    by_speed
-        The function for its derivative with respect to V**2; None if it is not known.
+    by_speed, by_place
+        The functions for its derivatives with respect to V**2 and the place; None if they are not known.
     rows
-        The name of the runtime's function for it and this derivative at many places.
+        The name of the runtime's function that fills it at many places, perhaps with others.
     row
-        Which of the two it is.
+        Which of the rows that this function fills it is.
     track, loads
         The charts that it reads: those of the track, and those of loads if other potentials act.
     """
@@ -105,16 +105,18 @@ class TrainLoad(sp.Function):  # type: ignore[misc]
     nargs = 7
     is_real = True
     by_speed: "ClassVar[type[TrainLoad] | None]" = None
+    by_place: "ClassVar[type[TrainLoad] | None]" = None
     rows: ClassVar[str]
     row: ClassVar[int]
     track: ClassVar[tuple[str, ...]]
     loads: ClassVar[tuple[str, ...]]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative with respect to V**2."""
-        if argindex != 2 or self.by_speed is None:
+        """Return the derivative with respect to the place, or V**2."""
+        head = (self.by_place, self.by_speed)[argindex - 1] if argindex <= 2 else None
+        if head is None:
             raise DerivationError(f"{self}: no derivative of it is known")
-        return self.by_speed(*self.args)
+        return head(*self.args)
 
 
 LOADS_IN_SPACE, LOAD_IN_PLANE = ("load_x", "load_y", "load_z"), ("load",)
@@ -127,10 +129,16 @@ class train_load_slope(TrainLoad):
     rows, row, track, loads = "train_loads", 1, ("along_x", "along_y", "along_z"), LOADS_IN_SPACE
 
 
+class train_load_rate(TrainLoad):
+    """The derivative of `train_load` with respect to the place."""
+
+    rows, row, track, loads = "train_load_rates", 0, train_load_slope.track, LOADS_IN_SPACE
+
+
 class train_load(TrainLoad):
     """The mean of |N|/m for a track in space."""
 
-    by_speed, rows, row = train_load_slope, "train_loads", 0
+    by_speed, by_place, rows, row = train_load_slope, train_load_rate, "train_loads", 0
     track, loads = train_load_slope.track, LOADS_IN_SPACE
 
 
@@ -147,7 +155,7 @@ class train_load_in_plane(TrainLoad):
     track, loads = train_load_slope_in_plane.track, LOAD_IN_PLANE
 
 
-TRAIN_LOADS = (train_load, train_load_slope, train_load_in_plane, train_load_slope_in_plane)
+TRAIN_LOADS = (train_load, train_load_slope, train_load_rate, train_load_in_plane, train_load_slope_in_plane)
 
 ROLL = "roll"
 AXES = ("x", "y", "z")

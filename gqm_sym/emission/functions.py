@@ -115,7 +115,7 @@ class _ChartCall(NamedTuple):
     start, offset
         The names of the fixed place and of the distance of the other from it; empty for the row itself.
     train
-        For the loads on cars: the name of the function that fills both rows, that of V**2 or 0, the numbers that it
+        For the loads on cars: the name of the function that fills their rows, that of V**2 or 0, the numbers that it
         needs, and the names of the charts that it reads.
     """
 
@@ -206,17 +206,20 @@ def _calls_of_charts(function: FunctionIR, given: Collection[str]) -> dict[Expr,
             start, place, offset = arguments
             if start not in assigned and place in given and offset in given:
                 gaps[call] = head._replace(place=place, start=start, offset=offset)
-    if loads:  # both rows are filled, whether or not both are read
-        call, found = next(iter(loads.items()))
-        both = [head for head in TRAIN_LOADS if head.rows == call.rows]
-        loads = {head(*call.args): found._replace(row=head.row) for head in both}
+    # A function of the runtime fills all of its rows, whether or not all of them are read.
+    filled = {
+        head(*call.args): found._replace(row=head.row)
+        for call, found in sorted(loads.items(), key=lambda item: item[0].func.rows)
+        for head in sorted(TRAIN_LOADS, key=lambda head: head.row)
+        if head.rows == call.rows
+    }
     order = list(heads)
     rows = {
         call: found[call]
         for found, prefix in ((plain, ""), (gaps, "divdiff1_"))
         for call in sorted(found, key=lambda call: order.index(call.func.__name__.removeprefix(prefix)))
     }
-    return rows | loads
+    return rows | filled
 
 
 def _divided(function: FunctionIR) -> list[tuple[list[int], list[Assignment]]]:

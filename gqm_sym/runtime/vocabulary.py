@@ -42,7 +42,7 @@ _NAMES_BY_HOME = {
     "charts.space.rail": "SpaceRail",
     "charts.tracing": "Traced",
     "charts.train": "TrackOfTrain",
-    "charts.train_load": "speeds_at_rest train_loads train_loads_in_plane",
+    "charts.train_load": "speeds_at_rest train_load_rates train_loads train_loads_in_plane",
     "interface": (
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
         "EFFECTIVE_POTENTIAL ExactChartLaw ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH "

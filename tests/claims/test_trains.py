@@ -342,6 +342,18 @@ def test_what_riders_feel_in_each_car(build: Build) -> None:
     assert not hasattr(build("train_on_circle", gqm.families.circle()).solve(1, length=1, L=1).cars(0), "n_vertical")
 
 
+def test_how_fast_loads_on_riders_change_under_friction(build: Build) -> None:
+    """The onset of each load is the derivative of the load, which under friction depends on the loads of all cars."""
+    track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))
+    forces = gqm.CoulombFriction() + gqm.RotatingFrame(Omega="1/10")
+    motion = build("riders_with_friction", track, forces).solve(40, 9, length=12, mu=0.1, t_max=3)
+    h, time = 2e-3, 2.0
+    states = motion.state(time + h * np.arange(-3, 4))
+    for load in ("vertical", "lateral", "longitudinal"):
+        rate = getattr(states, f"n_{load}") @ np.array([-1, 9, -45, 0, 45, -9, 1]) / (60 * h)
+        assert getattr(states, f"onset_{load}")[3] == pytest.approx(rate, rel=1e-9, abs=1e-11), load
+
+
 @pytest.mark.extended
 def test_friction_on_a_helix(build: Build) -> None:
     """All cars press alike on a helix, so that the train slides as one body, to the same limit."""

@@ -3,7 +3,7 @@ functions, for many places of the train at once.
 
 The first argument of each is the charts of the track. If other potentials than gravity act, they are followed by those
 of the static load per unit mass on a body across the track under these potentials: along x, y and z, or along the
-normal of a planar track. The angle of such a chart is the load.
+normal of a planar track. The angle of such a chart is the load, and its curvature the derivative of that.
 """
 
 from math import fabs, sqrt
@@ -85,9 +85,43 @@ def train_loads(charts, places, speeds, length, cars, g, turning, out):  # type:
 
 
 @Inner
+def train_load_rates(charts, places, speeds, length, cars, g, turning, out):  # type: ignore[no-untyped-def]
+    """Fill the last row of ``out`` with the derivative of the mean of |N|/m with respect to the place, for a track in
+    space; see `train_loads`.
+    """
+    n, rate = places.size, out.shape[0] - 1
+    at, rows, other = np.empty(n), np.empty((9, n)), np.zeros((6, n))
+    total = np.zeros(n)
+    for car in range(cars):
+        shift = _shift_of_car(length, cars, car)
+        for i in range(n):
+            at[i] = places[i] + shift
+        for axis in range(3):  # in space x of a chart is the derivative of its curvature
+            chart_rows(charts[axis], (0, 2, 3), at, rows[: 3 * axis + 3])
+            if len(charts) > 3:
+                chart_rows(charts[min(3 + axis, len(charts) - 1)], (2, 3), at, other[: 2 * axis + 2])
+        for i in range(n):
+            w, tx, ty, tz = speeds[i], rows[1, i], rows[4, i], rows[7, i]
+            cx, cy, cz, kx, ky, kz = rows[0, i], rows[3, i], rows[6, i], rows[2, i], rows[5, i], rows[8, i]
+            aside = turning * sqrt(w) if turning != 0.0 else 0.0
+            force_x = w * kx - g * tz * tx + other[0, i] - aside * ty
+            force_y = w * ky - g * tz * ty + other[2, i] + aside * tx
+            force_z = w * kz + g * (tx * tx + ty * ty) + other[4, i]
+            # The derivatives of these, without their components along the track.
+            change_x = w * cx - g * (kz * tx + tz * kx) + other[1, i] - aside * ky
+            change_y = w * cy - g * (kz * ty + tz * ky) + other[3, i] + aside * kx
+            change_z = w * cz - 2.0 * g * tz * kz + other[5, i]
+            size = sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
+            turned = force_x * change_x + force_y * change_y + force_z * change_z
+            total[i] += turned / size if size > 0.0 else 0.0
+    for i in range(n):
+        out[rate, i] = total[i] / cars
+
+
+@Inner
 def train_loads_in_plane(charts, places, speeds, length, cars, g, turning, out):  # type: ignore[no-untyped-def]
-    """Fill the last two rows of ``out`` with the same for a planar track, whose contact force has a component out of
-    the plane if the frame turns.
+    """Fill the last two rows of ``out`` with the same as `train_loads` for a planar track, whose contact force has a
+    component out of the plane if the frame turns.
     """
     n, load, slope = places.size, out.shape[0] - 2, out.shape[0] - 1
     at, rows, other = np.empty(n), np.empty((2, n)), np.zeros((1, n))
