@@ -22,9 +22,24 @@ def speeds_at_rest(n):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def _shift_of_car(length, cars, car):  # type: ignore[no-untyped-def]
-    """Return how far the middle of a car is ahead of that of the train."""
-    return length * ((car + 0.5) / cars - 0.5)
+def _fill_places_of_car(places, length, cars, car, at):  # type: ignore[no-untyped-def]
+    """Fill the places of the middle of a car, from those of the middle of the train."""
+    shift = length * ((car + 0.5) / cars - 0.5)
+    for i in range(places.size):
+        at[i] = places[i] + shift
+
+
+@Inlined
+def _force(w, g, aside, tangent, bend, other):  # type: ignore[no-untyped-def]
+    """Return N/m, given V**2, the tangent and its derivative by arc length, and the load under other potentials.
+
+    ``aside`` is the Coriolis acceleration across the track for each unit of horizontal component of the tangent.
+    """
+    (tx, ty, tz), (kx, ky, kz) = tangent, bend
+    force_x = w * kx - g * tz * tx + other[0] - aside * ty
+    force_y = w * ky - g * tz * ty + other[1] + aside * tx
+    force_z = w * kz + g * (tx * tx + ty * ty) + other[2]
+    return force_x, force_y, force_z, sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
 
 
 @Inlined
@@ -58,9 +73,7 @@ def train_loads(charts, places, speeds, length, cars, g, turning, out):  # type:
     at, rows, other = np.empty(n), np.empty((6, n)), np.zeros((3, n))
     sums = np.zeros((2, n))
     for car in range(cars):
-        shift = _shift_of_car(length, cars, car)
-        for i in range(n):
-            at[i] = places[i] + shift
+        _fill_places_of_car(places, length, cars, car, at)
         chart_rows(charts[0], (2, 3), at, rows[:2])
         chart_rows(charts[1], (2, 3), at, rows[:4])
         chart_rows(charts[2], (2, 3), at, rows)
@@ -72,10 +85,8 @@ def train_loads(charts, places, speeds, length, cars, g, turning, out):  # type:
             kx, ky, kz = rows[1, i], rows[3, i], rows[5, i]
             root = sqrt(w) if turning != 0.0 else 0.0
             aside, change = turning * root, _divided_by_speed(turning, root)
-            force_x = w * kx - g * tz * tx + other[0, i] - aside * ty
-            force_y = w * ky - g * tz * ty + other[1, i] + aside * tx
-            force_z = w * kz + g * (tx * tx + ty * ty) + other[2, i]
-            size = sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
+            load_of_others = other[0, i], other[1, i], other[2, i]
+            force_x, force_y, force_z, size = _force(w, g, aside, (tx, ty, tz), (kx, ky, kz), load_of_others)
             bent = force_x * (kx - change * ty) + force_y * (ky + change * tx) + force_z * kz
             sums[0, i] += size
             sums[1, i] += bent / size if size > 0.0 else 0.0
@@ -93,9 +104,7 @@ def train_load_rates(charts, places, speeds, length, cars, g, turning, out):  # 
     at, rows, other = np.empty(n), np.empty((9, n)), np.zeros((6, n))
     total = np.zeros(n)
     for car in range(cars):
-        shift = _shift_of_car(length, cars, car)
-        for i in range(n):
-            at[i] = places[i] + shift
+        _fill_places_of_car(places, length, cars, car, at)
         for axis in range(3):  # in space x of a chart is the derivative of its curvature
             chart_rows(charts[axis], (0, 2, 3), at, rows[: 3 * axis + 3])
             if len(charts) > 3:
@@ -104,14 +113,12 @@ def train_load_rates(charts, places, speeds, length, cars, g, turning, out):  # 
             w, tx, ty, tz = speeds[i], rows[1, i], rows[4, i], rows[7, i]
             cx, cy, cz, kx, ky, kz = rows[0, i], rows[3, i], rows[6, i], rows[2, i], rows[5, i], rows[8, i]
             aside = turning * sqrt(w) if turning != 0.0 else 0.0
-            force_x = w * kx - g * tz * tx + other[0, i] - aside * ty
-            force_y = w * ky - g * tz * ty + other[2, i] + aside * tx
-            force_z = w * kz + g * (tx * tx + ty * ty) + other[4, i]
+            load_of_others = other[0, i], other[2, i], other[4, i]
+            force_x, force_y, force_z, size = _force(w, g, aside, (tx, ty, tz), (kx, ky, kz), load_of_others)
             # The derivatives of these, without their components along the track.
             change_x = w * cx - g * (kz * tx + tz * kx) + other[1, i] - aside * ky
             change_y = w * cy - g * (kz * ty + tz * ky) + other[3, i] + aside * kx
             change_z = w * cz - 2.0 * g * tz * kz + other[5, i]
-            size = sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
             turned = force_x * change_x + force_y * change_y + force_z * change_z
             total[i] += turned / size if size > 0.0 else 0.0
     for i in range(n):
@@ -127,9 +134,7 @@ def train_loads_in_plane(charts, places, speeds, length, cars, g, turning, out):
     at, rows, other = np.empty(n), np.empty((2, n)), np.zeros((1, n))
     sums = np.zeros((2, n))
     for car in range(cars):
-        shift = _shift_of_car(length, cars, car)
-        for i in range(n):
-            at[i] = places[i] + shift
+        _fill_places_of_car(places, length, cars, car, at)
         chart_rows(charts[0], (2, 3), at, rows)
         if len(charts) > 1:
             chart_rows(charts[len(charts) - 1], (2,), at, other)

@@ -26,7 +26,7 @@ from gqm_sym.runtime.gradients.orbit import (
     without_formulas,
 )
 from gqm_sym.runtime.gradients.panels import Panels, resolved, rule_with_tails
-from gqm_sym.runtime.gradients.passages.from_turns import fill_other_side, from_turn_program, values_from_turns
+from gqm_sym.runtime.gradients.passages.from_turns import from_turn_program, on_both_sides, values_from_turns
 from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE
 from gqm_sym.runtime.gradients.path import PathRows, path_rows
 from gqm_sym.runtime.gradients.programs import (
@@ -145,12 +145,6 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         """Return the integrand along the orbit."""
         return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
 
-    def _on_both_sides(self, inputs: Array) -> Array:
-        """Return the inputs of `_from_turns` for both halves of a libration."""
-        both = np.stack([inputs, inputs])
-        fill_other_side.py_func(both, self.source.inputs)
-        return both
-
     @property
     def _from_turns(self) -> Program | None:
         """The integrand along half of a libration, from each turning point; None if there is none."""
@@ -211,7 +205,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         kind, is_lost = CIRCULATION if self.direction else LIBRATION, n == LOST_DIGITS
         ways = [] if is_lost else [(program, inputs[np.newaxis])]
         if program is self._program and self._from_turns is not None:
-            ways.insert(0, (self._from_turns, self._on_both_sides(inputs)))
+            ways.insert(0, (self._from_turns, on_both_sides(inputs, self.source.inputs)))
         for program, sides in ways:
             if fill_panel_means(program.operands, program.work, sides, kind, rule_with_tails(), found) > 0:
                 mean, _, error, _ = np.abs(found[1 : 1 + self.source.variables]).T

@@ -111,6 +111,15 @@ def fill_other_side(inputs, first):  # type: ignore[no-untyped-def]
                 inputs[1, part, to] = inputs[0, part, source]
 
 
+def on_both_sides(inputs: Array, first: int) -> Array:
+    """Return the inputs of the program for both halves of a libration, from those for the half that begins at the lower
+    turning point; ``first`` is the number of inputs before the turning points.
+    """
+    both = np.stack([inputs, inputs])
+    fill_other_side.py_func(both, first)
+    return both
+
+
 def values_from_turns(program: Program, inputs: Array, first: int, shares: Array) -> Array:
     """Return the results of the program at places of both halves of the orbit.
 
@@ -130,8 +139,7 @@ def values_from_turns(program: Program, inputs: Array, first: int, shares: Array
     array
         Of shape (k, 3, n): two doubles and a bound on the error for each of the k results.
     """
-    found, both = np.empty((program.outputs.size, 3, shares.shape[1])), np.stack([inputs, inputs])
-    fill_other_side.py_func(both, first)
+    found, both = np.empty((program.outputs.size, 3, shares.shape[1])), on_both_sides(inputs, first)
     rest = (1.0 - shares[0]) - shares[1]
     from_upper = np.array([rest, ((1.0 - shares[0]) - rest) - shares[1]])
     halves = shares[0] < 0.5, shares[0] >= 0.5
