@@ -99,11 +99,18 @@ def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Arr
     """Return the contact force in N at phase angles of a timed segment; in a rotating frame it depends on the direction
     of motion.
     """
-    if not problem.formulas.directed:
-        return contact_force(timed.segment, phi)
-    places, v2 = timed.segment.places(phi), timed.segment.speeds(phi) ** 2
-    forces = path_in_space(problem.formulas, problem.functions.p, places, v2, np.full(phi.size, timed.direction))
-    return length(forces[1:])
+    return contact_force_at(problem, timed, phi, timed.segment.places(phi))
+
+
+def contact_force_at(problem: "Problem", timed: TimedSegment, phi: Array, places: Array) -> Array:
+    """Return what `contact_force_on` does, for places that may lie a little beside those of the phase angles."""
+    v2, f = timed.segment.speeds(phi) ** 2, problem.functions
+    force: Array
+    if problem.formulas.directed:
+        force = length(path_in_space(problem.formulas, f.p, places, v2, np.full(phi.size, timed.direction))[1:])
+    else:
+        force = path_and_force_at(f.addresses, f.p, places, v2)[4]
+    return force
 
 
 def sided_force(formulas: "Formulas", f: BoundFunctions, places: Array, v2: Array, direction: int) -> Array:

@@ -13,7 +13,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
-from gqm_sym.runtime.motion.events import contact_force_on
+from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 if TYPE_CHECKING:
@@ -36,6 +36,9 @@ END_SHARE = 1e-9
 
 # The share of a segment before a joint at which contact is lost in which loads are not searched.
 BEFORE_JOINT = 1e-13
+
+# The distance from an edge of a panel at which a quantity that may jump there is sampled, as a share of the panel.
+BESIDE_EDGE = 1e-9
 
 # The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
 # of the phase angle.
@@ -120,10 +123,14 @@ class Quantity(NamedTuple):
         ``at(timed, phi)`` gives the values at phase angles of a timed segment.
     of_state : callable
         ``of_state(state)`` gives the value in a state.
+    beside : callable, optional
+        If the quantity jumps at joints of the curve, ``beside(timed, phi, places)`` gives the values at places beside
+        those of the phase angles.
     """
 
     at: Callable[[TimedSegment, Array], Array]
     of_state: Callable[[Any], float]
+    beside: Callable[[TimedSegment, Array, Array], Array] | None = None
 
 
 # |ds/dt| in m/s.
@@ -132,7 +139,8 @@ SPEED = Quantity(lambda timed, phi: timed.segment.speeds(phi), lambda state: abs
 
 def force_of(problem: "Problem") -> Quantity:
     """Return the contact force in N, as a quantity along motions."""
-    return Quantity(partial(contact_force_on, problem), lambda state: float(state.normal_force))
+    at, beside = partial(contact_force_on, problem), partial(contact_force_at, problem)
+    return Quantity(at, lambda state: float(state.normal_force), beside)
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
@@ -204,10 +212,7 @@ def _on_segment(
     if timed.end == "liftoff" and quantity is not SPEED and _ends_at_joint(timed):
         stop -= BEFORE_JOINT * (stop - start)  # the body leaves before the load beyond the joint acts
     low, high = min(start, stop), max(start, stop)
-    edges = segment.edges
-    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
-    inside = (edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel()
-    phi = np.unique([low, *inside[(inside > low) & (inside < high)], high])
+    phi = _samples(segment, low, high)
 
     def signed(angles: Array) -> Array:
         values = sign * quantity.at(timed, angles)
@@ -218,14 +223,15 @@ def _on_segment(
     ends_at_cusp = timed.end == "cusp" and timed.t_stop[0] <= end and quantity is not SPEED
     if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * _size(np.delete(values, at_cusp)):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
-    padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
-    found, size = [], _size(values)
-    for k in sorted(peaks.tolist(), key=lambda k: -float(values[k]))[:MAX_PEAKS]:
+    size = _size(values)
+    joints, found = _limits_at_joints(timed, trajectory, quantity, low, high)
+    for k in _peaks(values, size)[:MAX_PEAKS]:
         if values[k] == np.inf:
             found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
             continue
         angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
+        if np.abs(joints - angle).min(initial=np.inf) < END_SHARE * (high - low):
+            continue  # the limits at the joint count
         value = float(signed(np.array([angle]))[0])
         # Since a peak at an end of the segment may be flat, it may be found next to the end within rounding. At a joint
         # the quantity may jump, and what is found next to it is then the limit from the segment's side.
@@ -237,6 +243,53 @@ def _on_segment(
         value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))
     return size, sorted(found, key=lambda peak: peak.t)
+
+
+def _samples(segment: Any, low: float, high: float) -> Array:
+    """Return the phase angles between two of a segment at which a quantity is sampled, in order.
+
+    If the curve has joints, at which the quantity may jump, places on both sides of each edge are among them.
+    """
+    edges = segment.edges
+    widths = np.diff(edges)
+    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
+    inside = (edges[:-1, None] + widths[:, None] * steps).ravel()
+    if segment.functions.joints.size:
+        inside = np.concatenate([inside, edges[:-1] + BESIDE_EDGE * widths, edges[1:] - BESIDE_EDGE * widths])
+    return np.unique([low, *inside[(inside > low) & (inside < high)], high])
+
+
+def _limits_at_joints(
+    timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, low: float, high: float
+) -> tuple[Array, list[Extreme]]:
+    """Return the phase angles of the joints between two phase angles of a timed segment, and the limits of a quantity
+    from both sides of each joint, if it may jump there.
+    """
+    segment = timed.segment
+    f, edges = segment.functions, segment.edges
+    if quantity.beside is None or not f.joints.size:
+        return np.empty(0), []
+    joints = f.between(f.joints, *segment.places(np.array([low, high])).tolist())
+    distances, clear = np.abs(segment.places(edges)[:, None] - joints), CORNER_ROUNDINGS * np.spacing(np.abs(joints))
+    phi, is_edge = edges[distances.argmin(axis=0)], distances.min(axis=0, initial=np.inf) <= clear
+    phi, joints, clear = phi[is_edge], joints[is_edge], clear[is_edge]  # the quantity does not jump inside a panel
+    limits = [quantity.beside(timed, phi, joints + side * clear).tolist() for side in (-1.0, 1.0)]
+    places = (joints + timed.laps * trajectory.lap).tolist()
+    times = [time_of(timed, trajectory, angle) for angle in phi.tolist()]
+    return phi, [Extreme(*one) for values in limits for one in zip(values, times, places, strict=True)]
+
+
+def _peaks(values: Array, size: float) -> list[int]:
+    """Return the indices of samples that no neighbour exceeds, the largest first; of equal ones side by side, only the
+    first and the last count.
+    """
+    padded = np.concatenate([[-np.inf], values, [-np.inf]])
+    before, after = padded[:-2], padded[2:]
+    same = EQUAL_ROUNDINGS * ULP * size
+    with np.errstate(invalid="ignore"):  # infinite values
+        is_level = (np.abs(values - before) <= same) & (np.abs(values - after) <= same)
+    peaks = np.flatnonzero((values >= before) & (values >= after) & ~is_level).tolist()
+    return sorted(peaks, key=lambda k: -float(values[k]))
 
 
 def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:

@@ -216,6 +216,41 @@ def test_a_load_that_jumps_where_a_joint_is_passed_backwards(mu: float, tmp_path
     assert module.sweep("normal_force_max", [launch], t_max=20.0).values[0] == pytest.approx(load, rel=4e-15)
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.2])
+def test_a_load_that_falls_up_to_a_joint(mu: float, tmp_path: Path) -> None:
+    """On a clothoid N falls up to the joint with an arc, where it jumps: its limit there is the least contact force.
+
+    It was only seen as far as the last sample before the joint, and not at all if a level part had almost that value.
+    """
+    line, length, first, last, heading, v0, g = 0.75, 0.75, 0.25, -0.0625, -1.25, 1.0, 9.81
+    pieces = [
+        gqm.line(length=line),
+        gqm.clothoid(length=length, kappa_start=first, kappa_end=last),
+        gqm.arc(radius=2, angle="4/5"),
+    ]
+    force = gqm.Gravity() + gqm.CoulombFriction(mu=mu) if mu else gqm.Gravity()
+    curve = gqm.Curve.piecewise(pieces, heading=str(heading))
+    module = gqm.build(gqm.derive(curve, force), name=f"falling_load_{bool(mu)}", folder=tmp_path)
+
+    def bend(r: float) -> tuple[float, float]:
+        """Return the heading and the curvature at the length r on the clothoid."""
+        rate = (last - first) / length
+        return heading + first * r + 0.5 * rate * r * r, first + rate * r
+
+    def slope(r: float, w: np.ndarray) -> list[float]:
+        angle, kappa = bend(r)
+        return [-2.0 * g * sin(angle) - 2.0 * mu * (g * cos(angle) + kappa * w[0])]
+
+    v2 = v0**2 + 2.0 * line * g * (-sin(heading) - mu * cos(heading))
+    run = solve_ivp(slope, (0.0, length), [v2], "DOP853", rtol=3e-14, atol=1e-14)
+    angle, kappa = bend(length)
+    least = g * cos(angle) + kappa * run.y[0, -1]
+    found = module.solve(0.0, v0, 1).normal_force_min
+    assert found.value == pytest.approx(least, rel=4e-14)
+    assert found.lam == line + length
+    assert module.sweep("normal_force_min", [0.0], v0, 1).values[0] == pytest.approx(found.value, rel=1e-14)
+
+
 @pytest.mark.parametrize("width", [0.0, 2.0**-53, 2.0**-50, 2.0**-46, 1e-3])
 def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
     """On a panel of the width of a few roundings, polynomials mean nothing beside it."""
