@@ -14,6 +14,7 @@ from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.charts.train_orbits import TrainOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
@@ -77,8 +78,9 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f, problem = self._segment, self.problem.functions, self.problem
+        kind: type[ChartOrbitDerivatives] = ChartOrbitDerivatives
         if isinstance(problem.formulas.chart, TrackOfTrain):
-            problem = on_curve_of_means(problem)
+            problem, kind = on_curve_of_means(problem), TrainOrbitDerivatives
         if problem.formulas.rolling_radius or problem.true_pieces is None or problem.tape is None:
             raise without_formulas()
         passage = timing.passage_of(problem, self.kind, self.direction, self._offsets)
@@ -91,7 +93,7 @@ class PeriodicMotion(PeriodicTimes):
         if not direction:
             last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
-        return ChartOrbitDerivatives(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
+        return kind(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
     @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:

@@ -106,8 +106,7 @@ def shaping_of(formulas: Formulas) -> tuple[int, ...]:
     known.
     """
     assert formulas.chart is not None
-    # The potential of a train may take over the dependence on its length (`means`).
-    shaped_by = getattr(formulas.chart, "moved_by", formulas.chart.shaped_by)
+    shaped_by = formulas.chart.shaped_by
     return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
 
 
