@@ -174,7 +174,6 @@ TESTED_THROUGH = {
     "legs/panels/point.py": "claims/test_dissipative.py",
     "legs/panels/resolution.py": "runtime/legs/panels/test_polynomials.py",
     "legs/panels/widest.py": "claims/test_dissipative.py",
-    "legs/runs/changes.py": "claims/test_dissipative.py",
     "legs/runs/ends.py": "runtime/legs/test_dissipative.py",
     "legs/runs/peaks.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/runs/rest_on_corners.py": "runtime/sweep/test_planes_with_friction.py",

@@ -2,6 +2,7 @@
 
 from math import acos, cos, cosh, sin, sinh, sqrt
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -145,17 +146,30 @@ def test_questions_without_an_answer(module: object, arguments: dict, kind: type
         gqm.least_speed(module, 0, **arguments)
 
 
-@pytest.mark.extended
-def test_corkscrew(tmp_path: Path) -> None:
-    """On a helix about a level axis the riders lean towards the axis, and v0**2 from the lowest point is
-    4 g R + g (R**2 + c**2)/R; a slightly faster body passes the top, and a slower one lifts off.
-    """
+@pytest.fixture(scope="module")
+def coil(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """Return the module of a helix about a level axis, on which riders lean towards the axis."""
     roll = "-u+atan(2*sin(u)*cos(u)/(5*cos(u)**2+3*sin(u)**2))"  # for R = 4 and c = 3
     track = gqm.Curve.space(x="3*u", y="4*sin(u)", z="-4*cos(u)", parameter="u", roll=roll)
-    coil = gqm.build(gqm.derive(track, gqm.Gravity()), name="coil", folder=tmp_path)
-    speed = gqm.least_speed(coil, 0, between=(-1, 4))
-    assert near(speed, sqrt(9.81 * (16 + 25 / 4)))
+    return gqm.build(gqm.derive(track, gqm.Gravity()), name="coil", folder=tmp_path_factory.mktemp("coil"))
+
+
+def test_corkscrew(coil: ModuleType) -> None:
+    """On a helix about a level axis v0**2 from the lowest point is 4 g R + g (R**2 + c**2)/R, by the load on riders; a
+    bead needs 4 g R.
+    """
+    assert near(gqm.least_speed(coil, 0, between=(-1, 4)), sqrt(9.81 * (16 + 25 / 4)))
     assert near(gqm.least_speed(coil, 0, between=(-1, 4), contact="bilateral"), sqrt(9.81 * 16))
+    with pytest.raises(SolutionError, match="none of the load on a rider, which decides the least speed"):
+        gqm.least_speed_gradient(coil, 0, between=(-1, 4))
+    slopes = gqm.least_speed_gradient(coil, 0, between=(-1, 4), contact="bilateral")
+    assert near(slopes["g"], sqrt(16 / 9.81) / 2)
+
+
+@pytest.mark.extended
+def test_motions_in_a_corkscrew(coil: ModuleType, tmp_path: Path) -> None:
+    """A slightly faster body passes the top, and a slower one lifts off; a rail of pieces has the same least speed."""
+    speed = sqrt(9.81 * (16 + 25 / 4))
     turning = gqm.transition(length=25, pitch="4/25", roll="3/25")
     rail = gqm.Curve.piecewise([turning], start=(0, 0, -4), heading=("atan(4/3)", 0), roll="pieces")
     coiled = gqm.build(gqm.derive(rail, gqm.Gravity()), name="coiled", folder=tmp_path)
@@ -163,7 +177,3 @@ def test_corkscrew(tmp_path: Path) -> None:
     for factor, end in ((1.001, "transit"), (0.999, "liftoff")):
         motion = coil.solve(0, factor * speed, contact="above")
         assert (motion.kind if end == "transit" else motion.events[-1].kind) == end
-    with pytest.raises(SolutionError, match="none of the load on a rider, which decides the least speed"):
-        gqm.least_speed_gradient(coil, 0, between=(-1, 4))
-    slopes = gqm.least_speed_gradient(coil, 0, between=(-1, 4), contact="bilateral")
-    assert near(slopes["g"], sqrt(16 / 9.81) / 2)

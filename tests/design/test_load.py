@@ -38,7 +38,7 @@ def test_constant_load_with_parameters(tmp_path: Path) -> None:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("law", ["1 + 2*sin(pi*s/20)**2", "a*t*exp(-t) + 1/2"])
+@pytest.mark.parametrize("law", ["a*t*exp(-t) + 1/2", "1 + 2*sin(pi*s/20)**2"])
 def test_prescribed_load(law: str, tmp_path: Path) -> None:
     """The contact force is the prescribed function of arc length or of time."""
     by_time = "t" in law.replace("pi", "")
@@ -65,17 +65,22 @@ BAD = {
     "too small a load": (lambda: gqm.design.constant_load(1, 12), "n: must be greater than 1"),
     "backwards": (lambda: gqm.design.constant_load(3, -12), "v0: must be positive"),
     "up to rest": (lambda: gqm.design.from_load(0, 5, until=9, heading="pi/2"), "the body comes to rest"),
-    "a pole": (lambda: gqm.design.from_load("1/(1 - s)", 5, until=3), "the track ends near s = 0.99|no finite value"),
     "both": (lambda: gqm.design.from_load("s + t", 5, until=3), "must be a function of one of s, t"),
     "no value": (lambda: gqm.design.from_load("a*s", 5, until=3), "'a' has no value"),
     "no end": (lambda: gqm.design.from_load("s", 5), "'until' must be given"),
 }
 
 
-@pytest.mark.sample(3)
 @pytest.mark.parametrize("case", BAD)
 def test_loads_that_no_track_has(case: str) -> None:
     """Each load that no track has gives one clear error."""
     call, said = BAD[case]
     with pytest.raises(GQMError, match=said):
         call()
+
+
+@pytest.mark.extended
+def test_a_load_with_a_pole() -> None:
+    """Where a load grows without bound the track ends."""
+    with pytest.raises(GQMError, match=r"the track ends near s = 0\.99|no finite value"):
+        gqm.design.from_load("1/(1 - s)", 5, until=3)

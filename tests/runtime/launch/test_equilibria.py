@@ -108,10 +108,14 @@ def test_rolling_slows_down() -> None:
 
 @pytest.mark.extended
 def test_infinitely_many_want_a_range() -> None:
-    """A wave on the open line has too many equilibria; between two places they are listed, and the ends are checked."""
-    wave = model(gqm.Curve.graph("sin(x)"))
+    """A wave on the open line has too many equilibria to be listed."""
     with pytest.raises(SolutionError, match="between"):
-        wave.equilibria()
+        model(gqm.Curve.graph("sin(x)")).equilibria()
+
+
+def test_between_two_places() -> None:
+    """Those of a wave on the open line are listed between two places, which are checked."""
+    wave = model(gqm.Curve.graph("sin(x)"))
     found = wave.equilibria(between=(0, 10))
     assert [one.lam for one in found] == pytest.approx([pi / 2, 3 * pi / 2, 5 * pi / 2], rel=TOLERANCE)
     assert [one.stable for one in found] == [False, True, False]

@@ -359,7 +359,6 @@ def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> 
             assert off(state.lam, 2 * mp.acos(sigma / 2)) <= state.error <= POSITION
 
 
-@pytest.mark.extended
 def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
     """A spiral winds for ever over a finite length; the motion ends, and says when (``make soak`` found that it took
     for ever).

@@ -10,7 +10,7 @@ from mpmath import mp, mpf
 from numpy.polynomial.chebyshev import chebval
 
 from generated import circle_coulomb
-from gqm_sym.errors import InputError
+from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.clenshaw import GROUP
 from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.inversion.fourier import fit_wave, sum_cosines, sum_sines
@@ -75,7 +75,7 @@ def test_times_that_are_no_array_of_doubles(rough: bool, given: Any, module_of: 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_whirling_pendulum_at_random_times(direction: int, module_of: ModuleOf) -> None:
-    """The angle grows as twice the amplitude of Jacobi, lap by lap."""
+    """The angle grows as twice the amplitude of Jacobi, lap by lap, and a place in a later lap is reached once."""
     motion = module_of("circle").solve(0.0, 9.0, direction, L=1)
     t = np.random.default_rng(6).uniform(-100.0, 100.0, 60)
     places = motion.lam(t)
@@ -87,6 +87,11 @@ def test_a_whirling_pendulum_at_random_times(direction: int, module_of: ModuleOf
             u = (mpf(float(time)) - laps * loop) * mpf(9) / 2
             truth = direction * 2 * (mp.asin(mp.ellipfun("sn", u, m=m)) + laps * mp.pi)
             assert abs(mpf(float(place)) - truth) <= PLACE * max(abs(truth), 2 * mp.pi)
+        passed = mp.ellipf(10, m) * 2 / 9
+        assert abs(mpf(motion.time_at(20.0 * direction)) - passed) <= PLACE * passed
+    with pytest.raises(SolutionError, match="never at"):
+        motion.time_at(-direction)
+    assert motion.events_between(0, 1000) == ()
 
 
 def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:

@@ -103,6 +103,9 @@ LEBESGUE = 3.0
 # The smallest part of a panel that is searched for a change of sign if bounds do not decide it.
 MIN_PART = 2.0**-30
 
+# A series that takes the sign it is to begin with before this place begins at its zero, which is known only so well.
+AT_START = -1.0 + 1e-9
+
 # Rows of the buffer of a search: the series on the part being searched, three rows of the Clenshaw recurrence by which
 # it is found, and the ends of the parts still to be searched.
 PART, TWICE_X, NEXT_SUM, SUM_AFTER, STACK = range(0, 5 * WIDE, WIDE)
@@ -223,8 +226,8 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     -------
     verdict : int
         ONE_SIGN if the series has the sign so far up to its end; TO_ZERO if it does, but is within the noise at its
-        end; OTHER_SIGN if it has the other sign throughout; CROSSES if it changes from the sign so far to the other, or
-        has the other; ZERO if it is within the noise, or undecided on a smallest part; else UNDECIDED.
+        end; OTHER_SIGN if it begins with the other sign; CROSSES if it changes from the sign so far to the other; ZERO
+        if it is within the noise, or undecided on a smallest part; else UNDECIDED.
     before : int
         The sign with which it starts, if it was not known before.
     x : float
@@ -239,8 +242,11 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
         return (ONE_SIGN if found == before else OTHER_SIGN), before, 2.0
     if fabs(part[0]) + spread > noise and _is_monotone(part):
         left, right = _at_ends(part)
-        before = _sign(left, noise) if before == 0 else before
-        found = _sign(right, noise)
+        found_first, found = _sign(left, noise), _sign(right, noise)
+        before = found_first if before == 0 else before
+        if found_first != 0 and found_first != before:
+            ended_before = found == before and _crossing(part, left, right) <= AT_START
+            return (ONE_SIGN if ended_before else OTHER_SIGN), before, 2.0
         if found == 0:
             return TO_ZERO, before, 2.0
         before = found if before == 0 else before

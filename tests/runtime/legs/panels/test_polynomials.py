@@ -136,6 +136,8 @@ def test_a_wrong_sign_to_begin_with_changes_at_once() -> None:
     """A panel that begins with the other sign than it should changes at its start."""
     assert first_change(_series([1.4]), 1, NOISE)[0] == -1.0
     assert first_change(_series([-0.2]), -1, NOISE)[0] == pytest.approx(-0.2, abs=1e-15)
+    assert first_change(_series([-0.2]), 1, NOISE)[0] == -1.0  # also if the sign becomes the right one later
+    assert first_change(_series([-1.0 + 1e-11]), 1, NOISE)[0] == 2.0  # but not within the error of its first place
 
 
 WIDTH = 3 * LANES
