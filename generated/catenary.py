@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 19, input 2558bd3a8d44, body ff17d9136e21
+# interface 19, input 2558bd3a8d44, body 70ce86d0f30a
 """Bead on a hanging chain
 
 x              = x
@@ -294,11 +294,12 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
         c, g, _c0, _c1, a, b, da, db = p[0, i], p[1, i], p[3, i], p[4, i], lows[i], highs[i], left[i], right[i]
+        from_middle = da/2 - db/2
         x = place_from_ends(a, b, da, db)
         _t0 = 1/c
         _t1 = _t0*da
         _t2 = _t0*db
-        out[0, i] = _t0*g*(_c0*(_t1/2 - _t2/2)*divdiff1_sinhc_in_square(_t1, _t2) + _c1*divdiff1_cosh_in_square(_t1, _t2))
+        out[0, i] = _t0*g*(_c0*_t0*from_middle*divdiff1_sinhc_in_square(_t1, _t2) + _c1*divdiff1_cosh_in_square(_t1, _t2))
         out[1, i] = cosh(_t0*x)
 
 

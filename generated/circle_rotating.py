@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 19, input a74aedd594f9, body 73c532960e34
+# interface 19, input a74aedd594f9, body 764f04d57941
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -298,9 +298,10 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     for i in range(n):
         L, Omega, g, _c0, _c1, _c2, _c3, da = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], left[i]
         db = right[i]
+        from_middle = da/2 - db/2
         _t0 = 2*da
         _t1 = 2*db
-        out[0, i] = L**2*Omega**2*(-_c0*(da - db)*divdiff1_sinc_in_square(_t0, _t1) + _c1*divdiff1_cos_in_square(_t0, _t1)) - L*g*(-_c2*(da/2 - db/2)*divdiff1_sinc_in_square(da, db) + _c3*divdiff1_cos_in_square(da, db))
+        out[0, i] = L**2*Omega**2*(-2*_c0*from_middle*divdiff1_sinc_in_square(_t0, _t1) + _c1*divdiff1_cos_in_square(_t0, _t1)) - L*g*(-_c2*(da/2 - db/2)*divdiff1_sinc_in_square(da, db) + _c3*divdiff1_cos_in_square(da, db))
         out[1, i] = L
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 19, input bcc7b1afa151, body 67aa98dbf4df
+# interface 19, input bcc7b1afa151, body 5c64ea8f9fe6
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -341,16 +341,15 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (5, n)), carray(out, (8, n))
     for i in range(n):
-        middle, rest, a, b = middles[i], rests[i], lows[i], highs[i]
-        _t0 = -a + b
-        _t1 = a/2 - b/2
+        middle, rest, half, a, b = middles[i], rests[i], halves[i], lows[i], highs[i]
+        _t0 = 2*half
         out[0, i] = sin(b)
         out[1, i] = cos(b)
         out[2, i] = divdiff1_cos(a, b, _t0)
         out[3, i] = divdiff1_sin(a, b, _t0)
-        out[4, i] = sinc_near(-_t1)
+        out[4, i] = sinc_near(half)
         out[5, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[6, i] = cos(_t1)
+        out[6, i] = cos(half)
         out[7, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 

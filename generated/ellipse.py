@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 19, input 81dc4ee20e82, body 61279c0a28a6
+# interface 19, input 81dc4ee20e82, body e816fcc7b71f
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -312,11 +312,10 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
-        middle, rest, _a, _b = middles[i], rests[i], lows[i], highs[i]
-        _t0 = _a/2 - _b/2
-        out[0, i] = sinc_near(-_t0)
+        middle, rest, half = middles[i], rests[i], halves[i]
+        out[0, i] = sinc_near(half)
         out[1, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[2, i] = cos(_t0)
+        out[2, i] = cos(half)
         out[3, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 

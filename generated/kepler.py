@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 19, input a0162e77d64e, body 9de6c8ecc796
+# interface 19, input a0162e77d64e, body 8714325e0144
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -412,37 +412,38 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (15, n))
     for i in range(n):
-        a, ecc, middle, rest, _a, b = p[0, i], p[1, i], middles[i], rests[i], lows[i], highs[i]
-        _t0 = -_a + b
-        _t1 = _a/2 - b/2
-        _t2 = cos(_a)
-        _t3 = sin(_a)
-        _t4 = 1 - ecc**2
-        _t5 = sqrt(_t3**2*_t4 + (_t2 - ecc)**2)
-        _t6 = cos(b)
-        _t7 = sin(b)
-        _t8 = sqrt(_t4*_t7**2 + (_t6 - ecc)**2)
+        a, ecc, middle, rest, half, _a, b = p[0, i], p[1, i], middles[i], rests[i], halves[i], lows[i], highs[i]
+        _t0 = 2*half
+        _t1 = cos(_a)
+        _t2 = sin(_a)
+        _t3 = 1 - ecc**2
+        _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
+        _t5 = cos(b)
+        _t6 = sin(b)
+        _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
         out[0, i] = fabs(a)
         out[1, i] = divdiff1_cos(_a, b, _t0)
         out[2, i] = divdiff1_sin(_a, b, _t0)
-        out[3, i] = sinc_near(-_t1)
+        out[3, i] = sinc_near(half)
         out[4, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[5, i] = cos(_t1)
+        out[5, i] = cos(half)
         out[6, i] = cos_of_sum(0, 1, middle, rest, 0)
-        out[7, i] = 1/_t5
-        out[8, i] = _t5
-        out[9, i] = 1/_t8
-        out[10, i] = _t8
+        out[7, i] = 1/_t4
+        out[8, i] = _t4
+        out[9, i] = 1/_t7
     for i in range(n):
-        _a, b = lows[i], highs[i]
-        _t2 = cos(_a)
-        _t3 = sin(_a)
-        _t6 = cos(b)
-        _t7 = sin(b)
-        out[11, i] = _t3
-        out[12, i] = _t7
-        out[13, i] = _t2
-        out[14, i] = _t6
+        ecc, _a, b = p[1, i], lows[i], highs[i]
+        _t1 = cos(_a)
+        _t2 = sin(_a)
+        _t3 = 1 - ecc**2
+        _t5 = cos(b)
+        _t6 = sin(b)
+        _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
+        out[10, i] = _t7
+        out[11, i] = _t2
+        out[12, i] = _t6
+        out[13, i] = _t1
+        out[14, i] = _t5
 
 
 @compiled(TIME_INTEGRAND_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 19, input 8cb1e254c2ba, body 9ed85597b2bb
+# interface 19, input 8cb1e254c2ba, body 4a08e4bd4af9
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -311,16 +311,15 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     for i in range(n):
         r0, b, g, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
         _c5, _c6, a, _b, da, db = p[9, i], p[10, i], lows[i], highs[i], left[i], right[i]
+        from_middle = da/2 - db/2
         theta = place_from_ends(a, _b, da, db)
-        _t0 = da/2
-        _t1 = db/2
-        _t2 = _c4*divdiff1_cos_in_square(da, db) + _c5*(_t0 - _t1)*divdiff1_sinc_in_square(da, db)
-        _t3 = b*da
-        _t4 = b*db
-        _t5 = _t1*b
-        _t6 = b*theta
-        out[0, i] = g*r0*(_c0*_c6*b**2*((_t0*b - _t5)*divdiff1_sinhc_in_square(_t3, _t4) + divdiff1_cosh_in_square(_t3, _t4)) + _c1*_t2 + b*(_c3*_c5 - _t2*db)*sinhc_near(_t5)*exp(_b*b/2 + _t6/2))
-        out[1, i] = _c2*r0*exp(_t6)
+        _t0 = db/2
+        _t1 = _c4*divdiff1_cos_in_square(da, db) + _c5*(-_t0 + da/2)*divdiff1_sinc_in_square(da, db)
+        _t2 = b*da
+        _t3 = b*db
+        _t4 = b*theta
+        out[0, i] = g*r0*(_c0*_c6*b**2*(b*from_middle*divdiff1_sinhc_in_square(_t2, _t3) + divdiff1_cosh_in_square(_t2, _t3)) + _c1*_t1 + b*(_c3*_c5 - _t1*db)*sinhc_near(_t0*b)*exp(_b*b/2 + _t4/2))
+        out[1, i] = _c2*r0*exp(_t4)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
@@ -328,12 +327,12 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (7, n))
     for i in range(n):
-        b, middle, rest, a, _b = p[1, i], middles[i], rests[i], lows[i], highs[i]
+        b, middle, rest, half, a, _b = p[1, i], middles[i], rests[i], halves[i], lows[i], highs[i]
         _t0 = exp(b*middle)
         out[0, i] = sin(a)
         out[1, i] = exp(_b*b)
         out[2, i] = sqrt(b**2 + 1)
-        out[3, i] = sinc_near(_b/2 - a/2)
+        out[3, i] = sinc_near(half)
         out[4, i] = sin_of_sum(0, 1, middle, rest, 0)
         out[5, i] = cos_of_sum(0, 1, middle, rest, 0)
         out[6, i] = _t0*b*rest + _t0

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 19, input cd2a37956d84, body 24427b10d417
+# interface 19, input cd2a37956d84, body ecc89b08a60b
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -305,11 +305,11 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     for i in range(n):
         r0, b, k, _c0, _c1, _c2, a, _b = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], lows[i], highs[i]
         da, db = left[i], right[i]
+        from_middle = da/2 - db/2
         theta = place_from_ends(a, _b, da, db)
-        _t0 = b*da
-        _t1 = -_t0
-        _t2 = -b*db
-        out[0, i] = -_c2*b**2*k*((-_t0/2 + b*db/2)*divdiff1_sinhc_in_square(_t1, _t2) + divdiff1_cosh_in_square(_t1, _t2))/_c0
+        _t0 = -b*da
+        _t1 = -b*db
+        out[0, i] = -_c2*b**2*k*(-b*from_middle*divdiff1_sinhc_in_square(_t0, _t1) + divdiff1_cosh_in_square(_t0, _t1))/_c0
         out[1, i] = _c1*r0*exp(b*theta)
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 19, input c93b8a64a5a5, body 3f9e58e4bee1
+# interface 19, input c93b8a64a5a5, body 93e62fa2fbde
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -372,15 +372,15 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (7, n)), carray(out, (2, n))
     for i in range(n):
         a, g, _c0, _c1, _c2, _c3, da, db = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i], left[i], right[i]
+        from_middle = da/2 - db/2
         _t0 = da/2
         _t1 = db/2
         _t2 = divdiff1_cos_in_square(_t0, _t1)
-        _t3 = db/4
-        _t4 = -_t3 + da/4
-        _t5 = _t4*divdiff1_sinc_in_square(_t0, _t1)
-        _t6 = _t3*da
-        out[0, i] = a*g*(_c1*_t2 + _c3*_t5)/2
-        out[1, i] = a*sqrt((-_c1*(_c0*_t4 - _t5*_t6) + _c3*(_c2 - _t2*_t6))**2 + 1)
+        _t3 = divdiff1_sinc_in_square(_t0, _t1)
+        _t4 = from_middle/2
+        _t5 = da*db
+        out[0, i] = a*g*(_c1*_t2 + _c3*_t3*_t4)/2
+        out[1, i] = a*sqrt((-_c1*(_c0*_t4 - _t3*_t5*from_middle/8) + _c3*(_c2 - _t2*_t5/4))**2 + 1)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
@@ -388,9 +388,9 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
-        middle, rest, _a, b = middles[i], rests[i], lows[i], highs[i]
-        _t0 = _a/4 - b/4
-        out[0, i] = sinc_near(-_t0)
+        middle, rest, half = middles[i], rests[i], halves[i]
+        _t0 = half/2
+        out[0, i] = sinc_near(_t0)
         out[1, i] = sin_of_sum(0, 1/2, middle, rest, 0)
         out[2, i] = cos(_t0)
         out[3, i] = cos_of_sum(0, 1/2, middle, rest, 0)

@@ -1,12 +1,13 @@
 """The functions for sweeps: those of a conservative model in which each place has its own launch and parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Add, Expr, Function, Mul, S, Symbol, cos, cosh, exp, expand, sin, sinh
+from sympy import Add, Expr, Function, Mul, Rational, S, Symbol, cos, cosh, exp, expand, sin, sinh
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.angles import of_sum
+from gqm_sym.derivation.algebra.bottom_up import from_the_leaves_up
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.algebra.rewrite import in_single_waves
 from gqm_sym.emission.context import Lowering
@@ -195,6 +196,26 @@ def _at_middle(value: Expr, ends: tuple[Symbol, Symbol], middle: Symbol, rest: S
     return moved + 2 * rate * rest * {sinh: cosh, cosh: sinh, exp: exp}[value.func](argument)
 
 
+def _of_one_gap(
+    forms: Iterable[Expr], low: Symbol, high: Symbol, half: Symbol, unrounded: Sequence[Expr] = ()
+) -> tuple[Expr, ...]:
+    """Write multiples of the difference of two numbers as multiples of one symbol, which is half that difference.
+
+    A difference of two multiples has the roundings of both, and at the ends of an orbit far from zero these are much
+    more than that of its width. Multiples by ``unrounded`` stay as they are.
+    """
+
+    def of_half(form: Expr) -> Expr:
+        if not form.is_Add or len(form.args) != 2 or form.has(AppliedUndef) or not form.has(low):
+            return form
+        rate = form.diff(high)
+        if rate in unrounded or rate.has(low, high) or expand(form - rate * (high - low)) != 0:
+            return form
+        return 2 * rate * half
+
+    return from_the_leaves_up(forms, of_half)
+
+
 def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
     """Return the function for first divided differences of the effective potential, ds and the potential's slopes."""
     model, names, place = lowering.model, lowering.names, lowering.measured
@@ -234,18 +255,21 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     ends = [(a, at(lows)), (b, at(highs))]
     if model.origin:  # of ends far from zero, only their mean and distance are exact
         ends = [(half, at(halves)), (a, middle - half + rest), (b, middle + half + rest)]
+    from_middle = names.symbol("from_middle")
+    in_halves = (Rational(1, 2), Rational(-1, 2))
     outputs = [
         form.replace(
             lambda t: isinstance(t, (sin, cos)) and t.has(place),
             lambda t: of_sum(t, (place,), (middle, rest, (da - db) / 2)),
         )
-        for form in outputs
+        for form in _of_one_gap(outputs, db, da, from_middle, in_halves)
     ]
     held = [
         (symbol, of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
         for symbol, value in held
     ]
     held = [(symbol, _at_middle(value, (a, b), middle, rest)) for symbol, value in held]
+    held = list(zip((s for s, _ in held), _of_one_gap((v for _, v in held), a, b, half), strict=True))
     held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]
     held += [(symbol, symbol) for symbol in (a, b) if model.origin]
     behind = len(lowering.order)
@@ -258,6 +282,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
             *((symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)),
             *([] if model.origin else ends),
             *((symbol, at(array)) for symbol, array in ((da, left), (db, right))),
+            (from_middle, (da - db) / 2),
             (place, Function("place_from_ends")(a, b, da, db)),
         ],
         outputs=tuple(outputs),
@@ -271,7 +296,12 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
         (lows, highs, middles, rests, halves),
         "Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters"
         f"{lowering.meaning}.",
-        inside=[(middle, at(middles) - model.origin), (rest, at(rests)), *ends],
+        inside=[
+            (middle, at(middles) - model.origin),
+            (rest, at(rests)),
+            *([] if model.origin else [(half, at(halves))]),
+            *ends,
+        ],
         outputs=tuple(value for _, value in held),
         batch=True,
     )
