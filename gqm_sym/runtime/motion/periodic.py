@@ -183,9 +183,7 @@ class PeriodicMotion(PeriodicTimes):
         if time is not None and known is not None and self._sampler_for(time, time) is known[0]:
             return known[0], np.array([time]), known[1], ()
         given = plain_times(t) if time is None else (np.array([time]), time, time)
-        # The speeds of some segments can be computed from their panels only.
-        from_panels = given is None or self._segment.from_multiprecision
-        sampler = None if given is None or from_panels else self._sampler_for(*given[1:])
+        sampler = None if given is None else self._sampler_for(*given[1:])
         if given is None or sampler is None:
             return None
         trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
@@ -227,9 +225,6 @@ class PeriodicMotion(PeriodicTimes):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        # The speeds of some segments can be computed only from their panels.
-        if self._segment.from_multiprecision:
-            return super().state(t)._replace(lam=self.lam(t))
         if time is not None:
             return self._state_at(sampler.state(time))
         return self._state_of(times[0], sampler.states(times[0].reshape(-1)))

@@ -110,7 +110,7 @@ def test_neighbours_do_not_matter() -> None:
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("name", ["circle", "ellipse", "double_well", "rolling_circle"])
+@pytest.mark.parametrize("name", ["double_well", "circle", "ellipse", "rolling_circle"])
 def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Machine code for a program gives the same bits as the interpreters, for librations from rest and others, and for
     laps.
@@ -158,7 +158,6 @@ def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> 
         np.testing.assert_array_equal(found[0], found[-1])
 
 
-@pytest.mark.extended
 def test_machine_code_that_is_not_used_any_more() -> None:
     """Machine code is removed from memory with its program, and is made again when it is needed."""
     source = source_of(generated("circle").MODEL)
