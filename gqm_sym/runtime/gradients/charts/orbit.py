@@ -13,10 +13,10 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
 from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
-    TruePieces,
     arc_between,
     place_at,
     unshared,

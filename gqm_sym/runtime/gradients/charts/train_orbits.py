@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
-from gqm_sym.runtime.charts.double_double.pieces import TruePieces
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives, source_along
