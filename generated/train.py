@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 19, input b87305fcd75e, body afd1730c0c0a
+# interface 19, input b87305fcd75e, body 86043e34c975
 """A train of five cars on hills
 
 x              = x(s)
@@ -28,8 +28,8 @@ compiled = compiler(__file__, interface=19)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    CompiledFunctions, CompiledModel, Pass1, Sampled, SeparatedTerms, TrackOfTrain, chart_differences, chart_of,
-    chart_rows, cos, divdiff2_chart_z, ichart_alpha, iconst, imul, place_from_ends,
+    CompiledFunctions, CompiledModel, ExactPotential, Pass1, Sampled, SeparatedTerms, TrackOfTrain, chart_differences,
+    chart_of, chart_rows, cos, divdiff2_chart_z, ichart_alpha, iconst, imul, place_from_ends,
 )
 
 if TYPE_CHECKING:
@@ -180,6 +180,11 @@ def exact_train(op, p):
     length, g = p[0], p[1]
     return length, g, 0, 0
 
+def exact_body_effective_potential(op, x, z, p):
+    """U of a body at one place, and its derivatives with respect to x and z (paper, eq. 13)."""
+    g = p[1]
+    return g*z, 0, g
+
 def exact_factors(op, p):
     """Factors of the parts of U, then of the parts of n0."""
     g = p[1]
@@ -299,7 +304,7 @@ def separated_terms(n, a, places, offsets, p, out):
         out[3, i] = cos(_chart_alpha)
 
 
-CHART = TrackOfTrain(Sampled(POINTS, kind='spline', closed=False), cars=5, numbers=exact_train, length=0)
+CHART = TrackOfTrain(Sampled(POINTS, kind='spline', closed=False), cars=5, numbers=exact_train, length=0, body=ExactPotential(exact_body_effective_potential))
 
 
 MODEL = CompiledModel(

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.arguments import launch_arguments
+from gqm_sym.arguments import launch_arguments, short
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.literals.numbers import read_number
 from gqm_sym.optional import require
 
 __all__ = ["half_period", "period"]
@@ -40,7 +42,7 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     Notes
     -----
     The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
-    derivatives by JAX are not available.
+    derivatives by JAX are refused; ``motion.gradient(..., order=2)`` has them.
     """
     return _for_jax(module, "half_period")
 
@@ -66,6 +68,9 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
     import jax
     from jax import numpy as jnp
 
+    model = module.MODEL
+    units = {"lam0": model.units.get(model.parameter), "v0": "m/s", **model.units}
+
     def computed(names: tuple[str, ...], wrt: tuple[str, ...], arguments: tuple[Any, ...]) -> Any:
         """Return a sweep as one step of JAX: the values or, if names to differentiate by are given, the derivatives,
         with one more axis.
@@ -84,18 +89,34 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
     @cache
     def differentiable(names: tuple[str, ...]) -> Any:
         value: Any = jax.custom_jvp(lambda *arguments: computed(names, (), arguments))
+        first: Any = jax.custom_jvp(lambda wrt, *arguments: computed(names, wrt, arguments), nondiff_argnums=(0,))
+
+        def second(*_: Any) -> Any:
+            raise SolutionError(
+                f"jax.{quantity}: JAX gets no second derivatives; motion.gradient('{quantity}', order=2) has them"
+            )
 
         def tangent(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> Any:
             zero = jax.custom_derivatives.SymbolicZero
             varied = {name: t for name, t in zip(names, tangents, strict=True) if not isinstance(t, zero)}
-            slopes = computed(names, tuple(varied), primals)
+            slopes = first(tuple(varied), *primals)
             return value(*primals), sum(slopes[..., k] * t for k, t in enumerate(varied.values()))
 
+        first.defjvp(second)
         value.defjvp(tangent, symbolic_zeros=True)
         return value
 
+    def as_array(name: str, value: Any) -> Any:
+        """Return an argument as an array of JAX."""
+        if isinstance(value, str):
+            value = read_number(value, where=name, unit=units.get(name)).value
+        try:
+            return jnp.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"jax.{quantity}: {name}: must be a number or an array, got {short(value)}") from None
+
     def function(lam0: Any, v0: Any = 0.0, **parameters: Any) -> Any:
         given = launch_arguments(f"jax.{quantity}", module.PARAMETERS, lam0, v0, parameters)
-        return differentiable(tuple(given))(*(jnp.asarray(value, dtype=float) for value in given.values()))
+        return differentiable(tuple(given))(*(as_array(name, value) for name, value in given.items()))
 
     return function

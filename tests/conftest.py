@@ -15,8 +15,7 @@ from hypothesis.internal.conjecture import providers
 from problems import PROBLEMS, TRACKS, Problem
 from selection import EXTENDED_EXAMPLES, USUAL_EXAMPLES, usual
 
-from gqm_sym.runtime.compiled import emitted, jit
-from gqm_sym.runtime.compiled import uncompiled as plain
+from gqm_sym.runtime.compiled import emitted, jit, trial
 
 # The first example of a test may compile for seconds, and a failure must be reproducible.
 settings.register_profile("usual", deadline=None, derandomize=True, print_blob=True, max_examples=USUAL_EXAMPLES)
@@ -34,7 +33,7 @@ jit.ANNOUNCER.seconds = 1e6
 # Most of the suite's modules are used a few times only, and compiling their functions took half of the time of many
 # tests. Python gives the same bits, and may go on until it has taken as long as the compiler would, in however many
 # launches: a user's script may run again, but the cache of the suite is not used again.
-emitted.MAX_PYTHON_TIME, plain.MAX_LAUNCHES = 0.12, math.inf
+emitted.MAX_PYTHON_TIME, trial.MAX_LAUNCHES = 0.12, math.inf
 
 # A worker has up to a million objects of SymPy and numba; collecting garbage as often as usual takes a twelfth of the
 # time.

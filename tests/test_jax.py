@@ -84,3 +84,16 @@ def test_a_name_that_is_none(half_period: Callable) -> None:
         half_period(1.2)
     with pytest.raises(GQMError, match=r"jax\.half_period: there is no argument 'length'; it takes lam0, v0, L, g, m"):
         half_period(1.2, length=2.0)
+
+
+def test_what_has_no_derivative_or_is_no_number(half_period: Callable) -> None:
+    """Second derivatives, and arguments that are no numbers, are refused by one clear error; text is read."""
+    import jax
+
+    with pytest.raises(GQMError, match=r"jax\.half_period: JAX gets no second derivatives; motion\.gradient"):
+        jax.grad(jax.grad(half_period))(1.2, L=0.75)
+    with pytest.raises(GQMError, match=r"jax\.half_period: lam0: must be a number or an array, got 1j"):
+        half_period(1j, L=0.75)
+    with mp.workdps(40):
+        found = float(half_period("90 deg", L="75 cm"))
+        assert abs(mpf(found) / true(mp.pi / 2, 0.75) - 1) < CLOSE

@@ -14,6 +14,7 @@ from gqm_sym.design.shape import SplineChanges
 from gqm_sym.design.tracks import read_constant
 from gqm_sym.errors import DeclarationError, GQMError
 from gqm_sym.literals.namespaces import ARRAYS
+from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
@@ -49,6 +50,11 @@ class Limit(NamedTuple):
     def scale(self) -> float:
         """The size of the limit, by which its margin is measured."""
         return max((abs(end) for end in (self.low, self.high) if isfinite(end)), default=1.0) or 1.0
+
+    @property
+    def unit(self) -> str:
+        """The unit, as it stands behind a number."""
+        return "" if LIMITS[self.name] == "1" else f" {LIMITS[self.name]}"
 
     def margins(self, values: Array | None) -> Array:
         """Return the margins to both ends at all places, as shares of the size; -1 where there is no value."""
@@ -103,6 +109,47 @@ def read_limits(limits: Mapping[str, tuple[Any, Any]], where: str) -> list[Limit
             )
         found.append(Limit(name, low, high))
     return found
+
+
+def read_bounds(limits: Any, guess: float | None, name: str) -> tuple[float, float, float]:
+    """Read the lower limit, first guess and upper limit of an unknown.
+
+    Parameters
+    ----------
+    limits : tuple
+        ``(low, high)`` or ``(low, guess, high)``; the limits may be None.
+    guess : float or None
+        The value to begin with if none is given and if it lies between the limits; otherwise it is their middle.
+    name : str
+        The unknown.
+
+    Raises
+    ------
+    DeclarationError
+        If the limits contradict each other or exclude the first guess, or if there is no value to begin with.
+    """
+    if not isinstance(limits, tuple | list) or len(limits) not in (2, 3):
+        raise DeclarationError(
+            f"design.minimise: free: {name}: must be (low, high) or (low, guess, high), got {limits!r}"
+        )
+    where = f"design.minimise: free: {name}"
+    low, high = (
+        side if end in (None, side) else read_number(end, where=where).value
+        for end, side in zip((limits[0], limits[-1]), (-inf, inf), strict=True)
+    )
+    if not low < high:
+        raise DeclarationError(f"{where}: the limits contradict each other, got {limits!r}")
+    if len(limits) == 3 and limits[1] is not None:
+        start = read_number(limits[1], where=where).value
+        if not low <= start <= high:
+            raise DeclarationError(f"{where}: the first guess {start!r} must lie between {low!r} and {high!r}")
+    elif guess is not None and low <= guess <= high:
+        start = guess
+    elif isfinite(low) and isfinite(high):
+        start = 0.5 * (low + high)
+    else:
+        raise DeclarationError(f"{where}: has no value to begin with; give (low, guess, high), got {limits!r}")
+    return low, start, high
 
 
 def places_between(ends: tuple[float, float], between: tuple[Any, Any] | None) -> Array:

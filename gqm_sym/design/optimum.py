@@ -3,7 +3,7 @@
 import tempfile
 import warnings
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import inf, isfinite, nan
 from typing import Any
@@ -16,13 +16,13 @@ from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
 from gqm_sym.design.charted_limits import along_chart, along_shaped_chart, start_slopes
 from gqm_sym.design.limits import (
-    LIMITS,
     Limit,
     Limited,
     along_formulas,
     along_spline,
     margins_of,
     places_between,
+    read_bounds,
     read_limits,
     slopes_of,
 )
@@ -74,8 +74,9 @@ def minimise(
     force : Kernel
         As for `derive`.
     free : mapping or sequence
-        For a curve, the parameters to be found, each with ``(low, high)`` or ``(low, guess, high)``. For points, the
-        indices of those that may move, counted from 0, or a mapping from these to limits of their heights.
+        For a curve, the parameters to be found, each with ``(low, high)`` or ``(low, guess, high)``, in which low or
+        high may be None. For points, the indices of those that may move, counted from 0, or a mapping from these to
+        limits of their heights.
     limits : mapping, optional
         ``(low, high)``, either of them None, for "height" in m, "slope" (dz/dx), "curvature" in 1/m or "normal_force"
         in N. They are imposed at 201 places along the track.
@@ -172,8 +173,8 @@ def _check(held: list[Limit], found: Limited | None) -> None:
         if not margins.min() >= -MAX_EXCESS:
             raise SolutionError(
                 f"design.minimise: no track was found that meets all limits; at best {limit.name} exceeds "
-                f"({limit.low:.6g}, {limit.high:.6g}) by {-margins.min() * limit.scale:.3g} {LIMITS[limit.name]}. "
-                "Begin elsewhere, or allow more"
+                f"({limit.low:.6g}, {limit.high:.6g}) by {-margins.min() * limit.scale:.3g}"
+                f"{limit.unit}. Begin elsewhere, or allow more"
             )
 
 
@@ -290,7 +291,7 @@ class _Family(_Tracks):
                 raise DeclarationError(unknown_argument("design.minimise: free", str(name), defaults, what="parameter"))
             default = defaults[name]
             guess = None if default is None else float(exact_value(default))
-            rows.append(_bounds(limits, guess, str(name)))
+            rows.append(read_bounds(limits, guess, str(name)))
         self._names = tuple(free)
         self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
 
@@ -343,8 +344,8 @@ class _Points(_Tracks):
         self._curve = Curve.sampled(track)
         self._points = np.array([[float(number) for number in row] for row in np.asarray(track).tolist()])
         self.size = float(np.ptp(self._points, axis=0).max())
-        listed: Iterable[Any] = free if isinstance(free, Mapping | Sequence | range) else ()
-        self._moved = list(listed)
+        listed = free if isinstance(free, Iterable) and not isinstance(free, str) else ()
+        self._moved = [int(number) if isinstance(number, np.integer) else number for number in listed]
         rows = []
         for number in self._moved:
             if not (isinstance(number, int) and 0 <= number < len(self._points)):
@@ -352,7 +353,7 @@ class _Points(_Tracks):
                     f"design.minimise: free: {short(number)} is none of the points 0 to {len(self._points) - 1}"
                 )
             limits = free[number] if isinstance(free, Mapping) else None
-            rows.append(_bounds(limits or (-inf, inf), self._points[number, 1], f"point {number}"))
+            rows.append(read_bounds(limits or (-inf, inf), self._points[number, 1], f"point {number}"))
         if not rows:
             raise DeclarationError("design.minimise: free: no point may move; give their numbers, as in range(1, 9)")
         self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
@@ -406,18 +407,3 @@ class _Points(_Tracks):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NoisyPointsWarning)
             return Curve.sampled(self._heights(x))
-
-
-def _bounds(limits: Any, guess: float | None, name: str) -> tuple[float, float, float]:
-    """Read the lower limit, first guess and upper limit of an unknown."""
-    if not isinstance(limits, tuple | list) or len(limits) not in (2, 3):
-        raise DeclarationError(
-            f"design.minimise: free: {name}: must be (low, high) or (low, guess, high), got {limits!r}"
-        )
-    low, high = float(limits[0]), float(limits[-1])
-    start = float(limits[1]) if len(limits) == 3 else guess
-    if start is None or not low <= start <= high:
-        start = 0.5 * (low + high)
-    if not (low < high and low <= start <= high):
-        raise DeclarationError(f"design.minimise: free: {name}: the limits contradict each other, got {limits!r}")
-    return low, start, high

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from sympy import Add, Expr, Function, Mul, Rational, S, Symbol, cos, cosh, exp, expand, sin, sinh
+from sympy import Add, Expr, Function, Mul, Rational, S, Symbol, cos, cosh, exp, expand, sin, sinh, tan
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.algebra.angles import of_sum
@@ -165,6 +165,11 @@ def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
     )
 
 
+def _without_tangents(form: Expr) -> Expr:
+    """Write tangents as ratios, because that of the library keeps loops from filling vector registers."""
+    return form.replace(tan, lambda angle: sin(angle) / cos(angle))
+
+
 def _term_by_term(form: Expr) -> Expr:
     """Divide a sum by a power of a number term by term, if this takes that power from one of the terms.
 
@@ -230,7 +235,7 @@ def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
         f"U[a, {place}], ds/d{place} and dU/d{place}{lowering.meaning}.",
         inside=[(a, at(starts) - model.origin), *([offset, (place, a + d)] if model.origin else [here, offset])],
         outputs=(
-            _from_start(differences.first(potential, 0, 1), a, d),
+            _without_tangents(_from_start(differences.first(potential, 0, 1), a, d)),
             _term_by_term(lowering.from_origin(model.ds)),
             lowering.from_origin(model.effective_potential_slope),
         ),

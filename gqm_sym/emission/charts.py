@@ -14,10 +14,11 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.forces.train import PotentialParts, loads_along, potential_parts, rates_along
 from gqm_sym.derivation.geometry.geometry import cross, geometry
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.dissipative import planar_point, point_in_space
+from gqm_sym.emission.dissipative import CORIOLIS_VECTOR, planar_point, point_in_space
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
-from gqm_sym.sympy_charts import LOAD_IN_PLANE, LOADS_IN_SPACE, MEAN_PARTS
+from gqm_sym.kernels import base
+from gqm_sym.sympy_charts import AXES, LOAD_IN_PLANE, LOADS_IN_SPACE, MEAN_PARTS, SPACE_ROWS
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -186,6 +187,33 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     return _of_train(lowering, made) if lowering.model.force.cars else made
 
 
+def potential_by_coordinates(lowering: Lowering, potential: Expr, name: str = "") -> tuple[ExactIR, ...]:
+    """Return the functions of `interface.ExactPotential`: an effective potential in terms of coordinates with its
+    gradient, and in a rotating frame the vector of the Coriolis force.
+
+    Parameters
+    ----------
+    lowering
+        The module.
+    potential
+        The potential, in ``lowering.coordinates``.
+    name
+        What stands before their names.
+    """
+    places, coriolis = lowering.coordinates, lowering.model.coriolis
+    outputs = (potential, *(differentiate(potential, coordinate) for coordinate in places))
+    named = "x, y and z" if lowering.model.curve.in_space else "x and z"
+    doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
+    if name:
+        doc = f"U of a body at one place, and its derivatives with respect to {named} (paper, eq. 13)."
+    found = lowering.exact_function(f"{name}effective_potential", doc, outputs, places)
+    if not coriolis:
+        return (found,)
+    tangent = {SPACE_ROWS[axis][1](lowering.place): lowering.names.symbol(f"d{axis}ds") for axis in AXES}
+    aside = tuple(form.xreplace(tangent) for form in coriolis)
+    return found, lowering.exact_function(f"{name}coriolis", CORIOLIS_VECTOR, aside, tuple(tangent.values()))
+
+
 def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
     """Return the part that makes the chart of a train's track, from that of the track."""
     train = lowering.model.force
@@ -205,15 +233,27 @@ def _of_train(lowering: Lowering, track: ChartIR) -> ChartIR:
         arguments += [f"parts={parts[0].name}", f"held={held!r}"]
     if train.friction:
         arguments.append("friction=True")
+    body = _potential_of_body(lowering) if lowering.model.dissipation is None else ()
+    if body:
+        arguments.append(f"body=ExactPotential({', '.join(part.name for part in body)})")
     loads = LOADS_IN_SPACE if lowering.model.curve.in_space else LOAD_IN_PLANE
     return replace(
         track,
         statement=f"TrackOfTrain({', '.join(arguments)})",
-        imports=(*track.imports, "TrackOfTrain"),
+        imports=(*track.imports, "TrackOfTrain", *(["ExactPotential"] if body else [])),
         means=("along_h", *(f"along_{heads[0].axis}" for _, heads in zip(whole.parts, MEAN_PARTS, strict=False))),
         loads=loads if whole.parts and train.friction else (),
-        exact=(*track.exact, numbers, *parts),
+        exact=(*track.exact, numbers, *parts, *body),
     )
+
+
+def _potential_of_body(lowering: Lowering) -> tuple[ExactIR, ...]:
+    """Return the functions of `potential_by_coordinates` for a body at one place of the track of a train."""
+    train = lowering.model.force
+    names = lowering.coordinates
+    place = names if lowering.model.curve.in_space else (names[0], S.Zero, names[1])
+    potential = train.potential.xreplace(dict(zip((base.X, base.Y, base.Z), place, strict=True)))
+    return potential_by_coordinates(lowering, potential / lowering.model.inertia, "body_")
 
 
 def _parts_along_track(lowering: Lowering, whole: PotentialParts) -> ExactIR:

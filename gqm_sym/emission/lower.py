@@ -4,12 +4,10 @@ from sympy import Expr, Function
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.difference import Differences
-from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
-from gqm_sym.emission.charts import chart_maker
+from gqm_sym.emission.charts import chart_maker, potential_by_coordinates
 from gqm_sym.emission.context import FORWARDS, Lowering
 from gqm_sym.emission.dissipative import (
-    CORIOLIS_VECTOR,
     chart_law,
     contact_products,
     speed_equation,
@@ -26,7 +24,6 @@ from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import exact_axis_orbits
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
-from gqm_sym.sympy_charts import AXES, SPACE_ROWS
 
 FLAGS = ("friction", "kinked", "linear")
 """The parts of a module for a force law that is not conservative."""
@@ -267,19 +264,10 @@ class _ModelLowering(Lowering):
         """Return the effective potential and its gradient in terms of coordinates; nothing if it depends on more than
         these.
         """
-        places, potential = self.coordinates, self.by_coordinates(self.model.effective_potential)
+        potential = self.by_coordinates(self.model.effective_potential)
         if self.place in potential.free_symbols:
             return ()
-        outputs = (potential, *(differentiate(potential, coordinate) for coordinate in places))
-        named = "x, y and z" if self.model.curve.in_space else "x and z"
-        doc = f"U, so that V**2 + 2*U is constant, and its derivatives with respect to {named} (paper, eq. 13)."
-        found = self.exact_function("effective_potential", doc, outputs, places)
-        upright = upright_along_chart(self)
-        if not self.model.coriolis:
-            return (found, *upright)
-        tangent = {SPACE_ROWS[axis][1](self.place): self.names.symbol(f"d{axis}ds") for axis in AXES}
-        aside = tuple(form.xreplace(tangent) for form in self.model.coriolis)
-        return found, self.exact_function("coriolis", CORIOLIS_VECTOR, aside, tuple(tangent.values())), *upright
+        return (*potential_by_coordinates(self, potential), *upright_along_chart(self))
 
     def domain(self) -> ExactIR:
         """Return the formula for the range of the curve's parameter."""

@@ -28,7 +28,8 @@ RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
 # A parameter belongs to such a direction if its share of it is more than this.
 MIN_SHARE = 1e-3
 
-# Motions that lose energy are followed further than the last measured passage by this factor.
+# Motions that lose energy are followed further than the last measured time by this factor, and not to their end, which
+# may be many swings later.
 HORIZON_FACTOR = 1.5
 
 # The largest number of steps of the solver, which takes ten from a good guess.
@@ -62,7 +63,8 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
         And ``sigma``, their standard deviation: a number, a column, or a mapping with one for each quantity.
     free : mapping
         The unknowns, which are run-time parameters, "lam0" or "v0", each with a first guess, limits ``(low, high)``,
-        all three ``(low, guess, high)``, or None for the value that is given by keyword or the model's default.
+        all three ``(low, guess, high)``, either limit None where there is none, or None for the value that is given by
+        keyword or the model's default.
     fixed
         All other arguments of the launch and the parameters, as for ``module.solve``.
 
@@ -141,16 +143,20 @@ def _free(model: CompiledModel, free: Mapping[str, Any], fixed: Mapping[str, Any
         parts = list(given) if isinstance(given, tuple | list) else [given]
         unit = units_of(model)[name]
         numbers = [None if p is None else read_number(p, where=f"free: {name}", unit=unit).value for p in parts]
-        if len(numbers) not in (1, 2, 3) or (len(numbers) > 1 and None in numbers):
-            raise InputError(f"free: {name}: must be a guess, (low, high), (low, guess, high) or None, got {given!r}")
-        low, high = (numbers[0], numbers[-1]) if len(numbers) > 1 else (-inf, inf)
-        start = numbers[len(numbers) // 2] if len(numbers) != 2 else 0.5 * (low + high)  # type: ignore[operator]
+        low, *guess, high = numbers if len(numbers) > 1 else (None, *numbers, None)
+        if len(guess) > 1 or (len(numbers) > 1 and None in (guess or numbers)):
+            raise InputError(
+                f"free: {name}: must be a guess, (low, high), None, or (low, guess, high), where low and high may be "
+                f"None, got {given!r}"
+            )
+        low, high = -inf if low is None else low, inf if high is None else high
+        start = guess[0] if guess else 0.5 * (low + high)
         if start is None:
             value = fixed.get(name, 0 if name == "v0" else model.parameters.get(name))
             if value is None:
                 raise InputError(f"free: {name}: has no value to begin with; give a first guess")
             start = read_number(value, where=name, unit=unit).value
-        if not low < high or not low <= start <= high:  # type: ignore[operator]
+        if not low < high or not low <= start <= high:
             raise InputError(f"free: {name}: the first guess {start!r} must lie between {low!r} and {high!r}")
         rows.append((start, low, high))
     columns = np.array(rows, dtype=np.float64).T
@@ -180,6 +186,8 @@ class Residuals:
         sigma = measured.sigma
         self.sigma = np.ones(self.values.size) if sigma is None else np.concatenate([*sigma.values()])
         self._loses = module.MODEL.dissipation is not None
+        times = self.values if measured.place is not None else measured.t
+        self._last = 0.0 if times is None else float(times.max())
         self._solved: tuple[Array, Any] | None = None
 
     def arguments(self, x: Array) -> dict[str, Any]:
@@ -191,8 +199,8 @@ class Residuals:
         if self._solved is not None and np.array_equal(self._solved[0], x):
             return self._solved[1]
         arguments = self.arguments(x)
-        if self.measured.place is not None and self._loses:
-            arguments["t_max"] = HORIZON_FACTOR * float(self.values.max())
+        if self._loses and self._last > 0.0:
+            arguments["t_max"] = HORIZON_FACTOR * self._last
         self._solved = x.copy(), self.module.solve(**arguments)
         return self._solved[1]
 

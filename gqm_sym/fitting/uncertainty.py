@@ -1,12 +1,13 @@
 """The uncertainty of a result due to that of launch and parameters, by derivatives and by many exact results."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import compiled_model, one_of, short, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
@@ -16,6 +17,7 @@ from gqm_sym.fitting.result import Fit, with_deviation
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.sweep.columns import refused
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
 
 # The number of results in a sample if none is given, and the largest number.
@@ -57,7 +59,8 @@ class Uncertainty:
     samples : array
         The answers for the values that were drawn, as far as there are answers.
     missing : int
-        The number of drawn values without an answer.
+        The number of drawn values without an answer, among them those that no motion has, such as a negative friction
+        coefficient.
     """
 
     quantity: str
@@ -130,9 +133,9 @@ def uncertainty(
     asked = one_of(quantity, tuple(QUANTITIES), where="uncertainty: quantity")
     if asked == "turning_points":
         raise InputError("uncertainty: quantity: turning_points are two numbers; ask for one number")
-    if not (isinstance(samples, int) and 2 <= samples <= MAX_SAMPLES):
+    if not (isinstance(samples, int | np.integer) and 2 <= samples <= MAX_SAMPLES):
         raise InputError(f"uncertainty: samples: must be a whole number from 2 to {MAX_SAMPLES}, got {short(samples)}")
-    if not (isinstance(seed, int) and seed >= 0):
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
         raise InputError(f"uncertainty: seed: must be a whole number of at least 0, got {short(seed)}")
     values, covariance = _read(model, uncertain, fixed)
     known = (*LAUNCH, "direction", "lam", "t_max", "contact", *model.parameters)
@@ -157,7 +160,8 @@ def uncertainty(
         steps = STEP * np.maximum(np.abs(centre), np.sqrt(np.diag(covariance)))
         steps[steps == 0.0] = STEP
         gradient = central_differences(lambda x: answers(x[None, :])[0], centre, steps)
-    found = answers(centre + _draws(covariance, samples, seed))
+    drawn = centre + _draws(covariance, int(samples), int(seed))
+    found = answers(drawn[_are_permitted(model, values, fixed, drawn)])
     kept = found[np.isfinite(found)]
     return Uncertainty(
         quantity=quantity,
@@ -165,7 +169,7 @@ def uncertainty(
         sampled=Estimate(float(np.mean(kept)), float(np.std(kept, ddof=1))),
         gradient=dict(zip(values, gradient.tolist(), strict=True)),
         samples=kept,
-        missing=int(found.size - kept.size),
+        missing=int(samples - kept.size),
     )
 
 
@@ -209,12 +213,28 @@ def _draws(covariance: Array, samples: int, seed: int) -> Array:
     return deviations * (drawn @ np.linalg.cholesky(correlation).T)
 
 
+def _are_permitted(
+    model: CompiledModel, names: Iterable[str], fixed: Mapping[str, Any], drawn: Array
+) -> NDArray[np.bool_]:
+    """Return which of the drawn rows a launch may have: speeds are not negative, and parameters are in their ranges."""
+    columns = dict(zip(names, drawn.T, strict=True))
+    others = {name: fixed.get(name, default) for name, default in model.parameters.items() if name not in columns}
+    for name, given in others.items():
+        columns[name] = np.asarray(read_number(given, where=name, unit=model.units.get(name)).value)
+    found = np.ones(len(drawn), dtype=np.bool_)
+    if "v0" in columns:
+        found &= columns["v0"] >= 0.0
+    for wrong, _ in refused(model, columns):
+        found &= ~wrong
+    return found
+
+
 def _gradient(module: ModuleType, quantity: str, values: dict[str, float], fixed: Mapping[str, Any]) -> Array | None:
     """Return the derivatives of a quantity; None if there are none."""
     launch = {name: value for name, value in fixed.items() if name != "lam"}
     motion = module.solve(**{"lam0": 0.0, **launch, **values})
     try:
-        found = motion.gradient(quantity, tuple(values))
+        found = motion.gradient(quantity, tuple(values), lam=fixed.get("lam"))
     except (InputError, SolutionError):
         return None
     return np.array([*found.values()], dtype=np.float64)

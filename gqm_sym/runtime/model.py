@@ -15,8 +15,8 @@ from gqm_sym.literals.numbers import flat_doubles, read_numbers, without_unit
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
 from gqm_sym.runtime.compiled.threads import run_in_threads
+from gqm_sym.runtime.compiled.trial import begin_launch
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind, bind_all
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch

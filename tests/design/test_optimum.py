@@ -37,7 +37,7 @@ def test_the_quickest_plane() -> None:
 def test_with_friction() -> None:
     """With friction the quickest plane is steeper by half of the angle of friction."""
     force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
-    assert steepness(force, {"k": (0.5, 0.9, 4)}) == pytest.approx(tan(pi / 4 + atan(0.3) / 2), rel=1e-6)
+    assert steepness(force, {"k": (0.5, 0.9, None)}) == pytest.approx(tan(pi / 4 + atan(0.3) / 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("given", [{}, {"lam": "1/2"}])
@@ -73,16 +73,19 @@ def test_points_that_move(tmp_path: Path) -> None:
 
 
 BAD: dict[str, tuple[Any, Any, dict[str, Any], str]] = {
-    "no limits are met": (PLANE, {"k": (0.9, 4)}, {"limits": {"slope": (-0.8, None)}}, "at best slope exceeds"),
+    "no limits are met": (PLANE, {"k": (0.9, 4)}, {"limits": {"slope": (-0.8, None)}}, "(-0.8, inf) by 0.1. Begin"),
     "contradiction": (PLANE, START, {"limits": {"height": (1, 0)}}, "limits contradict each other"),
     "an unknown limit": (PLANE, START, {"limits": {"speed": (0, 1)}}, "there is no limit 'speed'"),
     "half a limit": (PLANE, START, {"limits": {"slope": 1}}, "slope: must be (low, high)"),
     "an unknown parameter": (PLANE, {"q": (0, 1)}, {}, "there is no parameter 'q'"),
     "a guess alone": (PLANE, {"k": 1}, {}, "must be (low, high)"),
     "limits out of order": (PLANE, {"k": (2, 1)}, {}, "limits contradict each other"),
+    "a guess outside": (PLANE, {"k": (0.1, 5, 4)}, {}, "k: the first guess 5.0 must lie between 0.1 and 4.0"),
+    "no guess": (PLANE, {"k": (2, None)}, {}, "k: has no value to begin with"),
+    "no number": (PLANE, {"k": ("low", 4)}, {}, "k: "),
     "nothing free": (PLANE, {}, {}, "free: must be a mapping"),
     "an unknown argument": (PLANE, START, {"L": 1}, "there is no argument 'L'"),
-    "no such point": ([[k, -k] for k in range(7)], [7], {}, "is none of the points 0 to 6"),
+    "no such point": ([[k, -k] for k in range(7)], np.array([7]), {}, "7 is none of the points 0 to 6"),
     "no point": ([[k, -k] for k in range(7)], [], {}, "no point may move"),
     "upwards": (PLANE, {"k": (-2, -1)}, {}, "would leave through it at once"),
 }

@@ -89,6 +89,13 @@ def test_seats_and_their_animation(hills: ModuleType, tmp_path: Path) -> None:
         gqm.figures.seats(hills.solve(0, 10))
 
 
+def test_an_animation_in_space(tmp_path: Path) -> None:
+    """The frames show a bead on a curve in space, coloured by the contact force."""
+    gqm.figures.animate(generated.viviani.solve("3/10"), tmp_path / "bead.gif", duration=0.2, rate=10)
+    with Image.open(tmp_path / "bead.gif") as frames:
+        assert frames.n_frames == 2
+
+
 @pytest.mark.parametrize(
     ("limits", "message"),
     [

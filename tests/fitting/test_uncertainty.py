@@ -60,6 +60,24 @@ def test_draws_without_an_answer() -> None:
     assert f"{found.missing} more draws have no half_period" in str(found)
 
 
+def test_draws_that_no_launch_may_have() -> None:
+    """Half of the draws about zero are negative, which neither speeds nor friction coefficients are; other draws are
+    answered, and so is the derivative of the time to the bottom, which is that of the amplitude's closed form.
+    """
+    found = gqm.uncertainty(
+        rough, "time_at", {"mu": (0, 0.01)}, lam0=1, lam=0, L=1, samples=np.int64(400), seed=np.int64(1)
+    )
+    assert abs(found.missing - 200) < 60
+    assert found.missing + found.samples.size == 400
+    found = gqm.uncertainty(pendulum, "period", {"L": (1, 0.5), "v0": (0, 0.1)}, lam0=1, samples=400)
+    assert abs(found.missing - 200 - 5) < 60
+    angle, w = 1.2, np.sqrt(9.81)
+    m = np.sin(0.5 * angle) ** 2
+    slope = 0.5 * np.cos(0.6) * (ellipe(m) / (1 - m) - ellipk(m)) / np.sin(0.6) / w
+    time = gqm.uncertainty(pendulum, "time_at", {"lam0": (angle, 1e-3)}, lam=0, L=1, samples=100)
+    assert time.gradient["lam0"] == pytest.approx(slope, rel=1e-13)
+
+
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
     """Return the fit of length and amplitude to positions."""

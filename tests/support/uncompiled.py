@@ -10,12 +10,12 @@ from pathlib import Path
 import numba
 import pytest
 
-from gqm_sym.runtime.compiled import emitted, jit, uncompiled
+from gqm_sym.runtime.compiled import emitted, jit, trial, uncompiled
 
 
 def install() -> None:
     """Let Python run what numba would compile, from now on."""
-    jit.MAX_PYTHON_TIME = emitted.MAX_PYTHON_TIME = uncompiled.MAX_CALL = uncompiled.MAX_LAUNCHES = math.inf
+    jit.MAX_PYTHON_TIME = emitted.MAX_PYTHON_TIME = uncompiled.MAX_CALL = trial.MAX_LAUNCHES = math.inf
     jit.COMPILER.record = lambda *_: Path(os.devnull)  # type: ignore[method-assign]
     jit.COMPILER.callback = jit.COMPILER.entry = _refused  # type: ignore[method-assign, assignment]
     numba.cfunc = _refused

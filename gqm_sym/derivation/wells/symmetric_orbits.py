@@ -25,6 +25,9 @@ MIN_GROWTH = sp.Rational(1, 4)
 # A sine or cosine is written in powers of the slowest one if its rate is at most this multiple of the slowest rate.
 MAX_MULTIPLE = 8
 
+# The power of the cosine that judges the digits which the rounding of the width takes from the time next to a pole.
+POWER_OF_POLE = sp.Rational(3, 2)
+
 # The highest degree of a polynomial in the square of a sine that is evaluated: of higher ones the powers cancel.
 MAX_DEGREE = 4
 
@@ -33,19 +36,29 @@ def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(f"_{name}", real=True)
 
 
-# Symbols for one place of an orbit: Y, 1 - Y, T - Y, 1 - Y*T.
+# Symbols for one place of an orbit: Y, 1 - Y, T - Y, 1 - Y*T, and (1 - Y)**2 - 4*Y, which is the cosine of k d times
+# (1 + Y)**2.
 Y, ONE_MINUS_Y, T_MINUS_Y, ONE_MINUS_YT = (_symbol(name) for name in ("y", "one_minus_y", "t_minus_y", "one_minus_yt"))
+COSINE_TERM = _symbol("cosine_term")
 
-# Symbols for the whole orbit: half its width; T, which is Y at its ends, 1 - T, 1 - T**2; the square of the sine there,
-# and the fourth power of the cosine of half its argument.
+# Symbols for the whole orbit: half its width; T, which is Y at its ends, 1 - T, 1 - T**2, (1 - T)**2 - 4*T; the square
+# of the sine there, the fourth power of the cosine of half its argument, and the cosine of twice its argument.
 HALF, T, ONE_MINUS_T, ONE_MINUS_TT = (_symbol(name) for name in ("half", "t", "one_minus_t", "one_minus_tt"))
-SINE_SQUARED, COSINE_FOURTH = _symbol("sine_squared"), _symbol("cosine_fourth")
+SINE_SQUARED, COSINE_FOURTH, COSINE_AT_TURN = (_symbol(n) for n in ("sine_squared", "cosine_fourth", "cosine_at_turn"))
+COSINE_TERM_AT_TURN = _symbol("cosine_term_at_turn")
 
 # Symbols for a launch: the distance from the axis, and V**2 there.
 OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
 
-# Symbols for intermediate results: the squares of the sine and of the cosine of half the argument.
-_SINE, _COSINE = _symbol("sine"), _symbol("cosine")
+# Symbols for intermediate results: the squares of the sine and of the cosine of half the argument, and the cosine of
+# the argument where the curve has a pole at its zero.
+_SINE, _COSINE, _COSINE_OF_POLE = _symbol("sine"), _symbol("cosine"), _symbol("cosine_of_pole")
+
+# Functions that are written as ratios of sines and cosines.
+_RATIOS = {
+    sp.tan: lambda x: sp.sin(x) / sp.cos(x),
+    sp.cot: lambda x: sp.cos(x) / sp.sin(x),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +72,7 @@ class SymmetricOrbits:
         second divided differences have more digits.
     divisor
         The divisor of ``time_integrand``. Next to a barrier it nearly vanishes at some places, and digits are lost.
+        Of a pole of the curve it has `POWER_OF_POLE`.
     invariants
         The symbols of the whole orbit, each with its value as a function of HALF.
     turning_point
@@ -112,6 +126,9 @@ def symmetric_orbits(
         return None
     d = sp.Dummy("d", real=True)
     forms = tuple(form.xreplace({lam: symmetry.place + d}) for form in forms)
+    has_ratios = any(form.has(*_RATIOS) for form in forms)
+    for function, ratio in _RATIOS.items():
+        forms = tuple(form.replace(function, ratio) for form in forms)
     functions = {type(call) for form in forms for call in form.atoms(sp.Function) if call.has(d)}
     if not functions:
         height, metric = (_even(form, d, Y) for form in forms)
@@ -138,8 +155,18 @@ def symmetric_orbits(
     if not slope:
         return None
     by_square = {_SINE: 4 * Y / more**2, _COSINE: less**2 / more**2}
+    by_square[_COSINE_OF_POLE] = COSINE_TERM / more**2
+    if _with_poles(slope, waves) != slope:
+        above, below = sp.together(slope).as_numer_denom()
+        slope = _with_poles(sp.expand(above) / below, waves)
+    of_pole = _with_poles(metric, waves)
+    if has_ratios and not of_pole.has(_COSINE_OF_POLE):
+        return None  # second differences keep more digits next to a pole that is elsewhere
     divisor = sp.together(slope.xreplace(by_square)) * ONE_MINUS_YT  # each takes one division
-    integrand = 4 * sp.together(metric.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
+    integrand = 4 * sp.together(of_pole.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
+    if of_pole.has(_COSINE_OF_POLE):
+        power = sp.degree(sp.together(slope).as_numer_denom()[1], _COSINE_OF_POLE)
+        divisor *= by_square[_COSINE_OF_POLE] ** (power + POWER_OF_POLE)
     invariants = _invariants(waves, rate * HALF / 2)
     degrees = [_degree_inside(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
     cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
@@ -179,6 +206,8 @@ def _invariants(waves: _Waves, argument: sp.Expr) -> tuple[tuple[sp.Symbol, sp.E
         (ONE_MINUS_TT, 4 * cosine / (1 + cosine) ** 2),
         (SINE_SQUARED, sine**2),
         (COSINE_FOURTH, (1 + cosine) ** 2 / 4),
+        (COSINE_AT_TURN, sp.cos(2 * argument)),
+        (COSINE_TERM_AT_TURN, 4 * sp.cos(2 * argument) / (1 + cosine) ** 2),
     )
 
 
@@ -231,12 +260,24 @@ def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) ->
 def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
     """Return the symbols of one place, where Y = ``sine2``*T and ``sine2 + cosine2`` = 1, as sums without
     cancellation.
+
+    COSINE_TERM keeps its digits next to a pole, where COSINE_AT_TURN is small.
     """
+    y, one_minus_y, one_minus_yt = (
+        invariants.get(T, T) * sine2,
+        cosine2 + invariants.get(ONE_MINUS_T, ONE_MINUS_T) * sine2,
+        cosine2 + invariants.get(ONE_MINUS_TT, ONE_MINUS_TT) * sine2,
+    )
+    # The same in two ways: a difference, and terms of one sign, which have more roundings but do not cancel.
+    plain = one_minus_y**2 - 4 * y
+    positive = cosine2 * one_minus_yt + invariants.get(COSINE_TERM_AT_TURN, COSINE_TERM_AT_TURN) * sine2
+    at_turn = invariants.get(COSINE_AT_TURN, COSINE_AT_TURN)
     return {
-        Y: invariants.get(T, T) * sine2,
+        Y: y,
         T_MINUS_Y: invariants.get(T, T) * cosine2,
-        ONE_MINUS_Y: cosine2 + invariants.get(ONE_MINUS_T, ONE_MINUS_T) * sine2,
-        ONE_MINUS_YT: cosine2 + invariants.get(ONE_MINUS_TT, ONE_MINUS_TT) * sine2,
+        ONE_MINUS_Y: one_minus_y,
+        ONE_MINUS_YT: one_minus_yt,
+        COSINE_TERM: at_turn * plain + (1 - at_turn) * positive,
     }
 
 
@@ -303,6 +344,24 @@ def _with_double_roots(metric: sp.Expr, waves: _Waves) -> sp.Expr:
         return sp.Mul(constant, *((f if r.has(_SINE) else r * _COSINE) ** power for f, r, power in ratios))
 
     return sp.Mul(*map(rooted, sp.Mul.make_args(metric)))
+
+
+def _with_poles(form: sp.Expr, waves: _Waves) -> sp.Expr:
+    """Return a form in which the cosine of the argument has a symbol of its own where it is a divisor.
+
+    In squares of the sine and cosine of half the argument it is a difference that loses its digits next to the pole.
+    """
+    if waves.sign > 0:
+        return form
+
+    def named(power: sp.Expr) -> sp.Expr:
+        for square, symbol in ((_SINE, _COSINE_OF_POLE), (SINE_SQUARED, COSINE_AT_TURN)):
+            ratio = sp.cancel(power.base.xreplace({_COSINE: 1 - _SINE}) / (1 - 2 * square))
+            if not ratio.has(_SINE, SINE_SQUARED):
+                return (ratio * symbol) ** power.exp
+        return power
+
+    return form.replace(lambda t: t.is_Pow and t.exp.is_Integer and t.exp < 0 and t.base.is_Add, named)
 
 
 def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:

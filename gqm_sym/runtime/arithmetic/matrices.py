@@ -26,7 +26,8 @@ from gqm_sym.runtime.compiled.registers import (
     operation,
     register,
 )
-from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
+from gqm_sym.runtime.compiled.trial import go_on
+from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, in_python
 
 # The number of sums that run at the same time.
 PARALLEL_SUMS = 6

@@ -8,7 +8,7 @@ import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.charts.chart import Chart
-from gqm_sym.runtime.charts.double_double.pieces import Samples, sample_places
+from gqm_sym.runtime.charts.double_double.making import Samples, sample_places
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials

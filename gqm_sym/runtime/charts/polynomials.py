@@ -11,7 +11,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, rectify, summed
 from gqm_sym.runtime.charts.chart import Chart, PieceData, assemble
-from gqm_sym.runtime.charts.double_double.pieces import TruePieces, starting_context
+from gqm_sym.runtime.charts.double_double.making import TruePieces, starting_context
 from gqm_sym.runtime.charts.exact_parts import Parts, polynomial
 from gqm_sym.runtime.compiled.types import Array
 

@@ -19,7 +19,7 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, Indices, Pieces, joined, rectify, summed
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, tangents_of
-from gqm_sym.runtime.charts.double_double.pieces import TruePieces, starting_context
+from gqm_sym.runtime.charts.double_double.making import TruePieces, starting_context
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry

@@ -16,7 +16,8 @@ from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, divided, rectify, summed, unwrapped
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, assemble_in_space
-from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, SAMPLES, TruePieces, sample_places
+from gqm_sym.runtime.charts.double_double.making import SAMPLES, TruePieces, sample_places
+from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES
 from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
 from gqm_sym.runtime.charts.interpolation import DEGREE, arc_length_knots, interpolated, polynomials, thinned

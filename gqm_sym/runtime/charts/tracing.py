@@ -19,8 +19,14 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic import doubledouble
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.continuation import CLOSED, FAR, MAX_PIECES, PIECE_ROWS, SINGULAR, trace_one_way
+from gqm_sym.runtime.charts.double_double.making import (
+    SAMPLES,
+    Samples,
+    TruePieces,
+    sample_places,
+    starting_context,
+)
 from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
-from gqm_sym.runtime.charts.double_double.pieces import SAMPLES, Samples, TruePieces, sample_places, starting_context
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, LevelCurve, evaluate_points
 from gqm_sym.runtime.compiled.jit import Inner, entry

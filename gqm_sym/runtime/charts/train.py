@@ -24,6 +24,7 @@ from gqm_sym.runtime.charts.differences import divdiff1_chart_alpha, divdiff1_ch
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.interface import ExactPotential
 
 # The places of the ends of a train ahead of its middle, as shares of its length.
 ENDS = (-0.5, 0.5)
@@ -35,7 +36,9 @@ MAX_RATIO = 16.0
 
 # A piece resolves a part of a potential if the last two Chebyshev coefficients of its second derivative are below this
 # share of it, or of what roundings of the part and of its slope make of it; other pieces are halved, so many times.
-MAX_TAIL, MAX_HALVINGS = 4e-16, 40
+# Where a part almost vanishes, roundings of the coordinates make more of it: after the last number of halvings the
+# share is of its largest value on the track.
+MAX_TAIL, MAX_HALVINGS, HALVINGS_OF_SMALL_PARTS = 4e-16, 40, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,8 @@ class TrackOfTrain:
         The indices of the run-time parameters that they depend on.
     friction : bool
         Whether there is friction on the cars, which jumps where one of them passes a jump of the curvature.
+    body : ExactPotential, optional
+        The potential of a body at one place of the track, if there are no losses.
     """
 
     track: ChartMaker
@@ -71,6 +76,7 @@ class TrackOfTrain:
     parts: Callable[..., Any] | None = None
     held: tuple[int, ...] = ()
     friction: bool = False
+    body: ExactPotential | None = None
 
     @property
     def shaped_by(self) -> tuple[int, ...] | None:
@@ -95,11 +101,11 @@ class TrackOfTrain:
                 f"train: length: {length!r} m is not shorter than the track, which is {whole!r} m long"
             )
         size = int(track.block[0])
-        height = _Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
+        height = Charted(track.block[:size], track.edges, isinstance(track, SpaceChart))
         others, count = self._charted_parts(track, p), len(self.numbers(FLOATS, p)) - 4
         charted, loads = (height, *others[:count]), others[count:]
-        edges = _graded(_passages(track, charted[-1].edges, length, ENDS), track.period > 0.0)
-        block = np.concatenate([_mean(one, edges, length, track.period) for one in charted])
+        edges = edges_of_means(track, charted[-1].edges, length)
+        block = np.concatenate([mean_over_train(one, edges, length, track.period) for one in charted])
         # At the points of a spline only the fifth derivative jumps, which panels resolve faster than so many breaks.
         rubs = self.friction and not track.from_points
         cars = (np.arange(self.cars) + 0.5) / self.cars - 0.5 if rubs else np.empty(0)
@@ -133,20 +139,23 @@ class TrackOfTrain:
             raise ParameterError("train: the potential is not finite everywhere on the track; keep it off its centre")
         return rows
 
-    def _charted_parts(self, track: Chart, p: tuple[float, ...]) -> "list[_Charted]":
+    def _charted_parts(self, track: Chart, p: tuple[float, ...]) -> "list[Charted]":
         """Return the charts of these parts along the track, and of the load across it. The angle of such a chart is the
         derivative of the part, or the component of the load.
         """
         if self.parts is None:
             return []
         edges = track.edges
-        for _ in range(MAX_HALVINGS):
+        for halvings in range(MAX_HALVINGS):
             half = 0.5 * np.diff(edges)
             places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
             rows = self._along(track, p, places.ravel()).reshape(-1, 3, *places.shape)
             coefficients = rows[:, 2] @ FIT.T
             values, slopes, bends = np.abs(rows).max(axis=3).swapaxes(0, 1)
-            above = np.abs(coefficients) > MAX_TAIL * (bends + slopes / half + values / half**2)[:, :, None]
+            sizes = bends + slopes / half + values / half**2
+            if halvings >= HALVINGS_OF_SMALL_PARTS:
+                sizes = np.maximum(sizes, bends.max(axis=1, keepdims=True))
+            above = np.abs(coefficients) > MAX_TAIL * sizes[:, :, None]
             coarse = above[:, :, -2:].any(axis=(0, 2))
             if not coarse.any():
                 break
@@ -157,33 +166,8 @@ class TrackOfTrain:
         used = np.flip(np.logical_or.accumulate(np.flip(above, axis=2), axis=2), axis=2)
         bends = np.where(used, coefficients, 0.0) @ AT_NODES
         first = self._along(track, p, edges[:1])[::3, 0]
-        blocks = _blocks(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
-        return [_Charted(block, edges, True) for block in blocks]
-
-    def change_of_mean(self, chart: Chart, p: tuple[float, ...], mean: int, edges: Array) -> Array:
-        """Return the block of a chart of the derivative of a mean with respect to the length, but for a constant.
-
-        Parameters
-        ----------
-        chart : Chart
-            The chart of the track of the train.
-        p : sequence of float
-            The run-time parameters.
-        mean : int
-            The number of the mean: 0 for the height, then those of the other parts.
-        edges : array
-            The edges of the pieces of its chart.
-        """
-        block = chart.block[: int(chart.block[0])]
-        if mean:
-            block = self._charted_parts(self.track.chart(p), p)[mean - 1].block
-        half = 0.5 * np.diff(edges)
-        places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
-        slopes = _slopes_of_change(np.ascontiguousarray(block), places.ravel(), float(p[self.length]))
-        slopes = slopes.reshape(places.shape)
-        bends = np.asarray(chebder(slopes @ FIT.T, axis=1)) @ AT_NODES[:-1] / half[:, None]
-        (made,) = _blocks(edges, np.zeros(1), slopes[:, None], bends[:, None], chart.period)
-        return made
+        blocks = blocks_of_functions(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
+        return [Charted(block, edges, True) for block in blocks]
 
     def potential(self, chart: Chart, p: Sequence[float], s: Array) -> tuple[Array, Array]:
         """Return the potential energy per unit mass of a body at arc lengths, and its derivative by arc length.
@@ -262,6 +246,11 @@ def _passages(track: Chart, places: Array, length: float, shares: Sequence[float
     return _merged(np.concatenate([[low, high], _inside(found, np.array([low, high]))]), high - low)
 
 
+def edges_of_means(track: Chart, edges: Array, length: float) -> Array:
+    """Return the edges of the pieces of a mean over a train, of a function of the place along a track between edges."""
+    return _graded(_passages(track, edges, length, ENDS), track.period > 0.0)
+
+
 def _graded(edges: Array, is_closed: bool) -> Array:
     """Return edges with further ones between them, so that no piece is much wider than the next one.
 
@@ -298,7 +287,7 @@ def _over_train(chart, places, length):  # type: ignore[no-untyped-def]
 
 
 @entry(VECTOR(VECTOR, VECTOR, REAL))
-def _slopes_of_change(chart, places, length):  # type: ignore[no-untyped-def]
+def slopes_by_length(chart, places, length):  # type: ignore[no-untyped-def]
     """Return the derivative with respect to the place, then to the length of a train, of a mean over it.
 
     It is half of z[a, b, b] - z[a, a, b] with both ends a and b, in which nothing is divided by a small length.
@@ -313,7 +302,7 @@ def _slopes_of_change(chart, places, length):  # type: ignore[no-untyped-def]
 
 
 @dataclass(frozen=True, slots=True)
-class _Charted:
+class Charted:
     """A function of the place along a track, of which a train has the mean.
 
     Attributes
@@ -324,30 +313,41 @@ class _Charted:
         The edges of its pieces.
     has_slope : bool
         Whether the angle of this chart is the derivative of the function; otherwise that is the sine of the angle.
+    is_fitted : bool
+        Whether this derivative follows from values of the function, and is less accurate than these.
     """
 
     block: Array
     edges: Array
     has_slope: bool
+    is_fitted: bool = False
 
 
-def _mean(charted: _Charted, edges: Array, length: float, period: float) -> Array:
+def mean_over_train(charted: Charted, edges: Array, length: float, period: float) -> Array:
     """Return the block of the chart of a mean, whose pieces end at ``edges``."""
     block = np.ascontiguousarray(charted.block)
     half = 0.5 * np.diff(edges)
     places = edges[:-1, None] + half[:, None] * (1.0 + NODES)
     (slopes, turns, back, front), _ = _over_train(block, places.ravel(), length)
-    if charted.has_slope:
-        bends = turns
+    slopes = slopes.reshape(places.shape)
+    if charted.is_fitted:
+        bends = fitted_slopes(slopes) / half[:, None]
+    elif charted.has_slope:
+        bends = turns.reshape(places.shape)
     else:  # the divided difference of sin alpha
-        bends = turns * np.cos(0.5 * (front + back)) * np.sinc((front - back) / (2.0 * np.pi))
-    slopes, bends = slopes.reshape(places.shape), bends.reshape(places.shape)
+        bends = (turns * np.cos(0.5 * (front + back)) * np.sinc((front - back) / (2.0 * np.pi))).reshape(places.shape)
     first = _first_mean(charted, block, (edges[0] - 0.5 * length, edges[0] + 0.5 * length), period)
-    (made,) = _blocks(edges, np.array([first]), slopes[:, None], bends[:, None], period)
+    (made,) = blocks_of_functions(edges, np.array([first]), slopes[:, None], bends[:, None], period)
     return made
 
 
-def _blocks(edges: Array, first: Array, slopes: Array, bends: Array, period: float) -> list[Array]:
+def fitted_slopes(values: Array) -> Array:
+    """Return the derivatives with respect to u at the nodes of functions with given values there (the last axis)."""
+    slopes: Array = np.asarray(chebder(values @ FIT.T, axis=-1)) @ AT_NODES[:-1]
+    return slopes
+
+
+def blocks_of_functions(edges: Array, first: Array, slopes: Array, bends: Array, period: float) -> list[Array]:
     """Return the blocks of charts of functions, from their values at the first edge and from derivatives at the nodes.
 
     Parameters
@@ -372,7 +372,7 @@ def _blocks(edges: Array, first: Array, slopes: Array, bends: Array, period: flo
     return blocks_of(edges, (anchors, lows), (slopes, bends), period)
 
 
-def _first_mean(charted: _Charted, block: Array, ends: tuple[float, float], period: float) -> float:
+def _first_mean(charted: Charted, block: Array, ends: tuple[float, float], period: float) -> float:
     """Return the mean over a train whose ends are given."""
     laps = (-1.0, 0.0, 1.0) if period else (0.0,)
     edges = np.concatenate([charted.edges + lap * period for lap in laps])

@@ -22,7 +22,8 @@ from numba import types
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import GENERATED
-from gqm_sym.runtime.compiled.uncompiled import Trial, go_on, paused, plain_by_address
+from gqm_sym.runtime.compiled.trial import Trial, go_on, paused
+from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
 # The time in seconds that Python may spend on running a function of a generated module before the function is compiled.

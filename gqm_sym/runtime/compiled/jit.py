@@ -16,7 +16,8 @@ from numba.extending import typeof_impl
 
 from gqm_sym.runtime.compiled.numba_internals import Compiler
 from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
-from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry, Trial
+from gqm_sym.runtime.compiled.trial import Trial
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
 
 COMPILE: dict[str, Any] = {"error_model": "numpy"}
 

@@ -15,7 +15,8 @@ from numba.core import cgutils
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
+from gqm_sym.runtime.compiled.trial import go_on
+from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, in_python
 
 # Doubles in a register.
 LANES = 8

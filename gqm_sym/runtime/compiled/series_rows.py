@@ -8,7 +8,8 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, Lanes, broadcast, fused, line_of, register
-from gqm_sym.runtime.compiled.uncompiled import go_on, in_python
+from gqm_sym.runtime.compiled.trial import go_on
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 
 def series_rows(width: int, count: int) -> Any:

@@ -14,14 +14,12 @@ import ctypes
 import dis
 import inspect
 import math
-import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from itertools import count
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
@@ -29,6 +27,7 @@ import numba
 import numpy as np
 
 from gqm_sym.runtime.compiled import intrinsics
+from gqm_sym.runtime.compiled.trial import TooSlowError, Trial, go_on, limited
 
 # Functions of the C library, by their number of arguments. Compiled code calls the same ones.
 _ELEMENTARY = {
@@ -44,10 +43,6 @@ _NUMPY = SimpleNamespace(
     **{name: np.float64(getattr(np, name)) for name in ("inf", "nan", "pi")},
 )
 
-
-# A function is compiled in the first launch after so many launches that have used it, in this process or in others.
-MAX_LAUNCHES = 2
-
 # The time in seconds that one call of an entry point may take in Python. The compiler takes some seconds.
 MAX_CALL = 1.5
 
@@ -56,86 +51,17 @@ class NotPlainError(Exception):
     """A function uses something that Python cannot run to the same bits."""
 
 
-class TooSlowError(Exception):
-    """Python has used up the time that it was given."""
-
-
-class _Deadline(threading.local):
-    """The time by which plain Python must end in this thread."""
-
-    at = math.inf
-
-
 class _Sharing(threading.local):
     """Whether other threads write into the same arrays as this one."""
 
     on = False
 
 
-_DEADLINE, _SHARING = _Deadline(), _Sharing()
+_SHARING = _Sharing()
 _STEPS = count()
-
 
 # The parser of Python 3.11 may raise a SystemError if two threads use it at once.
 _PARSING = threading.Lock()
-
-# Launches in this process so far.
-_LAUNCHES = SimpleNamespace(count=0)
-
-
-def begin_launch() -> None:
-    """Count a launch, or a sweep of them."""
-    _LAUNCHES.count += 1
-
-
-class Trial:
-    """The work that Python has done for a function, which decides when it is compiled.
-
-    Parameters
-    ----------
-    seconds : float
-        The time after which it is worth compiling.
-    record : Path, optional
-        A file that gets one byte for each launch, so that a script which is run again and again has its functions
-        compiled too. It is stored beside the compiled code and may be missing.
-    """
-
-    def __init__(self, seconds: float, record: Path = Path(os.devnull)) -> None:
-        self.left = seconds
-        self._launch, self._launches, self._record = -1, 0, record
-
-    def is_over(self) -> bool:
-        """Return whether the function is to be compiled: after the given time, or in the third launch that uses it."""
-        if self._launch != _LAUNCHES.count:
-            self._launch = _LAUNCHES.count
-            self._launches = max(self._launches, self._recorded()) + 1
-        return self.left <= 0.0 or self._launches > MAX_LAUNCHES
-
-    def _recorded(self) -> int:
-        """Return the number of launches in the record before this one."""
-        with suppress(OSError), self._record.open("ab") as file:
-            return file.write(b".") and file.tell() - 1
-        return 0
-
-
-@contextmanager
-def limited(seconds: float) -> Iterator[None]:
-    """Let functions run as plain Python for at most this time."""
-    before, _DEADLINE.at = _DEADLINE.at, time.perf_counter() + seconds
-    try:
-        yield
-    finally:
-        _DEADLINE.at = before
-
-
-@contextmanager
-def paused() -> Iterator[None]:
-    """Exclude the time of the ``with`` block, in which something is compiled, from the time that Python may take."""
-    started = time.perf_counter()
-    try:
-        yield
-    finally:
-        _DEADLINE.at += time.perf_counter() - started
 
 
 @contextmanager
@@ -150,12 +76,6 @@ def sharing_arrays() -> Iterator[None]:
         yield
     finally:
         _SHARING.on = before
-
-
-def go_on() -> None:
-    """Raise TooSlowError if Python has used up the time that it was given."""
-    if time.perf_counter() > _DEADLINE.at:
-        raise TooSlowError
 
 
 @cache

@@ -1,4 +1,6 @@
-"""The integrands over a panel of phase angles, in double-double arithmetic: time and arc length, with a bound."""
+"""The integrands over a panel of phase angles, in double-double arithmetic: time and arc length, with a bound; and the
+speed there.
+"""
 
 from math import fabs
 from typing import Any
@@ -10,7 +12,7 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, sine_and_cosine
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.orbit_time import ENDS
 from gqm_sym.runtime.double_double.quadrature import (
@@ -28,6 +30,10 @@ Pair = tuple[float, float]
 # The largest relative error of a rate. Rounded to a double, such a rate is as good as an exact one.
 MAX_RATE_ERROR = 2.0**-54
 
+# The derivative of the share of a segment with respect to phi, over the factor of the speed that is not regular: those
+# of TURN_TURN, FROM_TURN and REGULAR segments.
+GROWTHS = (0.5, 2.0, 1.0)
+
 PAIR = types.UniTuple(REAL, 2)
 
 
@@ -36,7 +42,8 @@ PAIR = types.UniTuple(REAL, 2)
     checked=False,
 )
 def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[no-untyped-def]
-    """Fill the rows of ``out`` with dt/dphi and ds/dphi at the nodes of a panel; see `panel_rates`.
+    """Fill the rows of ``out`` with dt/dphi, ds/dphi and the regular factor of the speed at the nodes of a panel; see
+    `panel_rates`.
 
     Parameters
     ----------
@@ -91,13 +98,18 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
         length, low = multiply(rows[2, i], rows[3, i], metric[i], metric[LOW + i])
         length, _ = multiply(length, low, width[0], width[1])
         out[0, i], out[1, i] = fabs(time), fabs(length)
+        speed, _ = divide(metric[i], metric[LOW + i], rates[i], rates[LOW + i])
+        out[2, i] = GROWTHS[kind] * speed
     return True
 
 
 def panel_rates(
     formulas: BoundTape, launch: tuple[Number, Number], kind: int, panel: tuple[Pair, Pair, Pair, Pair], nodes: Array
 ) -> Array | None:
-    """Return dt/dphi in s and ds/dphi in m at the nodes of a panel; None if their errors are too large.
+    """Return dt/dphi in s, ds/dphi in m and the regular factor of the speed in m/s at the nodes of a panel; None if
+    the errors are too large.
+
+    The speed is the regular factor times sin(phi) between two turning points, and times phi from a turning point.
 
     Parameters
     ----------
@@ -114,5 +126,5 @@ def panel_rates(
     """
     lam0, v0 = launch
     given: Any = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
-    out = np.empty((2, nodes.size))
+    out = np.empty((3, nodes.size))
     return out if fill_rates(*given, kind, panel, nodes, out) else None

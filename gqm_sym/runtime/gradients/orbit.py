@@ -29,8 +29,8 @@ def requested_quantity(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """Return the error for curves that have no gradients."""
     return SolutionError(
-        "gradients: there are none along tracks of rolling bodies with a radius, of trains with losses or under many "
-        "potentials, and along curves that are known in doubles only; declare the curve by formulas"
+        "gradients: there are none along tracks of rolling bodies with a radius, of trains with losses, and along "
+        "curves that are known in doubles only; declare the curve by formulas"
     )
 
 
@@ -48,12 +48,9 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     """
     if quantity not in OF_FORCE:
         return
-    if isinstance(formulas.chart, TrackOfTrain):
-        raise SolutionError(
-            f"gradients: there are none of {quantity} of a train, whose contact force is that of a body at its middle; "
-            "those of its places and times exist"
-        )
     exact = formulas.exact
+    if isinstance(formulas.chart, TrackOfTrain):
+        exact = formulas.chart.body
     has_force = formulas.signed or isinstance(exact, ExactPotential)
     has_force = has_force or getattr(exact, "load_along_curvature", None) is not None
     if formulas.directed:

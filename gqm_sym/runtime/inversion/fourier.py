@@ -1,10 +1,10 @@
 """The place of a body on a periodic motion as a Fourier series of the phase.
 
 On a libration the place is an even function of the phase from the lower turning point. On a circulation the difference
-between the place and that of a uniform motion is periodic. Both are analytic where the curve is smooth: some tens of
-terms, or a hundred next to a separatrix, represent them to rounding. The series is summed for many times at once by
-Clenshaw's recurrence in vector registers (`clenshaw.sum_group`). Motions that would need more terms have no series and
-use the table (`records`), which takes three times as long.
+between the place and that of a uniform motion is periodic. Both are analytic where the curve is smooth, and some tens
+of terms represent them to rounding. The series is summed for many times at once by Clenshaw's recurrence in vector
+registers (`clenshaw.sum_group`). Motions that would need more terms, such as those next to a separatrix, have no series
+and use the table (`records`), which takes as long as some 60 terms.
 """
 
 from math import cos, fabs, pi, sin
@@ -21,9 +21,9 @@ from gqm_sym.runtime.compiled.types import VECTOR
 from gqm_sym.runtime.inversion.table import place_on_panel
 from gqm_sym.runtime.quadrature.time_panels import derivative
 
-# The number of nodes of the first fit, and of the last one that is tried; a larger fit would take longer than the
-# table.
-MIN_NODES, MAX_NODES = 16, 256
+# The number of nodes of the first fit, and of the last one that is tried; the terms of a larger fit would take longer
+# than the table.
+MIN_NODES, MAX_NODES = 16, 64
 
 # A fit is resolved when the last quarter of its coefficients is below this share of half the swing or of the lap, which
 # is the rounding of the nodes.

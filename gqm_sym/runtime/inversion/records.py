@@ -15,6 +15,8 @@ COSINES, SINES           Fourier coefficients of the place; none where the table
 TIMING                   the constants of `phase_angles_at`
 MIDDLES ... ENDS         the table (`table.Table`), which comes with FUNCTIONS and TIMING
 EDGES, LENGTHS, ARCS     panels of the arc length: edges, lengths there, and Legendre coefficients
+SPEEDS                   Legendre coefficients of the regular factor of the speed on the same panels; none where V**2
+                         is computed at each time
 TIME_ERRORS              error of the time on each panel
 TABLE_ERRORS, OWNERS     error of the table on each of its segments, and the panel of each segment: integers
 ======================== ===================================================================================
@@ -30,6 +32,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
+from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, nearest_whole
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
@@ -40,14 +43,14 @@ from gqm_sym.runtime.inversion.fourier import sum_wave
 from gqm_sym.runtime.inversion.table import TERMS, Table, look_up
 from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at
-from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block
+from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block, sum_block
 
 # The number of times for which states are found together.
 BLOCK = 128
 FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
-EDGES, LENGTHS, ARCS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
-SECTIONS = 19
+EDGES, LENGTHS, ARCS, SPEEDS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 20)
+SECTIONS = 20
 _STATE = types.UniTuple(types.float64, 11)
 
 
@@ -194,10 +197,11 @@ def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore
 
 
 @Inner
-def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untyped-def]
-    """Fill the phases at n times, and rows of the place within the lap, of the velocity and of its square.
+def fill_motion(record, p, t, n, phases, panels, work, found):  # type: ignore[no-untyped-def]
+    """Fill the phases at n times, the panels of the phase angles, and rows of the place within the lap, of the velocity
+    and of its square.
 
-    ``work`` is space for 4 * n numbers.
+    ``work`` is an array of 4 rows of n numbers at least.
     """
     bits, shape, launch = section(record, FUNCTIONS).view(np.int64), section(record, SHAPE), section(record, LAUNCH)
     fns, kind = Addresses(bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
@@ -205,8 +209,16 @@ def fill_motion(record, p, t, n, phases, work, found):  # type: ignore[no-untype
     integrand = Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0)))
     direction, (reduced, v, v2) = 1.0 if b > a else -1.0, (found[0], found[1], found[2])
     phase_angles_at(section(record, TIMING), kind, table_of(record), t, n, phases)
-    # The functions of a generated module take rows of exactly n numbers.
-    fill_speeds(integrand, phases.phi[:n], work.reshape(-1)[: 4 * n].reshape(4, n), v)
+    owners, speeds = section(record, OWNERS).view(np.int64), section(record, SPEEDS)
+    for i in range(n):
+        panels[i] = owners[phases.segments[i]]
+    if speeds.size:
+        sum_block(section(record, EDGES), speeds.reshape((-1, DEGREE)), phases.phi, n, panels, work, v)
+        for i in range(n):
+            v[i] *= sin(phases.phi[i]) if kind == TURN_TURN else 1.0
+    else:
+        # The functions of a generated module take rows of exactly n numbers.
+        fill_speeds(integrand, phases.phi[:n], work.reshape(-1)[: 4 * n].reshape(4, n), v)
     for i in range(n):
         launched = t[i] == 0.0
         place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * width_ratio)
@@ -245,7 +257,6 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         arcs.reshape((arcs.size // DEGREE, DEGREE)),
     )
     time_errors, table_errors = section(record, TIME_ERRORS), section(record, TABLE_ERRORS)
-    owners = section(record, OWNERS).view(np.int64)
     direction = 1.0 if shape[1] > shape[0] else -1.0
     size = min(BLOCK, end - begin)
     # Two arrays serve as all work space, because making an array for each row would take as long as finding the state
@@ -258,9 +269,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
         block, lam = t[start : start + n], out[0, start : start + n]
-        fill_motion(record, p, block, n, phases, work, motion)
-        for i in range(n):
-            panels[i] = owners[segments[i]]
+        fill_motion(record, p, block, n, phases, panels, work, motion)
         read_off_block(edges, lengths, length_terms, phi, n, panels, spare, arc)
         for i in range(n):
             s = (s_a + direction * width_ratio * arc[i]) + laps[i] * lap_length
@@ -286,13 +295,13 @@ def find_phases(record, p, t, out):  # type: ignore[no-untyped-def]
     """
     kind, timing = section(record, FUNCTIONS).view(np.int64)[5], section(record, TIMING)
     size = min(BLOCK, t.size)
-    buffer, segments = np.empty((13, size)), np.empty(size, dtype=np.int64)
+    buffer, indices = np.empty((13, size)), np.empty((2, size), dtype=np.int64)
     motion, spare = buffer[3:6], buffer[6:9]
-    phases = Phases(buffer[0], buffer[1], buffer[2], spare, segments)
+    phases = Phases(buffer[0], buffer[1], buffer[2], spare, indices[0])
     for start in range(0, t.size, BLOCK):
         n = min(BLOCK, t.size - start)
         block = t[start : start + n]
-        fill_motion(record, p, block, n, phases, buffer[9:13], motion)
+        fill_motion(record, p, block, n, phases, indices[1], buffer[9:13], motion)
         for i in range(n):
             turns = phases.laps[i]
             if kind == TURN_TURN:

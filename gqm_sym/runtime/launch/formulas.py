@@ -47,7 +47,7 @@ class ParameterValues(tuple[Number, ...]):
         The compiled functions bound to these values, once they have been asked for.
     tape : double_double.recording.BoundTape or None
         The exact formulas as a tape, once it has been asked for; False if there is none.
-    true_pieces : charts.double_double.pieces.TruePieces or None
+    true_pieces : charts.double_double.making.TruePieces or None
         A charted curve in double-double arithmetic, once it has been asked for; False if the curve is known in doubles
         only.
     columns : tuple of lists of arrays or None

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from gqm_sym.runtime.charts.double_double.pieces import TruePieces
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
 from gqm_sym.runtime.double_double.recording import BoundTape, record, record_by_coordinates
 from gqm_sym.runtime.double_double.recording import bind as bind_tape

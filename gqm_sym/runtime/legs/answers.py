@@ -1,19 +1,17 @@
 """Bodies driven along the curve by compiled code: a few legs of one body, or one number for each of many."""
 
-from math import fabs, inf, isfinite, sqrt
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.compiled.calls import call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.legs.advance import (
     DISSIPATION,
-    END_LIFTOFF_AT_ONCE,
     END_OUT_OF_DOMAIN,
     END_OVERFLOW,
     END_REST,
@@ -27,89 +25,54 @@ from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
     ENDING,
-    FROM_REST,
     HORIZON,
     LAM0,
-    LAPS,
     LAST_AT,
     LEG_BEFORE,
-    MAY_END,
-    ONLY_SIGN,
     PANEL_COUNT,
-    PAUSES,
-    PERIOD,
-    PLACE,
     SIZE,
     STATUS,
     STEP,
     TARGET,
     TOTAL,
-    TURNS,
-    V2,
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import may_be_small
 from gqm_sym.runtime.legs.frames.tiny_legs import is_tiny, slides_little
 from gqm_sym.runtime.legs.gaps.data import forget
 from gqm_sym.runtime.legs.gaps.rooms import room_for
-from gqm_sym.runtime.legs.leg_reading import passage
-from gqm_sym.runtime.legs.leg_record import (
-    AHEAD,
-    BACK,
-    BEGIN,
-    BEGIN_LOW,
-    HEADING,
-    LAPS_BEFORE,
-    PANELS,
-    PASSAGE,
-    PEAKS,
-    ROWS,
-    START,
-    START_V2,
-    TIMES,
-    USED,
-    pack,
+from gqm_sym.runtime.legs.leg_record import AHEAD, BACK, PANELS, PASSAGE, PEAKS, ROWS, TIMES, USED, pack
+from gqm_sym.runtime.legs.questions import (
+    ARRIVAL,
+    FIRST_LEGS,
+    FOUND,
+    LEAST_LOAD,
+    LEAST_SPEED,
+    LEFT,
+    LEGS,
+    RUN_AGAIN,
+    Findings,
+    after_leg,
+    at_rest,
+    conclude,
+    conclude_at_rest,
+    force_is_unbounded,
+    goes_on,
+    sought_extreme,
 )
-from gqm_sym.runtime.legs.panels.equation import forces_on
-from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load, slope_of_v2
-from gqm_sym.runtime.legs.runs.ends import (
-    END_ASYMPTOTE,
-    END_LIMIT,
-    END_RECORD_FULL,
-    END_TOO_MANY_PANELS,
-    END_TOO_NARROW,
-    END_TURN,
-)
-from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
+from gqm_sym.runtime.legs.runs.ends import END_LIMIT, END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_TURN
+from gqm_sym.runtime.legs.runs.peaks import LENGTH, SPEED
 from gqm_sym.runtime.legs.runs.rest_on_corners import predicted_rest
 from gqm_sym.runtime.legs.runs.route import Reading
 
-# The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
-# equilibrium. RUN_AGAIN means to follow a leg, or a part of it, once more for its panels.
-FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
-LEAST_LENGTH, MOST_LENGTH = 10, 11
-
 # The code for a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
 END_NEAR_EQUILIBRIUM = 14
-
-# The status of an answer; LEFT is that of a body that the loop does not decide.
-FOUND, LEFT, NONE = range(3)
-
-# On a curve without ends, the number of successive runs without a turn after which the search for an end stops.
-MAX_PAUSES = 60
-
-# The number of turns after which the search for the place of rest stops.
-MAX_TURNS = 20000
 
 # The largest number of legs of one body.
 MAX_LEGS = 250_000
 
 # The number of successive predictions of the time of rest on a corner that must agree with the one before.
 AGREEMENTS = 2
-
-# Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
-# without bound there, as at a cusp.
-UNBOUNDED_GROWTH = 1e6
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
@@ -146,129 +109,6 @@ class Track(NamedTuple):
         return dissipation.kinked and dissipation.linear and not self.breaks.size
 
 
-class Findings(NamedTuple):
-    """The findings of the legs so far.
-
-    Attributes
-    ----------
-    arrival : float
-        The time of the first arrival at the target; infinite as long as there is none.
-    peak : float
-        The largest value of the quantity, or minus the smallest.
-    """
-
-    arrival: float
-    peak: float
-
-
-@Inner
-def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
-    """Return whether the next leg has to be followed too."""
-    if body[ENDING] != 0.0 or arrival < inf:
-        return False
-    # A body that has turned at two points reaches no place outside of them any more.
-    if question == ARRIVAL and body[TURNS] >= (1.0 if body[FROM_REST] else 2.0):
-        return False
-    if isfinite(body[HORIZON]):
-        return body[ELAPSED] < body[HORIZON]
-    if question == ARRIVAL:
-        return True
-    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
-
-
-@Inner
-def sought_extreme(question):  # type: ignore[no-untyped-def]
-    """Return the function that a question is about, and 1 if it is about the largest value, -1 if about the smallest
-    one.
-    """
-    sign = 1.0 if question in (MOST_SPEED, MOST_LOAD, MOST_LENGTH) else -1.0
-    return SPEED if question < LEAST_LOAD else LOAD if question < LEAST_LENGTH else LENGTH, sign
-
-
-@Inner
-def load_at(dissipation, p, question, place, direction, v2):  # type: ignore[no-untyped-def]
-    """Return the contact force per mass, or its length, on a body at a place."""
-    point = point_buffer()
-    if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
-        point[0] = place
-        call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
-        return sqrt(point[2] + v2 * (point[3] + v2 * point[4]))
-    slope_of_v2(forces_on(dissipation, p, direction), place, v2, 0, point)
-    return point[5] + point[6] * v2
-
-
-@Inner
-def after_leg(dissipation, p, body, question, findings, record):  # type: ignore[no-untyped-def]
-    """Return the findings of the legs so far after one more leg."""
-    begin, low = record[BEGIN], record[BEGIN_LOW]
-    if question < LEAST_SPEED:
-        if question != ARRIVAL or body[ENDING] == END_LIFTOFF_AT_ONCE:
-            return findings
-        spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
-        return Findings(begin + (low + spent), findings.peak)
-    function, sign = sought_extreme(question)
-    if body[ENDING] != END_LIFTOFF_AT_ONCE:
-        until = (body[HORIZON] - begin) - low
-        forces = forces_on(dissipation, p, int(record[HEADING]))
-        return Findings(findings.arrival, peak_of_leg(forces, record, until, (function, sign), findings.peak))
-    v2 = record[START_V2]
-    if function == SPEED:
-        value = sqrt(v2)
-    else:
-        value = load_at(dissipation, p, question, record[START], int(record[HEADING]), v2)
-    return Findings(findings.arrival, max(findings.peak, sign * value))
-
-
-@Inner
-def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
-    """Return the answer for a body that stays where it is, or that the track would have to pull there at once, and its
-    status.
-    """
-    if body[ONLY_SIGN] != 0.0:
-        contact_sign = sign_of_load(forces_on(dissipation, p, 1), body[LAM0], 0.0, point_buffer())
-        if contact_sign == 0:
-            return np.nan, LEFT
-        if contact_sign != body[ONLY_SIGN] and question in (END_TIME, REST_PLACE):
-            return (0.0, FOUND) if question == END_TIME else (np.nan, NONE)
-    if question == END_TIME:
-        return (body[HORIZON], FOUND) if isfinite(body[HORIZON]) else (np.nan, NONE)
-    if question == REST_PLACE:
-        return body[LAM0], FOUND
-    if question == ARRIVAL:
-        return (0.0, FOUND) if body[TARGET] == body[LAM0] else (np.nan, NONE)
-    if question < LEAST_LOAD:
-        return 0.0, FOUND
-    return load_at(dissipation, p, question, body[LAM0], 1, 0.0), FOUND
-
-
-@Inner
-def conclude(body, question, findings):  # type: ignore[no-untyped-def]
-    """Return the answer for a body that has been followed long enough, and its status."""
-    if question == ARRIVAL:
-        is_there = findings.arrival < inf and findings.arrival <= body[HORIZON]
-        return (findings.arrival, FOUND) if is_there else (np.nan, NONE)
-    ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
-    end = min(body[HORIZON], body[ELAPSED] if ends else inf)
-    if not isfinite(end):
-        return np.nan, NONE
-    if question == END_TIME:
-        return end, FOUND
-    if question == REST_PLACE:
-        rests = body[ENDING] == END_REST and body[ELAPSED] <= body[HORIZON]
-        return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
-    if body[ENDING] == END_ASYMPTOTE:
-        return np.nan, LEFT
-    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak, FOUND
-
-
-@Inner
-def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
-    """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
-    point = point_buffer()
-    slope_of_v2(forces_on(dissipation, p, 1), body[PLACE], body[V2], 0, point)
-    return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
-
-
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
@@ -301,16 +141,6 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
             if agreements == AGREEMENTS and predicted < body[HORIZON]:
                 return conclude_at_rest(question, findings, predicted, place), FOUND
     return np.nan, LEFT
-
-
-@Inner
-def conclude_at_rest(question, findings, time, place):  # type: ignore[no-untyped-def]
-    """Return the answer for a body that comes to rest at a place after ever slower swings."""
-    if question == END_TIME:
-        return time
-    if question == REST_PLACE:
-        return place
-    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak
 
 
 @Inner

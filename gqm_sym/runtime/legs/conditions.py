@@ -9,9 +9,10 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
-from gqm_sym.runtime.legs.answers import FIRST_LEGS, Track, drive_along
+from gqm_sym.runtime.legs.answers import Track, drive_along
 from gqm_sym.runtime.legs.body import HORIZON, LAM0, LEAST_SIZE, PREFERRED, V2, launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS
+from gqm_sym.runtime.legs.questions import FIRST_LEGS
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
 # The number of panels for which a record has space in addition to one for each break; a leg with more is followed again

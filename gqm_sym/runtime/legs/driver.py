@@ -13,15 +13,7 @@ from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.ends import leaving_at_once, starting_step
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import CREEPING_SHARE, END_OUT_OF_DOMAIN, END_OVERFLOW, END_REST
-from gqm_sym.runtime.legs.answers import (
-    END_NEAR_EQUILIBRIUM,
-    LEGS,
-    MAX_PAUSES,
-    MAX_TURNS,
-    RUN_AGAIN,
-    Track,
-    drive_along,
-)
+from gqm_sym.runtime.legs.answers import END_NEAR_EQUILIBRIUM, Track, drive_along
 from gqm_sym.runtime.legs.body import (
     CONTACT_SIGN,
     DIRECTION,
@@ -73,6 +65,12 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
 )
 from gqm_sym.runtime.legs.leg_segments import Run, Runs, TurnedLegs, panelled
+from gqm_sym.runtime.legs.questions import (
+    LEGS,
+    MAX_PAUSES,
+    MAX_TURNS,
+    RUN_AGAIN,
+)
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
     END_LIMIT,

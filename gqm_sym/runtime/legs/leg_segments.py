@@ -362,7 +362,8 @@ def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float
         turn_offset=0.0 if half_c == inf else half_c / last,
         stored_panels=(*laid, 1.0, CONVERGED),
         known_edge_times=(laid[1], low_times),
-        speed_series=(last, speed_terms),
+        speed_terms=speed_terms,
+        march_end=last,
     )
 
 

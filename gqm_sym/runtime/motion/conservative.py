@@ -339,8 +339,10 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
         return middle
     # So slow a launch is next to another equilibrium, and its place is needed as exactly as it was given.
     scale = f.exact.at(DIGITS)
-    panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
-    slow = Segment(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels)
+    panels, speed_terms = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
+    slow = Segment(
+        functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels, speed_terms=speed_terms
+    )
     motion.add(slow, 1, "")
     return middle
 

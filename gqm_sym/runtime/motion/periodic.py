@@ -14,6 +14,7 @@ from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.charts.train_orbits import TrainOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.one_orbit import period_gradient
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, requested_quantity, without_formulas
@@ -77,8 +78,9 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f, problem = self._segment, self.problem.functions, self.problem
+        kind: type[ChartOrbitDerivatives] = ChartOrbitDerivatives
         if isinstance(problem.formulas.chart, TrackOfTrain):
-            problem = on_curve_of_means(problem)
+            problem, kind = on_curve_of_means(problem), TrainOrbitDerivatives
         if problem.formulas.rolling_radius or problem.true_pieces is None or problem.tape is None:
             raise without_formulas()
         passage = timing.passage_of(problem, self.kind, self.direction, self._offsets)
@@ -91,7 +93,7 @@ class PeriodicMotion(PeriodicTimes):
         if not direction:
             last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
-        return ChartOrbitDerivatives(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
+        return kind(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
     @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:
@@ -183,9 +185,7 @@ class PeriodicMotion(PeriodicTimes):
         if time is not None and known is not None and self._sampler_for(time, time) is known[0]:
             return known[0], np.array([time]), known[1], ()
         given = plain_times(t) if time is None else (np.array([time]), time, time)
-        # The speeds of some segments can be computed from their panels only.
-        from_panels = given is None or self._segment.from_multiprecision
-        sampler = None if given is None or from_panels else self._sampler_for(*given[1:])
+        sampler = None if given is None else self._sampler_for(*given[1:])
         if given is None or sampler is None:
             return None
         trajectory, shape = self._trajectory(max(-given[1], given[2])), np.shape(given[0]) if time is None else ()
@@ -227,9 +227,6 @@ class PeriodicMotion(PeriodicTimes):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        # The speeds of some segments can be computed only from their panels.
-        if self._segment.from_multiprecision:
-            return super().state(t)._replace(lam=self.lam(t))
         if time is not None:
             return self._state_at(sampler.state(time))
         return self._state_of(times[0], sampler.states(times[0].reshape(-1)))

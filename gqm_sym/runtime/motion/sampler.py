@@ -135,6 +135,7 @@ class Sampler:
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
+                records.SPEEDS: np.empty(0) if segment.speed_terms is None else segment.speed_terms,
                 records.TIME_ERRORS: errors.time_errors_of_panels(segment),
                 records.TABLE_ERRORS: errors.inversion_error(segment, both_ends).reshape(2, -1).max(axis=0),
                 records.OWNERS: owners.astype(np.int64),

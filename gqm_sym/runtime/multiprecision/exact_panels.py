@@ -1,5 +1,5 @@
-"""Panels of time and arc length laid in extended precision, for segments on which doubles cannot resolve V**2 (near a
-separatrix).
+"""Panels of time, arc length and speed laid in extended precision, for segments on which doubles cannot resolve V**2
+(near a separatrix).
 
 The panels are those of `time_panels`, but the integrands at their nodes are accurate to the last bit. They are computed
 in double-double arithmetic, or with mpmath if too many of its digits cancel.
@@ -15,7 +15,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.panel_rates import panel_rates
 from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem, two_doubles
 from gqm_sym.runtime.quadrature.kronrod import KRONROD_WEIGHTS, NODES
-from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
     CONVERGED,
     COUNT,
@@ -67,7 +67,9 @@ def exact_ends(
 
 
 class _Rates:
-    """The integrands of time and arc length at the nodes of panels of one segment, accurate to the last bit."""
+    """The integrands of time and arc length, and the speed, at the nodes of panels of one segment, accurate to the last
+    bit.
+    """
 
     def __init__(self, exact: ExactProblem, kind: int, ends: tuple[Any, Any]) -> None:
         self.scale, self.kind, self.ends = exact.at(DIGITS), kind, ends
@@ -75,7 +77,7 @@ class _Rates:
         self.segment = two_doubles(ends[0]), two_doubles(ends[1] - ends[0])
 
     def __call__(self, middle: Any, reach: Any) -> Array:
-        """Return dt/dphi and ds/dphi as two rows."""
+        """Return rows of dt/dphi, ds/dphi and the regular factor of the speed, as `panel_rates`."""
         values = None
         if self.tape is not None:
             panel = *self.segment, two_doubles(middle), two_doubles(reach)
@@ -83,10 +85,12 @@ class _Rates:
         return self._by_mpmath(middle, reach) if values is None else values
 
     def _by_mpmath(self, middle: Any, reach: Any) -> Array:
-        rate, values = self.scale.time_rate(self.kind, *self.ends), np.empty((2, COUNT))
+        rate, values = self.scale.time_rate(self.kind, *self.ends), np.empty((3, COUNT))
+        growth = {TURN_TURN: self.scale.context.sin, FROM_TURN: self.scale.mpf, REGULAR: lambda _: 1}[self.kind]
         for i, x in enumerate(ALL_NODES.tolist()):
+            phi = middle + reach * x
             try:
-                duration, w = rate(middle + reach * x)
+                duration, w = rate(phi)
             except ZeroDivisionError:  # V**2 is zero to this number of digits
                 duration = w = self.scale.mpf(0)
             if duration.imag or w.imag or not (duration > 0 and w > 0):
@@ -94,12 +98,13 @@ class _Rates:
                     f"time of flight from {float(self.ends[0])!r} to {float(self.ends[1])!r}: V**2 is not positive "
                     f"inside this segment, as far as {DIGITS} digits tell; launch a little farther from the equilibrium"
                 )
-            values[:, i] = float(duration), float(duration * self.scale.sqrt(w))
+            speed = self.scale.sqrt(w)
+            values[:, i] = float(duration), float(duration * speed), float(speed / growth(phi))
         return values
 
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium")
-def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Panels:
+def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> tuple[Panels, Array]:
     """Lay panels over a segment in extended precision.
 
     Parameters
@@ -113,6 +118,13 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     stop : float
         Its last phase angle.
 
+    Returns
+    -------
+    Panels
+        Its panels.
+    (n, DEGREE) array
+        The Legendre coefficients of the regular factor of the speed on each of them.
+
     Raises
     ------
     SolutionError
@@ -121,7 +133,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     scale, rates_on = exact.at(DIGITS), _Rates(exact, kind, ends)
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
-    time_terms, length_terms = [], []
+    all_terms = []
     # The last phase angle is pi itself and not its nearest double, because near a barrier the body takes a long time
     # for the difference.
     end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
@@ -135,10 +147,16 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         high = end if right == stop else scale.mpf(right)
         reach, middle = (high - left) / 2, (high + left) / 2
         half, values = float(reach), rates_on(middle, reach)
-        c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
-        length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])
-        size, tail, _ = antiderivative(values[0], half, c, terms[0])
-        resolved = tail <= MAX_TAIL_RATIO * size and length_tail <= 10.0 * MAX_TAIL_RATIO * length_size
+        series, terms = np.empty(DEGREE + 1), np.empty((3, DEGREE))
+        speed_size, speed_tail, _ = antiderivative(values[2], half, series, terms[2])
+        terms[2] = series[:DEGREE]
+        length_size, length_tail, _ = antiderivative(values[1], half, series, terms[1])
+        size, tail, _ = antiderivative(values[0], half, series, terms[0])
+        resolved = (
+            tail <= MAX_TAIL_RATIO * size
+            and length_tail <= 10.0 * MAX_TAIL_RATIO * length_size
+            and speed_tail <= 10.0 * MAX_TAIL_RATIO * speed_size
+        )
         time, length = half * (weights @ values[0]), half * (weights @ values[1])
         resolved = resolved or (time <= NEGLIGIBLE_SHARE * times[-1] and length <= NEGLIGIBLE_SHARE * lengths[-1])
         if not resolved and half > 2.0**-50 * right:
@@ -154,16 +172,17 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         edges.append(float(right))
         times.append(times[-1] + float(time))
         lengths.append(lengths[-1] + float(length))
-        time_terms.append(terms[0])
-        length_terms.append(terms[1])
+        all_terms.append(terms)
         left = pending.pop()
-    return Panels(
+    time_terms, length_terms, speed_terms = np.moveaxis(np.array(all_terms), 1, 0)
+    panels = Panels(
         np.array(edges),
         np.array(times),
         np.array(lengths),
-        np.array(time_terms),
-        np.array(length_terms),
+        np.ascontiguousarray(time_terms),
+        np.ascontiguousarray(length_terms),
         error / times[-1] + 2.3e-16,
         1.0,
         status,
     )
+    return panels, np.ascontiguousarray(speed_terms)

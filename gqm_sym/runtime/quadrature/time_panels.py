@@ -297,8 +297,11 @@ def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
-    """Evaluate `read_off` at n phase angles on known panels, in vector registers; ``work`` has three rows of n."""
+def sum_block(edges, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the sums of the panels' Legendre series at n phase angles on known panels, in vector registers.
+
+    ``work`` has three rows of n.
+    """
     x, high, low = work[0], work[1], work[2]
     for i in range(n):
         left, half = edges[panels[i]], 0.5 * (edges[panels[i] + 1] - edges[panels[i]])
@@ -309,7 +312,15 @@ def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ign
             new = terms[panels[i], k] + growth * x[i] * high[i] - decay * low[i]
             low[i], high[i] = high[i], new
     for i in range(n):
-        out[i] = marks[panels[i]] + (terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i])
+        out[i] = terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i]
+
+
+@Inner
+def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
+    """Evaluate `read_off` at n phase angles on known panels, in vector registers; ``work`` has three rows of n."""
+    sum_block(edges, terms, phi, n, panels, work, out)
+    for i in range(n):
+        out[i] += marks[panels[i]]
 
 
 PANELS_TYPE = types.NamedTuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64), Panels)

@@ -6,6 +6,7 @@ from math import inf, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import not_given
 from gqm_sym.errors import InputError, ParameterError
@@ -64,15 +65,15 @@ def check_launches(v0: Array, direction: Array) -> None:
         raise InputError("direction: must be 1 or -1 (the sign of ds/dt at launch)")
 
 
-def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
-    """Refuse parameters for which the closed forms do not hold, and those below the lower limits of the model."""
+def refused(formulas: "Formulas", columns: dict[str, Array]) -> Iterator[tuple[NDArray[np.bool_], str]]:
+    """Yield which parameters are refused, because the closed forms do not hold for them or because they are below a
+    lower limit of the model, and why.
+    """
     for name in (*formulas.positive, "m"):
-        if (columns[name] <= 0.0).any():
-            raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
+        yield columns[name] <= 0.0, f"{name}: must be positive; the closed forms hold for {name} > 0"
     for name, lower in formulas.at_least:
         bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
-        if (columns[name] < bound).any():
-            raise ParameterError(f"{name}: must be at least {lower}")
+        yield columns[name] < bound, f"{name}: must be at least {lower}"
 
 
 def columns_of(
@@ -91,7 +92,9 @@ def columns_of(
         columns: tuple[list[Array], list[Array]] = numbers.columns
         return columns
     named = {name: as_doubles(value, name) for value, name in zip(given, formulas.parameters, strict=True)}
-    _check(formulas, named)
+    for wrong, message in refused(formulas, named):
+        if wrong.any():
+            raise ParameterError(message)
     broadcast_shape({**launches, **named})
     p = list(named.values())
     if formulas.trigonometric is not None:

@@ -20,7 +20,8 @@ from gqm_sym.runtime.compiled.strided import (
 )
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import ONLY_SIGN
-from gqm_sym.runtime.legs import answers as legs
+from gqm_sym.runtime.legs import questions
+from gqm_sym.runtime.legs.answers import Track, drive_along
 from gqm_sym.runtime.legs.body import SIZE, STATUS, VALUE
 from gqm_sym.runtime.legs.leg_record import COLUMNS
 from gqm_sym.runtime.sweep import quantities
@@ -35,13 +36,13 @@ MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
 # The question to the driver for each quantity, by its name. Motions that lose energy have no period.
 QUESTIONS = {
-    "t_end": legs.END_TIME,
-    "rest_position": legs.REST_PLACE,
-    "time_at": legs.ARRIVAL,
-    "v_min": legs.LEAST_SPEED,
-    "v_max": legs.MOST_SPEED,
-    "normal_force_min": legs.LEAST_LOAD,
-    "normal_force_max": legs.MOST_LOAD,
+    "t_end": questions.END_TIME,
+    "rest_position": questions.REST_PLACE,
+    "time_at": questions.ARRIVAL,
+    "v_min": questions.LEAST_SPEED,
+    "v_max": questions.MOST_SPEED,
+    "normal_force_min": questions.LEAST_LOAD,
+    "normal_force_max": questions.MOST_LOAD,
 }
 
 
@@ -51,7 +52,7 @@ class Question(NamedTuple):
     Attributes
     ----------
     question : int
-        A code of `legs.answers`.
+        A code of `legs.questions`.
     horizon : float
         The last time in s, infinite if there is none.
     only_sign : int
@@ -73,7 +74,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
         # The rows of a leg hold the length of the contact force, or the module has its square.
         if loss.squared_contact is None and (loss.linear or formulas.sided or formulas.directed):
             return None
-        question = legs.LEAST_LENGTH if question == legs.LEAST_LOAD else legs.MOST_LENGTH
+        question = questions.LEAST_LENGTH if question == questions.LEAST_LOAD else questions.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
     return Question(question, horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 
@@ -81,7 +82,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
 def answer_driven(
     formulas: "Formulas",
     asked: Question,
-    track: legs.Track,
+    track: Track,
     columns: list[Array],
     answers: Answers,
     part: slice,
@@ -114,16 +115,16 @@ def answer_driven(
         for k, column in enumerate(launches):
             bodies[:, k] = column
         rows = _rows(some[PARAMETERS:], track.chart)
-        legs.drive_along(track, dissipation, rows, asked.question, bodies, record)
+        drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
-        if asked.question >= legs.LEAST_LOAD:
+        if asked.question >= questions.LEAST_LOAD:
             values *= some[mass]
         status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
-        without = ended != legs.FOUND
+        without = ended != questions.FOUND
         if without.any():
-            none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
+            none = quantities.NEVER_THERE if asked.question == questions.ARRIVAL else quantities.NOT_PERIODIC
             values[without], status[without] = nan, none
-            decided = ended != legs.LEFT
+            decided = ended != questions.LEFT
             values, status = values[decided], status[decided]
             chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]
         there = slice(None) if chosen is None else chosen

@@ -12,8 +12,8 @@ from numba import types
 from paths import ROOT
 
 from gqm_sym.loading import load
-from gqm_sym.runtime.compiled import emitted, jit, uncompiled
-from gqm_sym.runtime.compiled.uncompiled import begin_launch
+from gqm_sym.runtime.compiled import emitted, jit, trial
+from gqm_sym.runtime.compiled.trial import begin_launch
 from gqm_sym.runtime.interface import INTERFACE
 
 # The launches in which Python may run a function; the suite as a whole allows more.
@@ -122,7 +122,7 @@ def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Compiler:
     """Return a compiler whose functions give 7, and which no time in Python calls, however slow the machine is."""
     compiler = _Compiler(tmp_path / "launches")
     monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", math.inf)
-    monkeypatch.setattr(uncompiled, "MAX_LAUNCHES", MAX_LAUNCHES)
+    monkeypatch.setattr(trial, "MAX_LAUNCHES", MAX_LAUNCHES)
     monkeypatch.setattr(jit, "COMPILER", compiler)
     monkeypatch.setattr(emitted, "_IN_USE", {})
     return compiler

@@ -22,7 +22,8 @@ from gqm_sym.runtime.compiled import jit, threads, uncompiled
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
-from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry, Trial
+from gqm_sym.runtime.compiled.trial import TooSlowError, Trial
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
 from gqm_sym.runtime.vocabulary import HOMES
 
 
@@ -244,7 +245,7 @@ def test_threads_keep_what_they_write_into_one_array(monkeypatch: pytest.MonkeyP
     def give_up() -> None:
         begun.set()
         written.wait()
-        raise uncompiled.TooSlowError
+        raise TooSlowError
 
     def compiled(function: Any, *_: Any, **__: Any) -> Any:
         return lambda out, begin, end: out.__setitem__(slice(begin, end), begin + 1.0)

@@ -23,8 +23,9 @@ from gqm_sym.runtime.compiled.intrinsics import (
 from gqm_sym.runtime.compiled.registers import borrowed, copied, on_stack, over_rows
 from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.strided import element, fill_row, pointers
+from gqm_sym.runtime.compiled.trial import Trial
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.compiled.uncompiled import PlainEntry, Trial
+from gqm_sym.runtime.compiled.uncompiled import PlainEntry
 from gqm_sym.runtime.double_double.arithmetic import series
 
 RNG = np.random.default_rng(11)

@@ -5,8 +5,9 @@ from numba import types
 
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.series_rows import series_rows
+from gqm_sym.runtime.compiled.trial import Trial
 from gqm_sym.runtime.compiled.types import VECTOR
-from gqm_sym.runtime.compiled.uncompiled import PlainEntry, Trial
+from gqm_sym.runtime.compiled.uncompiled import PlainEntry
 
 WIDTH, COUNT = 24, 23
 fill = series_rows(WIDTH, COUNT)

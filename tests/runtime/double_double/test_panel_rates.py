@@ -41,7 +41,9 @@ def rates(motion: Any, kind: int, ends: tuple[Any, Any], panel: tuple[Any, Any])
 @given(amplitude=st.floats(0.01, 3.1), low=st.floats(0.01, 0.98), width=st.floats(1e-6, 1.0))
 @examples(40)
 def test_the_last_bit(name: str, amplitude: float, low: float, width: float, circle: ModuleType) -> None:
-    """Each rate is the double nearest to that with V**2 = 2 g (cos lam - cos amplitude) and ds = dlam."""
+    """Each rate is the double nearest to that with V**2 = 2 g (cos lam - cos amplitude) and ds = dlam, and so is the
+    regular factor of the speed.
+    """
     motion, kind = circle.solve(lam0=amplitude, L=1), KINDS[name]
     with mp.workdps(60):
         a, b = -mpf(amplitude), mpf(amplitude) if kind == TURN_TURN else mpf(amplitude) / 3
@@ -55,8 +57,8 @@ def test_the_last_bit(name: str, amplitude: float, low: float, width: float, cir
             share = {TURN_TURN: mp.sin(phi / 2) ** 2, FROM_TURN: phi**2, REGULAR: phi}[kind]
             slope = {TURN_TURN: mp.sin(phi) / 2, FROM_TURN: 2 * phi, REGULAR: mpf(1)}[kind]
             speed = mp.sqrt(2 * G * (mp.cos(a + (b - a) * share) - mp.cos(amplitude)))
-            length = (b - a) * slope
-            for value, wanted in zip(found[:, i], (length / speed, length), strict=True):
+            length, growth = (b - a) * slope, {TURN_TURN: mp.sin(phi), FROM_TURN: phi, REGULAR: mpf(1)}[kind]
+            for value, wanted in zip(found[:, i], (length / speed, length, speed / growth), strict=True):
                 assert abs(mpf(float(value)) - wanted) <= mpf(np.spacing(float(wanted))) * mpf("0.75")
 
 

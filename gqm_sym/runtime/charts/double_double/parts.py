@@ -8,12 +8,12 @@ from numba import types
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, plus
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.double_double.offset_path import fill_path
 from gqm_sym.runtime.charts.double_double.pieces import (
     SHARE,
     TRUE_CURVE,
     TrueCurve,
-    TruePieces,
     place_at,
     stacked_places,
     stacked_points,

@@ -10,7 +10,13 @@ from numba import types
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
-from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, TruePieces, arc_between, place_at, unshared
+from gqm_sym.runtime.charts.double_double.making import TruePieces
+from gqm_sym.runtime.charts.double_double.pieces import (
+    TRUE_CURVE,
+    arc_between,
+    place_at,
+    unshared,
+)
 from gqm_sym.runtime.charts.double_double.potential import Path
 from gqm_sym.runtime.charts.double_double.times import time_on_piece
 from gqm_sym.runtime.charts.double_double.turning_points import (

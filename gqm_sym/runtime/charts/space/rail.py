@@ -22,7 +22,7 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, divided, summed
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, assemble_in_space
-from gqm_sym.runtime.charts.double_double.pieces import TruePieces
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.rail import MAX_MISMATCH, MAX_TOTAL_TURN
 from gqm_sym.runtime.charts.space.true_rail import (
     PIECE_NUMBERS,

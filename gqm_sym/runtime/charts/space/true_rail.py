@@ -10,7 +10,8 @@ from numba import types
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts import rail
 from gqm_sym.runtime.charts.chart import Chart
-from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, NODES, Samples, sample_places, starting_context
+from gqm_sym.runtime.charts.double_double.making import Samples, sample_places, starting_context
+from gqm_sym.runtime.charts.double_double.pieces import IN_SAMPLES, NODES
 from gqm_sym.runtime.charts.exact_parts import samples_between
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array

@@ -8,9 +8,9 @@ bodies along charts is known of the times of trains. The contact force on the ot
 The polynomials of the means are taken as they are in the chart of the train, so that results have the accuracy of
 doubles.
 
-A potential with a single part leaves a coordinate for the derivative of its mean with respect to the length of the
-train, whose factor is the difference from the given length. So derivatives with respect to the length are those with
-respect to the strength of a force.
+Derivatives with respect to parameters that shape the means, as the length of the train does, follow from the change of
+the potential along the track (`trains`). If the potential has more parts than there are coordinates, the whole of it is
+the one coordinate, and all parameters shape it.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,14 +27,19 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import Pair, two_sum
 from gqm_sym.runtime.charts.chart import Chart, SpaceChart
-from gqm_sym.runtime.charts.double_double.pieces import NODES, Samples, TruePieces, sample_places, starting_context
+from gqm_sym.runtime.charts.double_double.making import (
+    Samples,
+    TruePieces,
+    sample_places,
+    starting_context,
+)
+from gqm_sym.runtime.charts.double_double.pieces import NODES
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.emitted import RunByPython
-from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, square_root
-from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.interface import PATH_IN_SPACE, SPACE_ROWS, ExactPotential
 from gqm_sym.runtime.launch.formulas import ParameterValues, chart_with, shape_of
 from gqm_sym.runtime.launch.problem import Problem
@@ -46,9 +51,6 @@ MAX_SLOPE = 0.5
 # A curve in space has one coordinate without a force and two with one.
 MOST_MEANS = 2
 
-# This stands for the derivative of the first mean with respect to the length of the train.
-BY_LENGTH = -1
-
 
 def on_curve_of_means(problem: Problem) -> Problem:
     """Return the launch of a body whose times are those of a train.
@@ -57,27 +59,23 @@ def on_curve_of_means(problem: Problem) -> Problem:
     ----------
     problem : Problem
         The launch of a train.
-
-    Raises
-    ------
-    SolutionError
-        If its potential has too many parts.
     """
     formulas, values = problem.formulas, tuple(problem.p.values.tolist())
     train = formulas.chart
     assert isinstance(train, TrackOfTrain)
     means = _means_of(train, len(values))
     chart = chart_with(train, values)
-    records = _all_records(train, chart, values, means)
+    records = _coordinates_of(train, chart, values, means, formulas.inertia)
     steepest = (float(np.abs(record[:, 6 + 2 * TERMS : 6 + 3 * TERMS]).sum(axis=1).max()) for record in records)
     scales = tuple(2.0 ** (frexp(slope / MAX_SLOPE)[1]) if slope else 1.0 for slope in steepest)
-    curve = CurveOfMeans(train, means, scales, shape_of(train, values, 1.0))
-    potential = _Potential(train, formulas.inertia, means, scales, values[train.length])
+    given = shape_of(train, values, 1.0) if means else values
+    curve = CurveOfMeans(train, means, scales, formulas.inertia, given)
+    potential = _Potential(train, formulas.inertia, means, scales)
     other = replace(
         formulas,
         chart=curve,
         exact=ExactPotential(potential),
-        path_in_space=_path_in_space() if len(means) > 1 else None,
+        path_in_space=path_not_asked_for() if len(means) > 1 else None,
     )
     p = ParameterValues(problem.p)
     p.values, p.conditions = problem.p.values, {}
@@ -85,7 +83,7 @@ def on_curve_of_means(problem: Problem) -> Problem:
 
 
 @lru_cache(maxsize=1)
-def _path_in_space() -> RunByPython:
+def path_not_asked_for() -> RunByPython:
     """Return the function for y and the contact force on the other curve, which are not asked for."""
 
     def zeros(n: int, _places: int, _speeds: int, _v: float, _p: int, out: int) -> None:
@@ -95,30 +93,51 @@ def _path_in_space() -> RunByPython:
 
 
 def _means_of(train: TrackOfTrain, parameters: int) -> tuple[int, ...]:
-    """Return the numbers of the means that the potential has: 0 for the height, then those of other parts. If there is
-    only one, `BY_LENGTH` follows.
+    """Return the numbers of the means that are coordinates: 0 for the height, then those of other parts; none if there
+    are too many.
     """
     _, gravity, _, _, *factors = train.numbers(FLOATS, (nan,) * parameters)
     means = tuple(range(0 if gravity != 0 else 1, len(factors) + 1))
-    if len(means) > MOST_MEANS:
-        raise without_formulas()
-    return means if len(means) == MOST_MEANS else (*means, BY_LENGTH)
+    return means if len(means) <= MOST_MEANS else ()
 
 
-def _all_records(train: TrackOfTrain, chart: Chart, values: tuple[float, ...], means: tuple[int, ...]) -> list[Array]:
-    """Return the records of the pieces of the charts of means (`charts.evaluate`)."""
+def _coordinates_of(
+    train: TrackOfTrain,
+    chart: Chart,
+    values: tuple[float, ...],
+    means: tuple[int, ...],
+    inertia: Callable[..., Any] | None,
+) -> list[Array]:
+    """Return the means that are coordinates, or the whole effective potential, as records of charts."""
     size = int(chart.block[0])
     start = size * (3 + chart.banked if isinstance(chart, SpaceChart) else 1)
-    found = []
-    for mean in means:
-        block = chart.block[start + max(mean, 0) * int(chart.block[start]) :]
-        if mean == BY_LENGTH:
-            of_mean = chart.block[start + EDGES : start + EDGES + int(chart.block[start + 1]) + 1]
-            block = train.change_of_mean(chart, values, means[0], of_mean)
-        count = int(block[1])
-        first = EDGES + 3 * count + 2
-        found.append(block[first : first + count * RECORD].reshape(count, RECORD))
-    return found
+    step, factors = int(chart.block[start]), _factors(train, inertia, FLOATS, values)
+    found = [records_in(chart.block[start + mean * step :]) for mean in (means or range(len(factors)))]
+    return found if means else [sum_of_records(list(zip(factors, found, strict=True)))]
+
+
+def _factors(train: TrackOfTrain, inertia: Callable[..., Any] | None, op: Any, p: Any) -> list[Any]:
+    """Return the factors of all means in the effective potential."""
+    _, gravity, _, _, *others = train.numbers(op, p)
+    one_plus_beta = 1 if inertia is None else inertia(op, p)
+    return [factor / one_plus_beta for factor in (gravity, *others)]
+
+
+def records_in(block: Array) -> Array:
+    """Return the records of the pieces in the block of a chart (`charts.evaluate`)."""
+    count = int(block[1])
+    first = EDGES + 3 * count + 2
+    return block[first : first + count * RECORD].reshape(count, RECORD)
+
+
+def sum_of_records(parts: Sequence[tuple[float, Array]]) -> Array:
+    """Return the sum of functions, each times a factor, that are given by records of charts on the same pieces."""
+    total = parts[0][1].copy()
+    total[:, 6:] = sum(factor * records[:, 6:] for factor, records in parts)
+    wide = sum(factor * records[:, 4].astype(np.longdouble) + factor * records[:, 5] for factor, records in parts)
+    total[:, 4] = wide
+    total[:, 5] = wide - total[:, 4]
+    return total
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,24 +154,18 @@ class _Potential:
         The numbers of the means that are the coordinates z and y.
     scales : tuple of float
         The means over these coordinates.
-    length : float
-        The length of the train.
     """
 
     train: TrackOfTrain
     inertia: Callable[..., Any] | None
     means: tuple[int, ...]
     scales: tuple[float, ...]
-    length: float
 
     def __call__(self, op: Any, *arguments: Any) -> tuple[Any, ...]:
         *coordinates, p = arguments
-        _, gravity, _, _, *others = self.train.numbers(op, p)
-        inertia = 1 if self.inertia is None else self.inertia(op, p)
-        factors = [(gravity, *others)[mean] for mean in self.means if mean != BY_LENGTH]
-        if BY_LENGTH in self.means:
-            factors.append(factors[0] * (p[self.train.length] - op.mpf(self.length)))
-        slopes = [factor * scale / inertia for factor, scale in zip(factors, self.scales, strict=True)]
+        factors = _factors(self.train, self.inertia, op, p)
+        chosen = [factors[mean] for mean in self.means] or [op.mpf(1)]
+        slopes = [factor * scale for factor, scale in zip(chosen, self.scales, strict=True)]
         value = sum((slope * place for slope, place in zip(slopes, reversed(coordinates[1:]), strict=True)), op.mpf(0))
         return value, op.mpf(0), *reversed(slopes)
 
@@ -163,29 +176,23 @@ class CurveOfMeans:
 
     Attributes
     ----------
-    train, means, scales
+    train, means, scales, inertia
         As `_Potential` has them.
-    shape : tuple of float
-        The values of the parameters for which the curve is made; there are no neighbouring curves.
+    given : tuple of float
+        The values of the run-time parameters for which the curve is made, as far as it depends on them; there are no
+        neighbouring curves.
     """
 
     train: TrackOfTrain
     means: tuple[int, ...]
     scales: tuple[float, ...]
-    shape: tuple[float, ...]
+    inertia: Callable[..., Any] | None
+    given: tuple[float, ...]
 
     @property
     def shaped_by(self) -> tuple[int, ...] | None:
-        """The run-time parameters that the chart depends on, by their place; None if that is not known."""
-        return self.train.shaped_by
-
-    @property
-    def moved_by(self) -> tuple[int, ...] | None:
-        """Those on which the potential does not depend instead of the chart."""
-        shaped = self.shaped_by
-        if shaped is None or BY_LENGTH not in self.means:
-            return shaped
-        return tuple(index for index in shaped if index != self.train.length)
+        """The run-time parameters that the curve depends on, by their place; None if that is not known."""
+        return self.train.shaped_by if self.means else None
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Return the chart of the train."""
@@ -201,9 +208,10 @@ class CurveOfMeans:
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
         """Return the curve in double-double arithmetic; None for other values of the parameters that shape it."""
-        if shape_of(self.train, tuple(number.value for number in p), 1.0) != shape_of(self.train, self.shape, 1.0):
+        values = tuple(number.value for number in p)
+        if shape_of(self, values, 1.0) != shape_of(self, self.given, 1.0):
             return None
-        records = _all_records(self.train, chart, tuple(number.value for number in p), self.means)
+        records = _coordinates_of(self.train, chart, values, self.means, self.inertia)
         return _Pieces(chart, _sampler(chart, records, self.scales), in_space=len(self.means) > 1)
 
 
@@ -214,6 +222,23 @@ class _Pieces(TruePieces):
     def start_length(self) -> Pair:
         """The arc length from the left edge of the piece ``begin`` to arc length 0."""
         return -float(self.curve.edges[self.begin]), 0.0
+
+
+@Inner
+def value_on(record, s, s_low):  # type: ignore[no-untyped-def]
+    """Return a function and its slope at a place, two doubles each, from the record of a piece of its chart."""
+    u, u_low = add(s, s_low, -record[0], 0.0)
+    u, u_low = multiply(u, u_low, record[1], 0.0)
+    value, value_low, slope, slope_low = 0.0, 0.0, 0.0, 0.0
+    for j in range(TERMS - 1, -1, -1):
+        slope, slope_low = multiply(slope, slope_low, u, u_low)
+        slope, slope_low = add(slope, slope_low, value, value_low)
+        value, value_low = multiply(value, value_low, u, u_low)
+        value, value_low = add(value, value_low, record[6 + TERMS + j], 0.0)
+    whole, whole_low = two_sum(record[4], record[5])
+    value, value_low = add(value, value_low, whole, whole_low)
+    slope, slope_low = multiply(slope, slope_low, record[1], 0.0)
+    return value, value_low, slope, slope_low
 
 
 @entry(types.void(MATRIX, VECTOR, REAL, REAL, MATRIX, types.float64[:, :, ::1], types.float64[:, :, ::1]))
@@ -244,19 +269,10 @@ def fill_samples(records, scales, low, high, nodes, integrals, samples):  # type
         rate, rate_low = 1.0, 0.0
         for row in range(records.shape[0]):
             record = records[row]
-            u, u_low = add(s, s_low, -record[0], 0.0)
-            u, u_low = multiply(u, u_low, record[1], 0.0)
-            value, value_low, slope, slope_low = 0.0, 0.0, 0.0, 0.0
-            for j in range(TERMS - 1, -1, -1):
-                slope, slope_low = multiply(slope, slope_low, u, u_low)
-                slope, slope_low = add(slope, slope_low, value, value_low)
-                value, value_low = multiply(value, value_low, u, u_low)
-                value, value_low = add(value, value_low, record[6 + TERMS + j], 0.0)
-            whole, whole_low = two_sum(record[4], record[5])
-            value, value_low = add(value, value_low, whole, whole_low)
+            value, value_low, slope, slope_low = value_on(record, s, s_low)
             # The scales are powers of 2.
             samples[1 + row, 0, i], samples[1 + row, 1, i] = value / scales[row], value_low / scales[row]
-            slope, slope_low = multiply(slope / scales[row], slope_low / scales[row], record[1], 0.0)
+            slope, slope_low = slope / scales[row], slope_low / scales[row]
             slope, slope_low = multiply(slope, slope_low, slope, slope_low)
             rate, rate_low = add(rate, rate_low, -slope, -slope_low)
         rates[0, i], rates[1, i] = square_root(rate, rate_low)

@@ -13,6 +13,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.double_double.passage import ChartPassage
 from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
@@ -40,7 +41,7 @@ from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_p
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
 from gqm_sym.runtime.gradients.panels import Panels, resolved
-from gqm_sym.runtime.gradients.path import ASIDE, PathRows, squared_force
+from gqm_sym.runtime.gradients.path import ASIDE, PRODUCT, PathRows, squared_force
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.gradients.series import PanelSeries
 from gqm_sym.runtime.interface import ExactPotential
@@ -87,6 +88,14 @@ def source_along(problem: Problem) -> ChartSource:
     return kind(exact.effective_potential, *of_module, exact.coriolis)
 
 
+def path_along(source: ChartSource, shape: ShapedPieces, parameters: Array, lam: Array) -> PathRows:
+    """Return `path_rows` at arc lengths, with derivatives at the points of the curve."""
+    path = shape.path(shape.places(lam))
+    program = space_path_program(source) if isinstance(source, SpaceSource) else chart_path_program(source)
+    found = values(program, parameters, path[0], None, *path[1:], parts=1)
+    return PathRows(found.reshape(-1, source.parameters + 2, lam.size))
+
+
 class ChartOrbitDerivatives(OrbitDerivatives):
     """A libration or circulation along a chart, with derivatives with respect to all variables.
 
@@ -109,10 +118,10 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         pieces, launch = problem.true_pieces, problem.launch
         assert pieces is not None
         self.direction, self._edges, self._passage = direction, edges, passage
-        self.source = source_along(problem)
+        self.source = self._source_along(problem)
         chart = problem.formulas.chart
         self._shaped_by = {*self.source.shaping, *((chart and chart.shaped_by) or ())}
-        self._shape = ShapedPieces(problem, pieces, self.source.shaping)
+        self._shape = self._shaped(problem, pieces)
         self._found = passage.found
         numbers = [
             (n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in (*problem.p, launch.lam0, launch.v0)
@@ -124,6 +133,12 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         point = self._shape.coordinates(start)[:, 0].reshape(-1, 2)
         given = [(high, low, UNIT * abs(high)) for high, low in point.tolist()]
         self._inputs = np.hstack([self.variables, pairs(*given), pairs(*((s, 0.0, 0.0) for s in self._shifts))])
+
+    def _source_along(self, problem: Problem) -> ChartSource:
+        return source_along(problem)
+
+    def _shaped(self, problem: Problem, pieces: TruePieces) -> ShapedPieces:
+        return ShapedPieces(problem, pieces, self.source.shaping)
 
     @property
     def launch_changes(self) -> Array:
@@ -300,11 +315,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
 
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` at arc lengths, with derivatives at the points of the curve."""
-        path = self._shape.path(self._shape.places(lam))
-        in_space = isinstance(self.source, SpaceSource)
-        program = space_path_program(self.source) if in_space else chart_path_program(self.source)
-        found = values(program, self.parameters, path[0], None, *path[1:], parts=1)
-        return PathRows(found.reshape(-1, self.source.parameters + 2, lam.size))
+        return path_along(self.source, self._shape, self.parameters, lam)
 
     def extreme_rows(self, place: Array, *, of_speed: bool, direction: int = 1) -> Array:
         """Return the rows of `OrbitDerivatives.extreme_rows` at the points of the curve; the second derivative is a
@@ -322,7 +333,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
             force.append(2.0 * (rows[1] * mass_curvature[0] + rows[0] * mass_curvature[-1]) + load[-1])
             partials = [np.vstack([row[1:-1], by_variables]) for row in (mass_curvature, load)]
             of_variables = 2.0 * (rows[2:] * mass_curvature[0] + rows[0] * partials[0]) + partials[1]
-            if isinstance(self.source, SpaceSource):
+            if len(path.rows) > PRODUCT:
                 force, of_variables = _length_rows(path, rows, direction)
             rows = np.vstack([*force, of_variables])
         here, before, after = np.moveaxis(rows.reshape(len(rows), 3, place.size), 1, 0)

@@ -15,6 +15,7 @@ from numpy.polynomial.chebyshev import cheb2poly
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
 from gqm_sym.runtime.charts.chart import ChartMaker
+from gqm_sym.runtime.charts.double_double.making import TruePieces, chebyshev_fit, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
     DY,
@@ -22,15 +23,12 @@ from gqm_sym.runtime.charts.double_double.pieces import (
     IN_SAMPLES,
     NODES,
     TRUE_CURVE,
-    TruePieces,
     X,
     Y,
     Z,
-    chebyshev_fit,
     fill_points,
     is_in_space,
     place_at,
-    sample_places,
     stacked_places,
     stacked_points,
     unshared,
@@ -106,8 +104,7 @@ def shaping_of(formulas: Formulas) -> tuple[int, ...]:
     known.
     """
     assert formulas.chart is not None
-    # The potential of a train may take over the dependence on its length (`means`).
-    shaped_by = getattr(formulas.chart, "moved_by", formulas.chart.shaped_by)
+    shaped_by = formulas.chart.shaped_by
     return tuple(range(len(formulas.parameters))) if shaped_by is None else shaped_by
 
 

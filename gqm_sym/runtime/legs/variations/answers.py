@@ -109,9 +109,9 @@ def points_of(found: PhasePoints, v: Array) -> MarchPoints:
     """
     half, w = np.empty(v.size, dtype=np.int64), np.empty(v.size)
     for timed, here, phi in found.segments:
-        if timed.segment.speed_series is None:
+        if timed.segment.march_end is None:
             raise SolutionError(NEAR_EQUILIBRIUM)
-        half[here], w[here] = 2 * timed.leg + (timed.sense < 0), phi * timed.segment.speed_series[0]
+        half[here], w[here] = 2 * timed.leg + (timed.sense < 0), phi * timed.segment.march_end
     return MarchPoints(half, w, v, found.laps)
 
 

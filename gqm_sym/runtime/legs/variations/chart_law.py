@@ -26,6 +26,7 @@ from gqm_sym.runtime.legs.variations.programs import (
     chart_path_program,
     chart_sided_program,
 )
+from gqm_sym.runtime.legs.variations.train_law import TrainLaw
 
 # The number of places whose coordinates are found together.
 BLOCK = 4096
@@ -58,7 +59,7 @@ class ChartLaw(Law):
         )
         self._forces = ChartForces(formulas.exact, self.count, self.mass, varied, dimension)
         self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
-        self._launch, self._chart, self._maker = problem.launch.lam0, chart, maker
+        self._launch, self._chart = problem.launch.lam0, chart
 
     @property
     def launch_changes(self) -> Array:
@@ -71,13 +72,8 @@ class ChartLaw(Law):
 
     @property
     def ranges(self) -> Array:
-        """See `Law`. The ends of the curve keep their labels, but the middle of a longer train stays farther from
-        them.
-        """
-        found = np.zeros((3, self.count))
-        if isinstance(self._maker, CurveOfMeans):
-            found[:2, self._maker.train.length] = 0.5, -0.5
-        return found
+        """See `Law`. The ends of the curve keep their labels."""
+        return np.zeros((3, self.count))
 
     def coordinates(self, states: Array) -> Array:
         """See `Law`."""
@@ -133,7 +129,7 @@ class ChartLaw(Law):
 def law_of(problem: Problem) -> Law:
     """Return the law of the motion of a launch; along a curve with formulas it is kept with the run-time parameters."""
     if problem.formulas.chart is not None:
-        return ChartLaw(problem)
+        return TrainLaw(problem) if isinstance(problem.formulas.chart, CurveOfMeans) else ChartLaw(problem)
     kept = problem.p.conditions
     known: Law | None = kept.get("law")
     if known is None:

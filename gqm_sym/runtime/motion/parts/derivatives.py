@@ -8,7 +8,6 @@ import numpy as np
 
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError
-from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
@@ -95,14 +94,10 @@ class Derivatives(Positions):
             return
         unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
         if unknown:
-            reason = (
-                "the curve does not exist for neighbouring values (an exponent of a negative number must be an integer)"
-            )
-            if isinstance(self.problem.formulas.chart, TrackOfTrain):
-                reason = "the means over a train are known in doubles only"
             raise SolutionError(
-                f"{what}: there is no derivative with respect to {', '.join(unknown)}, because {reason}; name the "
-                "others in wrt"
+                f"{what}: there is no derivative with respect to {', '.join(unknown)}, because the curve does not "
+                "exist for neighbouring values (an exponent of a negative number must be an integer); name the others "
+                "in wrt"
             )
 
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def time_errors_of_panels(segment: Segment) -> Array:
     times = segment.edge_times[0]
     if segment.has_given_times:
         spans: Array = np.diff(times)
-    elif segment.kind == TO_EQUILIBRIUM or segment.speed_series is not None:
+    elif segment.kind == TO_EQUILIBRIUM or segment.march_end is not None:
         spans = times[1:]  # its end is arbitrary, or the error grows from ``a``
     else:
         spans = np.full(len(times) - 1, segment.duration)

@@ -29,7 +29,6 @@ from gqm_sym.runtime.quadrature.time_panels import (
     lay_along,
     lay_panels,
     read_off_many,
-    slopes,
 )
 
 # Widths of a segment, as shares of its ends, below which the rounding of the ends spoils its speeds, and below which it
@@ -46,11 +45,6 @@ MAX_CORRECTION_SHARE = 2.0**-10
 
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
-
-# The slopes of arc length and time by the phase angle have more digits of a speed than V**2 in doubles where the slope
-# of the time is above this share of its largest value, and where the speed is below that share of its largest value.
-# Beside a hilltop the slope of the time is so large that other places, where the body is slow too, are below the first.
-MIN_TIME_SLOPE, MAX_SLOW_SPEED = 1e-6, 0.3
 
 
 @dataclass(slots=True, kw_only=True)
@@ -84,9 +78,12 @@ class Segment:
         the turning point would be to ``a``, as a share of the last phase angle.
     stored_panels : tuple, optional
         Its panels, if they were computed in extended precision or together with a leg.
-    speed_series : (float, array), optional
-        For panels computed together with a leg, the last value of the march variable and the Legendre coefficients of Y
-        (`legs.panels.equation`).
+    speed_terms : (n, k) array, optional
+        For panels that were computed in extended precision or together with a leg, the Legendre coefficients of the
+        regular factor of the speed: the speed is this times sin(phi) between two turning points, and times phi and
+        ``march_end`` from a turning point.
+    march_end : float, optional
+        For panels computed together with a leg, the last value of the march variable (`legs.panels.equation`).
     known_edge_times : pair of arrays, optional
         The time in s from ``a`` to each edge of its panels, as two doubles, once they have been computed.
     known_duration : float, optional
@@ -109,7 +106,8 @@ class Segment:
     v2: Array | None = None
     turn_offset: float = 0.0
     stored_panels: Any = None
-    speed_series: tuple[float, Array] | None = None
+    speed_terms: Array | None = None
+    march_end: float | None = None
     known_duration: float | None = None
     is_lazy: bool = False
     ends: tuple[Any, Any] = (None, None)
@@ -127,7 +125,7 @@ class Segment:
     def _lay_panels(self) -> None:
         """Compute its panels, in extended precision where too much of V**2 cancels for doubles."""
         f = self.functions
-        if self.speed_series is not None:
+        if self.march_end is not None:
             return
         self._from_multiprecision, is_beside_double = self.stored_panels is not None, False
         if self.v2 is not None:
@@ -148,7 +146,7 @@ class Segment:
         if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
-            self.stored_panels = lay_exactly(f.exact, self.kind, self.ends, self.stop)
+            self.stored_panels, self.speed_terms = lay_exactly(f.exact, self.kind, self.ends, self.stop)
             self._from_multiprecision = True
         if self.stored_panels[7] == ILL_CONDITIONED:
             raise SolutionError(
@@ -288,7 +286,7 @@ class Segment:
 
     @property
     def _is_conservative(self) -> bool:
-        return self.functions.exact is not None and self.v2 is None and self.speed_series is None
+        return self.functions.exact is not None and self.v2 is None and self.march_end is None
 
     def _exact_offsets(self, place: float, low: float) -> tuple[float, float]:
         """Return `offsets` from the exact ends; close to an end its rounding would be a large share of the time to
@@ -339,34 +337,20 @@ class Segment:
 
     def speeds(self, phi: Array) -> Array:
         """Return |ds/dt| in m/s at phase angles."""
-        exact = self.from_multiprecision
-        if self.v2 is not None and not exact:
-            along: Array = speeds_along(self.a, self.b, self.v2, phi)
-            return along
-        if self.speed_series is not None and not exact:
-            last, terms = self.speed_series
-            smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
-            return smooth * (last * (phi + self.turn_offset)) if self.kind == FROM_TURN else smooth
-        speeds = self._speeds_in_doubles(phi)
-        return self._improved_by_panels(phi, speeds) if exact else speeds * self.width_ratio
-
-    def _speeds_in_doubles(self, phi: Array) -> Array:
-        f = self.functions
-        found: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
-        return found
-
-    def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
-        """Return |ds/dt| from the slopes of arc length and time, which has digits even where V**2 in doubles is
-        rounding only.
-
-        Where the body is so fast that the time hardly grows, the slope of the time has fewer digits than V**2. At a
-        turn the slope of arc length is zero up to rounding and may be negative, while a speed may not.
-        """
-        lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
-        grows = times > MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
-        is_slow = ~(speeds > MAX_SLOW_SPEED * self._speeds_in_doubles(self.edges).max())
-        np.divide(lengths, times, out=speeds, where=grows | is_slow)
-        return np.maximum(speeds, 0.0)
+        f = self._with_panels().functions
+        speeds: Array
+        if self.v2 is not None:
+            speeds = speeds_along(self.a, self.b, self.v2, phi)
+        elif self.speed_terms is None:
+            speeds = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
+            speeds *= self.width_ratio
+        else:
+            speeds = read_off_many(self.edges, np.zeros_like(self.edges), self.speed_terms, phi)
+            if self.kind == FROM_TURN:
+                speeds *= (1.0 if self.march_end is None else self.march_end) * (phi + self.turn_offset)
+            elif self.kind == TURN_TURN:
+                speeds *= np.sin(phi)
+        return speeds
 
     def times(self, phi: Array) -> Array:
         """Return the time in s from the end ``a`` to phase angles."""
@@ -382,7 +366,8 @@ class Segment:
     def width_ratio(self) -> float:
         """The exact width of a short segment between two turning points, divided by that of the rounded ends."""
         exact, width = self.functions.exact, self.b - self.a
-        if exact is None or self.kind != TURN_TURN or not self._is_short(MIN_WIDTH_SHARE):
+        is_rounded = exact is not None and self.kind == TURN_TURN and self._is_short(MIN_WIDTH_SHARE)
+        if exact is None or not is_rounded or self.from_multiprecision:
             return 1.0
         if self._width_ratio is None:
             low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)

@@ -85,7 +85,7 @@ class Timing(NamedTuple):
     kind : float
         The kind of the segment.
     last, turn_offset : float
-        As in `Segment.speed_series` and in `Segment`.
+        As `march_end` (1 where there is none) and `turn_offset` of `Segment`.
     error_a, error_b : float
         The errors of the ends that are turning points, in units of the curve parameter.
     lam_before : float
@@ -208,18 +208,15 @@ def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
     segment = timed.segment
     _, _, lengths, time_terms, length_terms = segment.panels[:5]
     marks = np.array([segment.edges, *segment.edge_times, lengths, np.append(time_errors_of_panels(segment), 0.0)])
-    last, is_resolved = nan, True
-    if segment.speed_series is None:
-        of_ends = _errors_of_ends(segment)
+    last, is_resolved = nan if segment.march_end is None else segment.march_end, True
+    if segment.speed_terms is None:
         marks, *series, is_resolved = _with_speeds(segment, marks, time_terms, length_terms)
     else:
-        last, speed_terms = segment.speed_series
-        series = [time_terms, length_terms, speed_terms]
-        of_ends = (MAX_END_ROUNDINGS * ULP * abs(segment.width) if segment.kind == FROM_TURN else 0.0, 0.0)
+        series = [_of_full_width(terms) for terms in (time_terms, length_terms, segment.speed_terms)]
     timing = Timing(
         *(float(segment.kind), 1.0 if isnan(last) else last, segment.turn_offset, segment.a, segment.low_parts[0]),
         *(segment.b, segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a),
-        *(*timed.r_start, *timed.t_start, timed.t_stop[0], *of_ends),
+        *(*timed.r_start, *timed.t_start, timed.t_stop[0], *_errors_of_ends(segment)),
     )
     intervals, states, panels = tabulate_piece(marks, *series, timing)
     return TabulatedPiece(
@@ -230,23 +227,26 @@ def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
 def _with_speeds(
     segment: Segment, marks: Array, time_terms: Array, length_terms: Array
 ) -> tuple[Array, Array, Array, Array, bool]:
-    """Return the arguments of `tabulate_piece` for a segment without `Segment.speed_series`, and whether the series of
+    """Return the arguments of `tabulate_piece` for a segment without `Segment.speed_terms`, and whether the series of
     its speed are resolved; panels are halved until they are.
     """
-    series = np.zeros((2, len(time_terms), WIDE))
-    series[0, :, : time_terms.shape[1]] = time_terms
-    series[1, :, : length_terms.shape[1]], marks[3] = segment.width_ratio * length_terms, segment.width_ratio * marks[3]
+    series = np.array([_of_full_width(time_terms), segment.width_ratio * _of_full_width(length_terms)])
+    marks[3] *= segment.width_ratio
     for _ in range(MAX_HALVINGS):
         speed_terms = _speed_terms(segment, marks[0])
-        # In extended precision speeds are slopes of the series of time and arc length, with as many digits as these.
-        if segment.from_multiprecision:
-            return marks, *series, speed_terms, True
         tails, largest = np.abs(speed_terms[:, -2:]).max(axis=1), np.abs(speed_terms).max(axis=1)
         coarse = ~(tails <= MAX_SPEED_TAIL * largest)
         if not coarse.any():
             return marks, *series, speed_terms, True
         marks, series = _halved(marks, series, coarse)
     return marks, *series, _speed_terms(segment, marks[0]), False
+
+
+def _of_full_width(terms: Array) -> Array:
+    """Return the Legendre coefficients of each panel with zeros behind them, so that there are WIDE of them."""
+    wide = np.zeros((len(terms), WIDE))
+    wide[:, : terms.shape[1]] = terms
+    return wide
 
 
 def _halved(marks: Array, series: Array, which: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -278,7 +278,9 @@ def _speed_terms(segment: Segment, edges: Array) -> Array:
 
 
 def _errors_of_ends(segment: Segment) -> tuple[float, float]:
-    """Return the errors of the ends of a conservative segment that are turning points in doubles."""
+    """Return the errors of those ends of a segment that are turning points in doubles."""
+    if segment.march_end is not None:
+        return MAX_END_ROUNDINGS * ULP * abs(segment.width) if segment.kind == FROM_TURN else 0.0, 0.0
     is_exact = segment.kind in (REGULAR, TO_EQUILIBRIUM) or segment.from_multiprecision
     return (0.0, 0.0) if is_exact else end_errors(segment)
 

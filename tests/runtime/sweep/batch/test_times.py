@@ -191,3 +191,33 @@ def test_waves_far_from_zero(tmp_path: Path) -> None:
     with mp.workdps(40):
         truths = [half_period_on_lissajous(start) for start in starts.tolist()]
     assert np.abs(errors(values, truths)).max() <= MAX_ERROR
+
+
+def half_period_on_kappa_curve(angle: Any) -> Any:
+    """Return the half period of a body on r = 1.3 tan(theta) that turns at -``angle`` and ``angle``."""
+    nodes, total = 256, mpf(0)
+    for k in range(nodes):
+        u = mp.pi * (2 * k + 1) / (4 * nodes)
+        t = angle * mp.cos(u)
+        ds = mp.hypot(mp.tan(t), 1 / mp.cos(t) ** 2)
+        fallen = (mp.cos(t) - mp.cos(angle)) * (1 + 1 / (mp.cos(t) * mp.cos(angle)))
+        total += mpf("1.3") * ds * angle * mp.sin(u) / mp.sqrt(2 * mpf(9.81) * mpf("1.3") * fallen)
+    return mp.pi * total / nodes
+
+
+def test_next_to_a_pole(tmp_path: Path) -> None:
+    """Next to a pole of a curve the cosine of the place is small, and the ends of an orbit in doubles do not give its
+    digits: 28 % of the times of thrown bodies were off by over 2 ulp, by 12 at most.
+    """
+    curve = gqm.Curve.polar("13*tan(theta)/10", parameter="theta", domain=("-1.5", "1.5"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="kappa_curve", folder=tmp_path)
+    starts = np.linspace(-0.9, 1.05, 16)
+    v0 = np.linspace(2.0, 9.5, 16)
+    values = module.sweep("half_period", [*starts, *np.linspace(0.5, 1.45, 8)], [*v0, *[0.0] * 8]).values
+    with mp.workdps(40):
+        ends = []
+        for start, speed in zip(map(mpf, starts.tolist()), v0.tolist(), strict=True):
+            level = mp.sin(start) ** 2 / mp.cos(start) + mpf(speed) ** 2 / (2 * mpf(9.81) * mpf("1.3"))
+            ends.append(mp.acos(2 / (level + mp.sqrt(level**2 + 4))))
+        truths = [half_period_on_kappa_curve(end) for end in (*ends, *map(mpf, np.linspace(0.5, 1.45, 8).tolist()))]
+    assert np.abs(errors(values, truths)).max() <= MAX_ERROR

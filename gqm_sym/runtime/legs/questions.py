@@ -1,0 +1,183 @@
+"""Questions about the motion of one body with losses: how long it is followed for each, and what the answer is."""
+
+from math import fabs, inf, isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.calls import call_squared_contact
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
+from gqm_sym.runtime.legs.body import (
+    ELAPSED,
+    ENDING,
+    FROM_REST,
+    HORIZON,
+    LAM0,
+    LAPS,
+    MAY_END,
+    ONLY_SIGN,
+    PAUSES,
+    PERIOD,
+    PLACE,
+    TARGET,
+    TURNS,
+    V2,
+)
+from gqm_sym.runtime.legs.leg_reading import passage
+from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, HEADING, LAPS_BEFORE, START, START_V2
+from gqm_sym.runtime.legs.panels.equation import forces_on
+from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load, slope_of_v2
+from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
+from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
+
+# The question for each body. LEGS means to advance by some legs, and FIRST_LEGS does so unless the launch is next to an
+# equilibrium. RUN_AGAIN means to follow a leg, or a part of it, once more for its panels.
+FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
+LEAST_LENGTH, MOST_LENGTH = 10, 11
+
+# The status of an answer; LEFT is that of a body that the loop does not decide.
+FOUND, LEFT, NONE = range(3)
+
+# On a curve without ends, the number of successive runs without a turn after which the search for an end stops.
+MAX_PAUSES = 60
+
+# The number of turns after which the search for the place of rest stops.
+MAX_TURNS = 20000
+
+# Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
+# without bound there, as at a cusp.
+UNBOUNDED_GROWTH = 1e6
+
+
+class Findings(NamedTuple):
+    """The findings of the legs so far.
+
+    Attributes
+    ----------
+    arrival : float
+        The time of the first arrival at the target; infinite as long as there is none.
+    peak : float
+        The largest value of the quantity, or minus the smallest.
+    """
+
+    arrival: float
+    peak: float
+
+
+@Inner
+def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
+    """Return whether the next leg has to be followed too."""
+    if body[ENDING] != 0.0 or arrival < inf:
+        return False
+    # A body that has turned at two points reaches no place outside of them any more.
+    if question == ARRIVAL and body[TURNS] >= (1.0 if body[FROM_REST] else 2.0):
+        return False
+    if isfinite(body[HORIZON]):
+        return body[ELAPSED] < body[HORIZON]
+    if question == ARRIVAL:
+        return True
+    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
+
+
+@Inner
+def sought_extreme(question):  # type: ignore[no-untyped-def]
+    """Return the function that a question is about, and 1 if it is about the largest value, -1 if about the smallest
+    one.
+    """
+    sign = 1.0 if question in (MOST_SPEED, MOST_LOAD, MOST_LENGTH) else -1.0
+    return SPEED if question < LEAST_LOAD else LOAD if question < LEAST_LENGTH else LENGTH, sign
+
+
+@Inner
+def load_at(dissipation, p, question, place, direction, v2):  # type: ignore[no-untyped-def]
+    """Return the contact force per mass, or its length, on a body at a place."""
+    point = point_buffer()
+    if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
+        point[0] = place
+        call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
+        return sqrt(point[2] + v2 * (point[3] + v2 * point[4]))
+    slope_of_v2(forces_on(dissipation, p, direction), place, v2, 0, point)
+    return point[5] + point[6] * v2
+
+
+@Inner
+def after_leg(dissipation, p, body, question, findings, record):  # type: ignore[no-untyped-def]
+    """Return the findings of the legs so far after one more leg."""
+    begin, low = record[BEGIN], record[BEGIN_LOW]
+    if question < LEAST_SPEED:
+        if question != ARRIVAL or body[ENDING] == END_LIFTOFF_AT_ONCE:
+            return findings
+        spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
+        return Findings(begin + (low + spent), findings.peak)
+    function, sign = sought_extreme(question)
+    if body[ENDING] != END_LIFTOFF_AT_ONCE:
+        until = (body[HORIZON] - begin) - low
+        forces = forces_on(dissipation, p, int(record[HEADING]))
+        return Findings(findings.arrival, peak_of_leg(forces, record, until, (function, sign), findings.peak))
+    v2 = record[START_V2]
+    if function == SPEED:
+        value = sqrt(v2)
+    else:
+        value = load_at(dissipation, p, question, record[START], int(record[HEADING]), v2)
+    return Findings(findings.arrival, max(findings.peak, sign * value))
+
+
+@Inner
+def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
+    """Return the answer for a body that stays where it is, or that the track would have to pull there at once, and its
+    status.
+    """
+    if body[ONLY_SIGN] != 0.0:
+        contact_sign = sign_of_load(forces_on(dissipation, p, 1), body[LAM0], 0.0, point_buffer())
+        if contact_sign == 0:
+            return np.nan, LEFT
+        if contact_sign != body[ONLY_SIGN] and question in (END_TIME, REST_PLACE):
+            return (0.0, FOUND) if question == END_TIME else (np.nan, NONE)
+    if question == END_TIME:
+        return (body[HORIZON], FOUND) if isfinite(body[HORIZON]) else (np.nan, NONE)
+    if question == REST_PLACE:
+        return body[LAM0], FOUND
+    if question == ARRIVAL:
+        return (0.0, FOUND) if body[TARGET] == body[LAM0] else (np.nan, NONE)
+    if question < LEAST_LOAD:
+        return 0.0, FOUND
+    return load_at(dissipation, p, question, body[LAM0], 1, 0.0), FOUND
+
+
+@Inner
+def conclude(body, question, findings):  # type: ignore[no-untyped-def]
+    """Return the answer for a body that has been followed long enough, and its status."""
+    if question == ARRIVAL:
+        is_there = findings.arrival < inf and findings.arrival <= body[HORIZON]
+        return (findings.arrival, FOUND) if is_there else (np.nan, NONE)
+    ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
+    end = min(body[HORIZON], body[ELAPSED] if ends else inf)
+    if not isfinite(end):
+        return np.nan, NONE
+    if question == END_TIME:
+        return end, FOUND
+    if question == REST_PLACE:
+        rests = body[ENDING] == END_REST and body[ELAPSED] <= body[HORIZON]
+        return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
+    if body[ENDING] == END_ASYMPTOTE:
+        return np.nan, LEFT
+    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak, FOUND
+
+
+@Inner
+def force_is_unbounded(dissipation, p, body, peak):  # type: ignore[no-untyped-def]
+    """Return whether the contact force grows without bound towards the end of the domain at which the body is."""
+    point = point_buffer()
+    slope_of_v2(forces_on(dissipation, p, 1), body[PLACE], body[V2], 0, point)
+    return not fabs(point[5]) + fabs(point[6]) * body[V2] <= UNBOUNDED_GROWTH * fabs(peak)
+
+
+@Inner
+def conclude_at_rest(question, findings, time, place):  # type: ignore[no-untyped-def]
+    """Return the answer for a body that comes to rest at a place after ever slower swings."""
+    if question == END_TIME:
+        return time
+    if question == REST_PLACE:
+        return place
+    return findings.peak if sought_extreme(question)[1] > 0.0 else 0.0 - findings.peak
