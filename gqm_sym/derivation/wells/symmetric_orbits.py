@@ -10,20 +10,18 @@ oscillator, the integral is a complete elliptic integral of the first kind, whic
 gives.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import gcd, inf, lcm
+from math import inf
 
 import sympy as sp
 
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.wells.symmetry import MAX_OPERATIONS, Symmetry, is_half_turn
+from gqm_sym.derivation.wells.waves import CIRCULAR, COSINE, HYPERBOLIC, SINE, Waves, even, of_waves
 
 # The smallest growth of U2 with a square that must remain at the turning point, as a share of the size of its terms.
 MIN_GROWTH = sp.Rational(1, 4)
-
-# A sine or cosine is written in powers of the slowest one if its rate is at most this multiple of the slowest rate.
-MAX_MULTIPLE = 8
 
 # The power of the cosine that judges the digits which the rounding of the width takes from the time next to a pole.
 POWER_OF_POLE = sp.Rational(3, 2)
@@ -50,9 +48,8 @@ COSINE_TERM_AT_TURN = _symbol("cosine_term_at_turn")
 # Symbols for a launch: the distance from the axis, and V**2 there.
 OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
 
-# Symbols for intermediate results: the squares of the sine and of the cosine of half the argument, and the cosine of
-# the argument where the curve has a pole at its zero.
-_SINE, _COSINE, _COSINE_OF_POLE = _symbol("sine"), _symbol("cosine"), _symbol("cosine_of_pole")
+# Symbol for the cosine of the argument where the curve has a pole at its zero.
+_COSINE_OF_POLE = _symbol("cosine_of_pole")
 
 # Functions that are written as ratios of sines and cosines.
 _RATIOS = {
@@ -93,18 +90,6 @@ class SymmetricOrbits:
     agm_arguments: tuple[sp.Expr, sp.Expr] | None
 
 
-@dataclass(frozen=True, slots=True)
-class _Waves:
-    """A pair of functions with cosine**2 = 1 + sign*sine**2."""
-
-    sine: type[sp.Function]
-    cosine: type[sp.Function]
-    sign: int
-
-
-_CIRCULAR, _HYPERBOLIC = _Waves(sp.sin, sp.cos, -1), _Waves(sp.sinh, sp.cosh, 1)
-
-
 def symmetric_orbits(
     potential: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
 ) -> SymmetricOrbits | None:
@@ -131,7 +116,7 @@ def symmetric_orbits(
         forms = tuple(form.replace(function, ratio) for form in forms)
     functions = {type(call) for form in forms for call in form.atoms(sp.Function) if call.has(d)}
     if not functions:
-        height, metric = (_even(form, d, Y) for form in forms)
+        height, metric = (even(form, d, Y) for form in forms)
         if height is None or metric is None:
             return None
         slope = _divided_difference(height, Y, T, T_MINUS_Y)
@@ -141,20 +126,20 @@ def symmetric_orbits(
         turning_point = square and (sp.sqrt(square), growth, sp.S.Zero)
         squares = _isochronous(height, metric, Y, 4 * Y)
         return _with_agm(metric / slope, slope, ((T, HALF**2),), turning_point, squares)
-    waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if functions <= {waves.sine, waves.cosine}), None)
-    found = None if waves is None else _of_waves(forms, d, waves)
+    waves = next((waves for waves in (CIRCULAR, HYPERBOLIC) if functions <= {waves.sine, waves.cosine}), None)
+    found = None if waves is None else of_waves(forms, d, waves)
     if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
         return None  # beyond half a turn Y decreases
     rate, height, metric = found
     metric = _with_double_roots(metric, waves)
     less, more = (ONE_MINUS_Y, 1 + Y) if waves.sign < 0 else (1 + Y, ONE_MINUS_Y)
-    # V**2 = (SINE_SQUARED - _SINE)*slope, where the difference is a product of factors without cancellation.
+    # V**2 = (SINE_SQUARED - SINE)*slope, where the difference is a product of factors without cancellation.
     sine_gap = 4 * T_MINUS_Y * ONE_MINUS_YT * COSINE_FOURTH / more**2
-    height = height.xreplace({_COSINE: 1 + waves.sign * _SINE})
-    slope = _divided_difference(height, _SINE, SINE_SQUARED, sine_gap)
+    height = height.xreplace({COSINE: 1 + waves.sign * SINE})
+    slope = _divided_difference(height, SINE, SINE_SQUARED, sine_gap)
     if not slope:
         return None
-    by_square = {_SINE: 4 * Y / more**2, _COSINE: less**2 / more**2}
+    by_square = {SINE: 4 * Y / more**2, COSINE: less**2 / more**2}
     by_square[_COSINE_OF_POLE] = COSINE_TERM / more**2
     if _with_poles(slope, waves) != slope:
         above, below = sp.together(slope).as_numer_denom()
@@ -168,12 +153,12 @@ def symmetric_orbits(
         power = sp.degree(sp.together(slope).as_numer_denom()[1], _COSINE_OF_POLE)
         divisor *= by_square[_COSINE_OF_POLE] ** (power + POWER_OF_POLE)
     invariants = _invariants(waves, rate * HALF / 2)
-    degrees = [_degree_inside(form.xreplace({_COSINE: 1 - _SINE}), {_SINE}) for form in (height, metric)]
+    degrees = [_degree_inside(form.xreplace({COSINE: 1 - SINE}), {SINE}) for form in (height, metric)]
     cancels = waves.sign < 0 and max(degrees) > MAX_DEGREE
     times = None if cancels else integrand, divisor, invariants
-    square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
-    metric = metric.xreplace({_COSINE: 1 + waves.sign * _SINE})
-    squares = _isochronous(height, metric, _SINE, rate**2 * _SINE * (1 + waves.sign * _SINE))
+    square, growth = _turn(height, SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
+    metric = metric.xreplace({COSINE: 1 + waves.sign * SINE})
+    squares = _isochronous(height, metric, SINE, rate**2 * SINE * (1 + waves.sign * SINE))
     if square is None:
         return _with_agm(*times, None, squares)
     turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
@@ -182,7 +167,7 @@ def symmetric_orbits(
     return _with_agm(*times, (turn, growth, share), squares)
 
 
-def _invariants(waves: _Waves, argument: sp.Expr) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
+def _invariants(waves: Waves, argument: sp.Expr) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
     """Return the symbols of the whole orbit as functions of the argument at the turning point.
 
     Those of a circular wave are the squares of a cosine and a tangent of half the argument, by functions of the
@@ -326,27 +311,27 @@ def _with_agm(
     return SymmetricOrbits(integrand, divisor, invariants, turning_point, arguments)
 
 
-def _with_double_roots(metric: sp.Expr, waves: _Waves) -> sp.Expr:
+def _with_double_roots(metric: sp.Expr, waves: Waves) -> sp.Expr:
     """Return (ds/dd)**2 with its sums as products of powers if they are polynomials with double roots, as at cusps.
 
     Near such a root the terms of the expanded polynomial cancel twice as many digits as those of its root.
     """
-    cosine = 1 + waves.sign * _SINE
+    cosine = 1 + waves.sign * SINE
 
     def rooted(part: sp.Expr) -> sp.Expr:
-        form = part.xreplace({_COSINE: cosine})
-        if not part.is_Add or not form.is_polynomial(_SINE) or sp.Poly(form, _SINE).domain.is_EX:
+        form = part.xreplace({COSINE: cosine})
+        if not part.is_Add or not form.is_polynomial(SINE) or sp.Poly(form, SINE).domain.is_EX:
             return part
-        constant, factors = sp.sqf_list(form, _SINE)
+        constant, factors = sp.sqf_list(form, SINE)
         if all(power < 2 for _, power in factors):
             return part
         ratios = [(factor, sp.cancel(factor / cosine), power) for factor, power in factors]
-        return sp.Mul(constant, *((f if r.has(_SINE) else r * _COSINE) ** power for f, r, power in ratios))
+        return sp.Mul(constant, *((f if r.has(SINE) else r * COSINE) ** power for f, r, power in ratios))
 
     return sp.Mul(*map(rooted, sp.Mul.make_args(metric)))
 
 
-def _with_poles(form: sp.Expr, waves: _Waves) -> sp.Expr:
+def _with_poles(form: sp.Expr, waves: Waves) -> sp.Expr:
     """Return a form in which the cosine of the argument has a symbol of its own where it is a divisor.
 
     In squares of the sine and cosine of half the argument it is a difference that loses its digits next to the pole.
@@ -355,9 +340,9 @@ def _with_poles(form: sp.Expr, waves: _Waves) -> sp.Expr:
         return form
 
     def named(power: sp.Expr) -> sp.Expr:
-        for square, symbol in ((_SINE, _COSINE_OF_POLE), (SINE_SQUARED, COSINE_AT_TURN)):
-            ratio = sp.cancel(power.base.xreplace({_COSINE: 1 - _SINE}) / (1 - 2 * square))
-            if not ratio.has(_SINE, SINE_SQUARED):
+        for square, symbol in ((SINE, _COSINE_OF_POLE), (SINE_SQUARED, COSINE_AT_TURN)):
+            ratio = sp.cancel(power.base.xreplace({COSINE: 1 - SINE}) / (1 - 2 * square))
+            if not ratio.has(SINE, SINE_SQUARED):
                 return (ratio * symbol) ** power.exp
         return power
 
@@ -369,53 +354,3 @@ def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap:
     difference = Differences(square, (square, top), {(0, 1): gap}).first(height, 0, 1)
     # Products are expanded, because their terms may cancel, as those of cos**2 and sin**2 do.
     return sp.Mul(*(sp.expand(f) if f.is_polynomial(square, top) else f for f in sp.Mul.make_args(difference)))
-
-
-def _even(form: sp.Expr | None, root: sp.Symbol, square: sp.Expr) -> sp.Expr | None:
-    """Return a form that has only even powers of ``root`` in terms of its square; None if it has other powers."""
-    for f in () if form is None else (form, sp.expand(form)):
-        found = f.replace(
-            lambda t: t.is_Pow and t.base == root and t.exp.is_Integer and t.exp % 2 == 0,
-            lambda t: square ** (t.exp / 2),
-        )
-        if not found.has(root):
-            return found
-    return None
-
-
-def _of_waves(forms: Sequence[sp.Expr], d: sp.Symbol, waves: _Waves) -> tuple[sp.Expr, sp.Expr, sp.Expr] | None:
-    """Return a rate for which the forms are functions of the square of a sine, and these functions; None if there is
-    none.
-    """
-    calls = {call for form in forms for call in form.atoms(waves.sine, waves.cosine) if call.has(d)}
-    shifted = {call: call.func(sp.expand(call.args[0])) for call in calls}
-    forms = [form.xreplace(shifted) for form in forms]
-    calls = {call for form in forms for call in form.atoms(waves.sine, waves.cosine) if call.has(d)}
-    rates = {call: call.args[0].diff(d) for call in calls}
-    if not calls or any(rate.has(d) or sp.expand(call.args[0] - rate * d) != 0 for call, rate in rates.items()):
-        return None
-    first = min(rates.values(), key=sp.default_sort_key)
-    ratios = {call: sp.cancel(rate / first) for call, rate in rates.items()}
-    if not all(ratio.is_Rational for ratio in ratios.values()):
-        return None
-    common = sp.Rational(gcd(*(int(r.p) for r in ratios.values())), lcm(*(int(r.q) for r in ratios.values())))
-    multiples = {call: int(ratio / common) for call, ratio in ratios.items()}
-    if max(map(abs, multiples.values())) > MAX_MULTIPLE:
-        return None
-    c, s, c2, s2 = sp.symbols("c s c2 s2", cls=sp.Dummy, real=True)
-    by_first = {
-        call: sp.chebyshevt(abs(n), c) if call.func is waves.cosine else sp.sign(n) * s * sp.chebyshevu(abs(n) - 1, c)
-        for call, n in multiples.items()
-    }
-    even = [_even(form.xreplace(by_first), s, s2) for form in forms]
-    squares = [_even(form, c, c2) for form in even]
-    # If only squares appear, they are functions of twice the rate.
-    if None in squares:
-        rate, found, names = common * first, even, {c: _COSINE + waves.sign * _SINE, s2: 4 * _SINE * _COSINE}
-    else:
-        rate, found, names = 2 * common * first, squares, {c2: _COSINE, s2: _SINE}
-    height, metric = (form if form is None else form.xreplace(names) for form in found)
-    # A form may hold powers of the distance beside its waves, such as those of a rotating frame on a catenary.
-    if height is None or metric is None or height.has(d) or metric.has(d):
-        return None
-    return rate, height, metric

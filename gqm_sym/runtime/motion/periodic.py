@@ -1,5 +1,6 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
+from collections.abc import Iterable
 from functools import partial
 from math import inf
 from typing import Any
@@ -14,6 +15,7 @@ from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import on_curve_of_means
 from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.charts.shaped_pieces import shaping_of
 from gqm_sym.runtime.gradients.charts.train_orbits import TrainOrbitDerivatives
 from gqm_sym.runtime.gradients.formula_orbit import FormulaOrbitDerivatives
 from gqm_sym.runtime.gradients.one_orbit import period_gradient
@@ -24,6 +26,7 @@ from gqm_sym.runtime.gradients.quantities import PERIODS, gradient, second_gradi
 from gqm_sym.runtime.gradients.sensitivity import PLACE, SPEED, OrbitSensitivity, Sensitivity, points_of
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
@@ -76,11 +79,28 @@ class PeriodicMotion(PeriodicTimes):
         segment = self._segment  # its panels, which are laid when edges are read, are needed near a separatrix only
         return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, lambda: segment.edges)
 
-    def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
-        segment, f, problem = self._segment, self.problem.functions, self.problem
-        kind: type[ChartOrbitDerivatives] = ChartOrbitDerivatives
-        if isinstance(problem.formulas.chart, TrackOfTrain):
-            problem, kind = on_curve_of_means(problem), TrainOrbitDerivatives
+    @computed_once
+    def _derivatives_of_one_shape(self) -> OrbitDerivatives:
+        """The orbit with its derivatives but for those with respect to what shapes the curve, which may be dear."""
+        if self.problem.formulas.chart is None or not shaping_of(self._timed.formulas):
+            return self._derivatives
+        return self._derivatives_along_chart(self.direction if self.kind == "circulation" else 0, ())
+
+    def _derivatives_by(self, rows: Iterable[int]) -> OrbitDerivatives:
+        """Return the orbit with its derivatives with respect to some variables at least."""
+        if self.problem.formulas.chart is None or set(shaping_of(self._timed.formulas)).intersection(rows):
+            return self._derivatives
+        return self._derivatives_of_one_shape
+
+    @property
+    def _timed(self) -> Problem:
+        """The launch of the body that has the times of this motion along a chart, which for a train is another one."""
+        is_train = isinstance(self.problem.formulas.chart, TrackOfTrain)
+        return on_curve_of_means(self.problem) if is_train else self.problem
+
+    def _derivatives_along_chart(self, direction: int, shaping: tuple[int, ...] | None = None) -> ChartOrbitDerivatives:
+        segment, f, problem = self._segment, self.problem.functions, self._timed
+        kind = ChartOrbitDerivatives if problem is self.problem else TrainOrbitDerivatives
         if problem.formulas.rolling_radius or problem.true_pieces is None or problem.tape is None:
             raise without_formulas()
         passage = timing.passage_of(problem, self.kind, self.direction, self._offsets)
@@ -93,7 +113,7 @@ class PeriodicMotion(PeriodicTimes):
         if not direction:
             last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
         edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
-        return kind(problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
+        return kind(problem, passage, direction, np.concatenate([[0.0], edges, [last]]), shaping)
 
     @computed_once
     def _orbit_sensitivity(self) -> OrbitSensitivity:
@@ -102,7 +122,10 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         found = self._period_gradient(quantity, wrt) if quantity in PERIODS else None
-        return gradient(self._derivatives, self, quantity, wrt) if found is None else found
+        if found is not None:
+            return found
+        rows = selected(self.problem.formulas.parameters, wrt)
+        return gradient(self._derivatives_by(rows.values()), self, quantity, wrt)
 
     def _period_gradient(self, quantity: str, wrt: Any) -> dict[str, float] | None:
         """Return the derivatives of a period along a curve with formulas; None where they take more than one call of
@@ -135,14 +158,14 @@ class PeriodicMotion(PeriodicTimes):
 
     @locked
     def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
-        return second_gradient(self._derivatives, self, quantity, wrt)
+        return second_gradient(self._derivatives_of_one_shape, self, quantity, wrt)
 
     @property
     @locked
     def action(self) -> float:
         """The integral of (1 + beta) V ds over one period, per mass, in m2/s."""
         with requested_quantity("action"):
-            return self._derivatives.action
+            return self._derivatives_of_one_shape.action
 
     @property
     @locked
@@ -151,7 +174,7 @@ class PeriodicMotion(PeriodicTimes):
         formulas = self.problem.formulas
         inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
         with requested_quantity("period_slope"):
-            return float(self._derivatives.period_gradient[-1] / inertia)
+            return float(self._derivatives_of_one_shape.period_gradient[-1] / inertia)
 
     @locked
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:

@@ -10,6 +10,7 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.gradients.charts import trains
 
 # The means are known in doubles, to some units in the last place, and derivatives are a few times as sensitive.
 ROUNDING = 2e-14
@@ -120,6 +121,28 @@ def test_periods(hoop: ModuleType, time: Callable[..., Any], quantity: str, v0: 
     assert motion.gradient(quantity, "m") == {"m": 0.0}
     swept = hoop.sweep(quantity, [1.2], v0, gradient=names, **given)
     assert swept.gradient[0] == pytest.approx(truth, rel=ROUNDING, abs=ROUNDING)
+
+
+def test_a_fixed_shape_needs_no_neighbours(hoop: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The changes along the track, which are dear, are made only for what shapes the means, and once for the same
+    parameters.
+    """
+    made, changes = [], trains.ChangesOfTrain
+    monkeypatch.setattr(trains, "ChangesOfTrain", lambda problem: made.append(problem) or changes(problem))
+    names, given = ("lam0", "v0", "g", "k", "Omega"), {name: str(value) for name, value in CONSTANTS.items()}
+    given["g"] = "9.79"
+    at = {**CONSTANTS, "g": mpf("9.79")}
+    motion = hoop.solve("6/5", 1, **given)
+    with mp.workdps(30):
+        truth = [derivative(half_period, name, 1, at) for name in names]
+    assert list(motion.gradient("half_period", names).values()) == pytest.approx(truth, rel=ROUNDING)
+    for quantity in ("turning_points", "action", "v_max"):
+        motion.gradient(quantity, names)
+    assert motion.period_slope > 0.0
+    assert not made
+    for place in ("6/5", "1"):
+        hoop.solve(place, 1, **given).gradient("half_period", "L")
+    assert len(made) == 1
 
 
 def test_turning_points_and_times(hoop: ModuleType) -> None:

@@ -41,7 +41,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, square_root
 from gqm_sym.runtime.interface import PATH_IN_SPACE, SPACE_ROWS, ExactPotential
-from gqm_sym.runtime.launch.formulas import ParameterValues, chart_with, shape_of
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues, chart_with, shape_of
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
@@ -53,23 +53,31 @@ MOST_MEANS = 2
 
 
 def on_curve_of_means(problem: Problem) -> Problem:
-    """Return the launch of a body whose times are those of a train.
+    """Return the launch of a body whose times are those of a train. Its curve is kept with the run-time parameters.
 
     Parameters
     ----------
     problem : Problem
         The launch of a train.
     """
-    formulas, values = problem.formulas, tuple(problem.p.values.tolist())
-    train = formulas.chart
+    kept = problem.p.conditions
+    if "means" not in kept:
+        kept["means"] = _with_curve_of_means(problem.formulas, problem.p)
+    formulas, p = kept["means"]
+    return Problem(formulas, problem.launch, p, problem.domain)
+
+
+def _with_curve_of_means(formulas: Formulas, given: ParameterValues) -> tuple[Formulas, ParameterValues]:
+    """Return the formulas of motions along the curve of means, and run-time parameters that keep what belongs to it."""
+    values, train = tuple(given.values.tolist()), formulas.chart
     assert isinstance(train, TrackOfTrain)
     means = _means_of(train, len(values))
     chart = chart_with(train, values)
     records = _coordinates_of(train, chart, values, means, formulas.inertia)
     steepest = (float(np.abs(record[:, 6 + 2 * TERMS : 6 + 3 * TERMS]).sum(axis=1).max()) for record in records)
     scales = tuple(2.0 ** (frexp(slope / MAX_SLOPE)[1]) if slope else 1.0 for slope in steepest)
-    given = shape_of(train, values, 1.0) if means else values
-    curve = CurveOfMeans(train, means, scales, formulas.inertia, given)
+    shape = shape_of(train, values, 1.0) if means else values
+    curve = CurveOfMeans(train, means, scales, formulas.inertia, shape)
     potential = _Potential(train, formulas.inertia, means, scales)
     other = replace(
         formulas,
@@ -77,9 +85,9 @@ def on_curve_of_means(problem: Problem) -> Problem:
         exact=ExactPotential(potential),
         path_in_space=path_not_asked_for() if len(means) > 1 else None,
     )
-    p = ParameterValues(problem.p)
-    p.values, p.conditions = problem.p.values, {}
-    return Problem(other, problem.launch, p, problem.domain)
+    p = ParameterValues(given)
+    p.values, p.conditions = given.values, {}
+    return other, p
 
 
 @lru_cache(maxsize=1)

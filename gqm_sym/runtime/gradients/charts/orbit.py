@@ -109,18 +109,28 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         0 for a libration, else the sign of ds/dt.
     edges : array
         Phase angles, or shares of a lap, between which the speed changes smoothly, from the first to the last.
+    shaping : tuple of int, optional
+        The parameters by which the curve's shape is varied; by default all that shape it. Derivatives with respect to
+        others that shape it mean nothing.
     """
 
     source: ChartSource
     by_arc_length = True
 
-    def __init__(self, problem: Problem, passage: ChartPassage, direction: int, edges: Array) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        passage: ChartPassage,
+        direction: int,
+        edges: Array,
+        shaping: tuple[int, ...] | None = None,
+    ) -> None:
         pieces, launch = problem.true_pieces, problem.launch
         assert pieces is not None
         self.direction, self._edges, self._passage = direction, edges, passage
-        self.source = self._source_along(problem)
-        chart = problem.formulas.chart
-        self._shaped_by = {*self.source.shaping, *((chart and chart.shaped_by) or ())}
+        source = self._source_along(problem)
+        self.source = source if shaping is None else source._replace(shaping=shaping)
+        self._shaped_by = set(source.shaping)
         self._shape = self._shaped(problem, pieces)
         self._found = passage.found
         numbers = [

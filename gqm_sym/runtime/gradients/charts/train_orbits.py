@@ -17,7 +17,7 @@ from gqm_sym.runtime.gradients.charts.orbit import ChartOrbitDerivatives, source
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
 from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces
 from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource
-from gqm_sym.runtime.gradients.charts.trains import ChangesOfTrain
+from gqm_sym.runtime.gradients.charts.trains import ChangesOfTrain, changes_of
 from gqm_sym.runtime.gradients.path import PathRows
 from gqm_sym.runtime.launch.problem import Problem
 
@@ -115,9 +115,12 @@ class TrainOrbitDerivatives(ChartOrbitDerivatives):
         return kind(*source_along(problem))
 
     def _shaped(self, problem: Problem, pieces: TruePieces) -> ShapedPieces:
-        self._changes = ChangesOfTrain(problem)
-        return CurveOfTrain(problem, pieces, self.source.shaping, self._changes)
+        self._problem, shaping = problem, self.source.shaping
+        # The changes are dear, and derivatives for a fixed shape follow from the formulas alone.
+        if not shaping:
+            return super()._shaped(problem, pieces)
+        return CurveOfTrain(problem, pieces, shaping, changes_of(problem))
 
     def at_places(self, lam: Array) -> PathRows:
         """Return `path_rows` of the middle of the train at labels."""
-        return self._changes.path(lam)
+        return changes_of(self._problem).path(lam)

@@ -223,6 +223,15 @@ class ChangesOfTrain:
         return PathRows(rows)
 
 
+def changes_of(problem: Problem) -> ChangesOfTrain:
+    """Return the changes for a launch on the curve of means, which are kept with the run-time parameters."""
+    kept = problem.p.conditions
+    if "changes" not in kept:
+        kept["changes"] = ChangesOfTrain(problem)
+    changes: ChangesOfTrain = kept["changes"]
+    return changes
+
+
 @entry(types.void(types.float64[:, :, ::1], types.int64[::1], MATRIX, types.float64[:, :, ::1]))
 def fill_functions(records, pieces, s, found):  # type: ignore[no-untyped-def]
     """Fill functions at places of two doubles each, as two doubles each, from their records on all pieces."""

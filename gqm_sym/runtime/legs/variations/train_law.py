@@ -3,7 +3,7 @@
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.charts.trains import ChangesOfTrain
+from gqm_sym.runtime.gradients.charts.trains import changes_of
 from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.gradients.path import PRODUCT, PathRows, squared_force
 from gqm_sym.runtime.launch.problem import Problem
@@ -28,7 +28,7 @@ class TrainLaw(Law):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self._changes, self._launch = ChangesOfTrain(problem), problem.lam0
+        self._changes, self._launch = changes_of(problem), problem.lam0
 
     @property
     def launch_changes(self) -> Array:
