@@ -76,6 +76,7 @@ class ByFormulas(Declaration):
 
         Examples
         --------
+        >>> from gqm_sym import Curve
         >>> Curve.graph("a*x**2 + b*x", parameter="x").parameters
         ('a', 'b')
         """
@@ -123,6 +124,7 @@ class ByFormulas(Declaration):
 
         Examples
         --------
+        >>> from gqm_sym import Curve
         >>> Curve.parametric(x="L*sin(u)", z="-L*cos(u)", parameter="u", period="2*pi").period
         2*pi
         """
@@ -223,6 +225,7 @@ class ByFormulas(Declaration):
 
         Examples
         --------
+        >>> from gqm_sym import Curve
         >>> Curve.space(x="R*cos(u)", y="R*sin(u)", z="c*u", parameter="u").parameters
         ('R', 'c')
         """

@@ -37,8 +37,11 @@ END_SHARE = 1e-9
 # The share of a segment before a joint at which contact is lost in which loads are not searched.
 BEFORE_JOINT = 1e-13
 
-# The distance from an edge of a panel at which a quantity that may jump there is sampled, as a share of the panel.
-BESIDE_EDGE = 1e-9
+# The distance from a joint at which a quantity that jumps there is sampled, as a share of the segment.
+BESIDE_EDGE = 5e-10
+
+# The share of the contact force by which it must jump at a joint; the pieces of a smooth chart differ by less.
+LEAST_JUMP = 1e-11
 
 # The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
 # of the phase angle.
@@ -212,7 +215,8 @@ def _on_segment(
     if timed.end == "liftoff" and quantity is not SPEED and _ends_at_joint(timed):
         stop -= BEFORE_JOINT * (stop - start)  # the body leaves before the load beyond the joint acts
     low, high = min(start, stop), max(start, stop)
-    phi = _samples(segment, low, high)
+    joints, found = _limits_at_joints(timed, trajectory, quantity, low, high)
+    phi = _samples(segment, joints, low, high)
 
     def signed(angles: Array) -> Array:
         values = sign * quantity.at(timed, angles)
@@ -224,7 +228,6 @@ def _on_segment(
     if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * _size(np.delete(values, at_cusp)):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
     size = _size(values)
-    joints, found = _limits_at_joints(timed, trajectory, quantity, low, high)
     for k in _peaks(values, size)[:MAX_PEAKS]:
         if values[k] == np.inf:
             found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
@@ -245,25 +248,23 @@ def _on_segment(
     return size, sorted(found, key=lambda peak: peak.t)
 
 
-def _samples(segment: Any, low: float, high: float) -> Array:
-    """Return the phase angles between two of a segment at which a quantity is sampled, in order.
-
-    If the curve has joints, at which the quantity may jump, places on both sides of each edge are among them.
+def _samples(segment: Any, joints: Array, low: float, high: float) -> Array:
+    """Return the phase angles between two of a segment at which a quantity is sampled, in order; places on both sides
+    of the joints, at which it jumps, are among them.
     """
-    edges = segment.edges
-    widths = np.diff(edges)
+    edges, beside = segment.edges, BESIDE_EDGE * (high - low)
     steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
-    inside = (edges[:-1, None] + widths[:, None] * steps).ravel()
-    if segment.functions.joints.size:
-        inside = np.concatenate([inside, edges[:-1] + BESIDE_EDGE * widths, edges[1:] - BESIDE_EDGE * widths])
+    inside = np.concatenate(
+        [(edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), joints - beside, joints + beside]
+    )
     return np.unique([low, *inside[(inside > low) & (inside < high)], high])
 
 
 def _limits_at_joints(
     timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, low: float, high: float
 ) -> tuple[Array, list[Extreme]]:
-    """Return the phase angles of the joints between two phase angles of a timed segment, and the limits of a quantity
-    from both sides of each joint, if it may jump there.
+    """Return the phase angles of the joints between two phase angles of a timed segment at which a quantity jumps, and
+    its limits from both sides there.
     """
     segment = timed.segment
     f, edges = segment.functions, segment.edges
@@ -273,23 +274,28 @@ def _limits_at_joints(
     distances, clear = np.abs(segment.places(edges)[:, None] - joints), CORNER_ROUNDINGS * np.spacing(np.abs(joints))
     phi, is_edge = edges[distances.argmin(axis=0)], distances.min(axis=0, initial=np.inf) <= clear
     phi, joints, clear = phi[is_edge], joints[is_edge], clear[is_edge]  # the quantity does not jump inside a panel
-    limits = [quantity.beside(timed, phi, joints + side * clear).tolist() for side in (-1.0, 1.0)]
-    places = (joints + timed.laps * trajectory.lap).tolist()
+    limits = np.array([quantity.beside(timed, phi, joints + side * clear) for side in (-1.0, 1.0)])
+    jumps = np.abs(limits[1] - limits[0]) > LEAST_JUMP * np.abs(limits).max(axis=0)
+    phi, places, limits = phi[jumps], joints[jumps] + timed.laps * trajectory.lap, limits[:, jumps]
     times = [time_of(timed, trajectory, angle) for angle in phi.tolist()]
-    return phi, [Extreme(*one) for values in limits for one in zip(values, times, places, strict=True)]
+    return phi, [
+        Extreme(*one) for values in limits.tolist() for one in zip(values, times, places.tolist(), strict=True)
+    ]
 
 
 def _peaks(values: Array, size: float) -> list[int]:
-    """Return the indices of samples that no neighbour exceeds, the largest first; of equal ones side by side, only the
-    first and the last count.
+    """Return the indices of samples that no neighbour exceeds, the largest first; of samples side by side that are
+    equal within rounding, at most the first and the largest.
     """
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    before, after = padded[:-2], padded[2:]
-    same = EQUAL_ROUNDINGS * ULP * size
+    peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:])).tolist()
     with np.errstate(invalid="ignore"):  # infinite values
-        is_level = (np.abs(values - before) <= same) & (np.abs(values - after) <= same)
-    peaks = np.flatnonzero((values >= before) & (values >= after) & ~is_level).tolist()
-    return sorted(peaks, key=lambda k: -float(values[k]))
+        level = np.cumsum(np.abs(np.diff(values, prepend=values[:1])) > EQUAL_ROUNDINGS * ULP * size).tolist()
+    by_value = sorted(peaks, key=lambda k: -float(values[k]))
+    largest = {level[k]: k for k in reversed(by_value)}
+    first = {level[k]: k for k in reversed(peaks)}
+    kept = {*largest.values(), *first.values()}
+    return [k for k in by_value if k in kept]
 
 
 def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:
