@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numba import types
 from numpy.polynomial.chebyshev import chebder
+from numpy.typing import NDArray
 
 from gqm_sym.errors import ParameterError
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
@@ -163,8 +164,7 @@ class TrackOfTrain:
         else:
             raise ParameterError("train: the potential changes too fast along the track; keep it off its centre")
         # Powers of u would magnify the noise in trailing coefficients.
-        used = np.flip(np.logical_or.accumulate(np.flip(above, axis=2), axis=2), axis=2)
-        bends = np.where(used, coefficients, 0.0) @ AT_NODES
+        bends = up_to_last(above, coefficients) @ AT_NODES
         first = self._along(track, p, edges[:1])[::3, 0]
         blocks = blocks_of_functions(edges, first, rows[:, 1].swapaxes(0, 1), bends.swapaxes(0, 1), track.period)
         return [Charted(block, edges, True) for block in blocks]
@@ -339,6 +339,13 @@ def mean_over_train(charted: Charted, edges: Array, length: float, period: float
     first = _first_mean(charted, block, (edges[0] - 0.5 * length, edges[0] + 0.5 * length), period)
     (made,) = blocks_of_functions(edges, np.array([first]), slopes[:, None], bends[:, None], period)
     return made
+
+
+def up_to_last(above: NDArray[np.bool_], coefficients: Array) -> Array:
+    """Return coefficients (the last axis), with zeros for those behind the last one that is ``above`` the noise."""
+    used = np.flip(np.logical_or.accumulate(np.flip(above, axis=-1), axis=-1), axis=-1)
+    found: Array = np.where(used, coefficients, 0.0)
+    return found
 
 
 def fitted_slopes(values: Array) -> Array:

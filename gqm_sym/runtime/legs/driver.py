@@ -65,12 +65,7 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
 )
 from gqm_sym.runtime.legs.leg_segments import Run, Runs, TurnedLegs, panelled
-from gqm_sym.runtime.legs.questions import (
-    LEGS,
-    MAX_PAUSES,
-    MAX_TURNS,
-    RUN_AGAIN,
-)
+from gqm_sym.runtime.legs.questions import LEGS, MAX_PAUSES, MAX_TURNS, RUN_AGAIN
 from gqm_sym.runtime.legs.runs.ends import (
     END_ASYMPTOTE,
     END_LIMIT,

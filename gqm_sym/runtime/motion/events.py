@@ -88,13 +88,6 @@ class Leg(NamedTuple):
     end: str
 
 
-def contact_force(segment: Segment, phi: Array) -> Array:
-    """Return the contact force N in N at phase angles of a segment."""
-    f = segment.functions
-    force: Array = path_and_force_at(f.addresses, f.p, segment.places(phi), segment.speeds(phi) ** 2)[4]
-    return force
-
-
 def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Array:
     """Return the contact force in N at phase angles of a timed segment; in a rotating frame it depends on the direction
     of motion.

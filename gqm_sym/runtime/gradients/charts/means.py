@@ -27,12 +27,7 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import Pair, two_sum
 from gqm_sym.runtime.charts.chart import Chart, SpaceChart
-from gqm_sym.runtime.charts.double_double.making import (
-    Samples,
-    TruePieces,
-    sample_places,
-    starting_context,
-)
+from gqm_sym.runtime.charts.double_double.making import Samples, TruePieces, sample_places, starting_context
 from gqm_sym.runtime.charts.double_double.pieces import NODES
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.train import TrackOfTrain

@@ -23,6 +23,7 @@ from gqm_sym.runtime.charts.train import (
     fitted_slopes,
     mean_over_train,
     slopes_by_length,
+    up_to_last,
 )
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, Array
@@ -159,8 +160,7 @@ class ChangesOfTrain:
                 break
             edges = np.sort(np.append(edges, (edges[:-1] + half)[coarse]))
         # Derivatives would magnify the noise in trailing coefficients.
-        used = np.flip(np.logical_or.accumulate(np.flip(above, axis=2), axis=2), axis=2)
-        coefficients = np.where(used, coefficients, 0.0)
+        coefficients = up_to_last(above, coefficients)
         slopes = fitted_slopes(coefficients @ AT_NODES) / half[:, None]
         slopes[0] = rows[-1].reshape(places.shape)
         bends = fitted_slopes(slopes) / half[:, None]
