@@ -106,7 +106,7 @@ class Inner:
         self.__name__, self.__doc__ = function.__name__, function.__doc__
         self._dispatcher: Any = None
         self._called: Any = None
-        self._plain: Any = None
+        self._plain: dict[Any, PlainEntry] = {}
 
     @property
     def dispatcher(self) -> Any:
@@ -116,11 +116,13 @@ class Inner:
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled function from Python."""
+        """Call the function from Python, which runs it at first; numbers keep their types, as in compiled code."""
         if self._called is None:
+            kinds = tuple(map(typeof, arguments))
             try:
-                self._plain = self._plain or _plain_entry(self.py_func, tuple(map(typeof, arguments)))
-                return self._plain(arguments)
+                if kinds not in self._plain:
+                    self._plain[kinds] = _plain_entry(self.py_func, kinds)
+                return self._plain[kinds](arguments)
             except NotPlainError:
                 self._called = COMPILER.called(self.py_func)
         try:
