@@ -203,6 +203,7 @@ def eccentric_anomaly(e: str, t: float) -> mpf:
         return mp.findroot(lambda E: E - number(e) * mp.sin(E) - mean, mean)
 
 
+@pytest.mark.sample(1)
 @ECCENTRICITIES
 def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
     """V**2 is k*(2/r - 1/a) all round, and N is zero to rounding."""
@@ -217,6 +218,7 @@ def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
     assert np.abs(field.normal_force).max() <= KEPLER_FIELD * np.abs(field.kappa * field.v2).max()
 
 
+@pytest.mark.sample(1)
 @ECCENTRICITIES
 def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None:
     """A planet obeys the third law, and Kepler's equation gives its place at any time."""
@@ -229,6 +231,7 @@ def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None
         assert error(motion.lam(t), truth) <= KEPLER_POSITION * float(max(truth, 2 * mp.pi))
 
 
+@pytest.mark.sample(1)
 @ECCENTRICITIES
 def test_the_centre_may_be_anywhere(e: str, module_named: ModuleNamed) -> None:
     """If the centre is an expression in a parameter, the period is the same and the track is still not needed."""

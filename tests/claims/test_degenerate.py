@@ -134,6 +134,7 @@ def test_periods(edge_motion: MotionOf) -> None:
     assert sum(u <= MOST_ULPS for u in lost) >= MOST_SHARE * len(lost)
 
 
+@pytest.mark.sample(18)
 @EVERY_EDGE
 def test_positions(edge: Edge, edge_motion: MotionOf) -> None:
     """lam, x, z and v are right at any time: early, late, and at times of fast motion."""
@@ -165,6 +166,7 @@ def test_the_error_bound_is_honest(edge: Edge, edge_motion: MotionOf) -> None:
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
 
 
+@pytest.mark.sample(18)
 @EVERY_EDGE
 def test_the_error_bound_is_useful(edge: Edge, edge_motion: MotionOf) -> None:
     """The error bound is at most a hundred times the error. The worst ratio measured is 63."""

@@ -435,7 +435,7 @@ LOSSES = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("name", CUSPED)
 def test_cusps_at_places_that_are_not_zero(name: str, loss: str, build: Build) -> None:

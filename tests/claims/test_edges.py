@@ -29,6 +29,7 @@ HALF_PIPE = gqm.Curve.piecewise(
 BALL = gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "launch",
     [
@@ -194,7 +195,7 @@ def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
             module.solve(1, 0, -1)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("height", "domain", "lam0", "t"),
     [("log(x)", None, 0.9, 2.0), ("-1/x", None, 0.9, 2.0), ("x**(9/10)", (0, None), 1.0, None)],
@@ -274,6 +275,7 @@ def test_a_body_that_falls_into_a_centre_along_a_chart(slope: float | None, buil
     assert module.solve(4.0 * scale, 3.0, -1).events[-1].kind == "singular-point"
 
 
+@pytest.mark.extended
 def test_the_contact_force_before_a_pole(built: Build) -> None:
     """On a parabola through the centre of a force the only change of the sign of N is one that is no rounding.
 
@@ -422,6 +424,7 @@ def test_what_is_no_model_is_refused_by_name() -> None:
     assert issubclass(DeclarationError, GQMError)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "force"), [("vee", gqm.Gravity()), ("rough_vee", gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))]
 )

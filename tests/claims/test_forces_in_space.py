@@ -55,6 +55,7 @@ def test_a_frame_that_turns(mu: float, built: Build) -> None:
             assert np.all(np.abs(path.normal_force[~same] - state.normal_force[~same]) > 0.1)
 
 
+@pytest.mark.extended
 def test_a_frame_that_turns_has_extremes_of_its_contact_force(built: Build) -> None:
     """No state exceeds the extremes of the contact force, and sweeps return the same numbers within two
     roundings.
@@ -184,7 +185,7 @@ def test_a_track_that_turns_and_pushes_upwards_only(lam0: float, v0: float, way:
 TURNING_VALLEY = gqm.Curve.space(x="10*u", y="4*sin(u/2)", z="2*u**2", parameter="u", roll="pi/3")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("lam0", "v0", "way", "legs"), [(0.1, 10.0, 1, 2), (1.2, 6.7, -1, 1)])
 def test_a_rough_track_that_turns_and_pushes_upwards_only(
     lam0: float, v0: float, way: int, legs: int, built: Build

@@ -132,6 +132,7 @@ LOOKS = {
 ATTACKS = {**CODE, **GIANTS, **LOOKS}
 
 
+@pytest.mark.sample(48)
 @pytest.mark.parametrize("key", ["z", "value", "lam0"])
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_expression_does_harm(
@@ -156,7 +157,7 @@ def test_no_expression_does_harm(
         assert printed.err.replace("\n", "").isprintable()
 
 
-@pytest.mark.sample(10)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_expression_does_harm_in_python(attack: str, witness: Path) -> None:
     """In Python too, a curve, a potential and an argument of a family are read as arithmetic only."""

@@ -70,7 +70,7 @@ def passages(spline: Any, drag: Any) -> list[tuple[Any, Any, Any]]:
     return found
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.filterwarnings("ignore:.*the points scatter")
 @pytest.mark.parametrize(("scatter", "drag"), [(0.01, "0"), (0.05, "0"), (0.05, DRAG)])
 def test_bounds_along_a_spline_through_scattered_points(scatter: float, drag: str) -> None:

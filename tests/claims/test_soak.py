@@ -218,6 +218,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     return soak_kinds.build(tmp_path_factory.mktemp("kinds"))
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("near", [1e-1, 2.5e-3, 1e-6, 1e-10, -1e-10, -2.5e-3])
 @pytest.mark.parametrize("v0", [0.68, 1e-5, 60.0])
 def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dict[str, ModuleType]) -> None:

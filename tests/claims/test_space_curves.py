@@ -35,6 +35,7 @@ def derived(row: dict[str, Any]) -> gqm.Model:
     return gqm.derive(gqm.Curve.space(x=x, y=y, z=z, parameter="u"), force)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("name", ROWS)
 def test_closed_forms_of_the_twelve(name: str) -> None:
     """Closed forms of the twelve give V**2 and the contact force, along each axis and in length, to 30 digits."""

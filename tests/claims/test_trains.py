@@ -472,7 +472,7 @@ def test_cars_pass_jumps_of_curvature(build: Build) -> None:
         assert leg.lam_end == pytest.approx(place, rel=ROUNDING)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("in_space", [True, False])
 def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
     """A short train moves like a body with friction in the limit; at a length of a nanometre both move alike."""

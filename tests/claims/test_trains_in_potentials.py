@@ -33,7 +33,7 @@ def sinc(length: Any, radius: Any) -> Any:
     return mp.sinc(mpf(length) / mpf(radius))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("radius", "length", "place"), [(1, 1, 1.2), (2, 1.5, -0.7), (3, 2, 2.0), (1, 1e-6, 1.0), (1, 2.0**-40, 0.01)]
 )
@@ -239,6 +239,7 @@ def test_friction_on_a_rotating_hoop(build_train: Build) -> None:
     assert found.coupling_force == pytest.approx(lacking[:-1], rel=0, abs=1e-12)
 
 
+@pytest.mark.extended
 def test_friction_on_a_rotating_helix(build_train: Build) -> None:
     """On a helix about the axis all cars press alike, so that time and place are integrals over the speed, which mpmath
     has in 30 digits; upwards and downwards the Coriolis force has opposite signs.

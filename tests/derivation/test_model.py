@@ -123,7 +123,7 @@ def differences(function, at: mpf) -> tuple[mpf, mpf]:
     return slope / step, (bend - mpf(205) / 72 * function(at)) / step**2
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.parametrize("place", ["1/3", "11/7"])
 def test_forms_agree_with_numerical_differentiation(name, place):

@@ -20,7 +20,7 @@ def slid(_: Any, x: Any, z: Any, p: Any) -> tuple[Any, Any, Any]:
     return p[0] * z - p[1] * x, -p[1], p[0]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", [gqm.Gravity(), gqm.Gravity() + gqm.Rolling(beta="2/5")])
 @pytest.mark.parametrize("v0", [0.0, 0.7])
 def test_times_of_solved_motions(force: gqm.Kernel, v0: float, tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_the_interface_is_the_runtimes() -> None:
     assert INTERFACE == interface.INTERFACE
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("head", HEADS)
 def test_numbers_of_every_head(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values, differences and bounds are those of the declared text; exact forms to 60 digits.

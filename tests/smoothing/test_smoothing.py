@@ -130,7 +130,7 @@ def loads(truth: Truth, curve: gqm.Curve, s: np.ndarray | None = None) -> tuple[
     return np.cos(alpha) + 2.0 * (top - z) * kappa - right, 2.0 * (top - z)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("scatter", [0.001, 0.01, 0.1])
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("known", [True, False], ids=["known", "auto"])
@@ -347,6 +347,7 @@ def test_what_is_reported() -> None:
     assert gqm.Curve.graph("x**2").smoothing is None
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("count", [40, 160, 400])
 def test_the_warning(name: str, count: int) -> None:
@@ -411,6 +412,7 @@ def written(folder: Path, smoothing: str) -> Path:
     return folder / "track.yaml"
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("text", "smoothing"),
     [("0.02", 0.02), ("auto", "auto"), ("1/50", 0.02), ("{value: 20, unit: mm}", 0.02), ("{value: auto}", "auto")],

@@ -577,6 +577,7 @@ def test_what_cannot_be_solved(case: tuple[str, list[str]], tmp_path: Path) -> N
     assert found == expected
 
 
+@pytest.mark.extended
 def test_a_number_that_sympy_stumbles_over(tmp_path: Path) -> None:
     """A sine of 10**300 lies between -1 and 1, whatever SymPy does with the arc sine of it."""
     spec = read(tmp_path, edited(("h*x**2", "h*asin(sin(10**300*x))"), ("lam0: 1/2", "lam0: 2")))

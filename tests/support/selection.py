@@ -22,7 +22,18 @@ EXTENDED_EXAMPLES, USUAL_EXAMPLES = 100, 25
 
 # Notebooks that show on one more example what others and the tests of the same calls show too. They take most of the
 # time of all notebooks.
-EXTENDED_NOTEBOOKS = ("absorber", "damping", "descent", "design", "families", "kepler", "kernels", "period_law", "rail")
+EXTENDED_NOTEBOOKS = (
+    "absorber",
+    "coaster",
+    "damping",
+    "descent",
+    "design",
+    "families",
+    "kepler",
+    "kernels",
+    "period_law",
+    "rail",
+)
 
 
 def examples(count: int) -> settings:

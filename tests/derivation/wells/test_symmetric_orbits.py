@@ -112,7 +112,7 @@ def by_heights(model: gqm.Model, half: mpf) -> mpf:
     return 2 * integral(rate)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", CASES)
 def test_the_time_is_that_of_the_motion(name: str) -> None:
     """Both integrals have the same value."""
@@ -196,7 +196,7 @@ FORCES = [
 ]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("axis", ["x", "catenary"])
 @pytest.mark.parametrize("force", range(len(FORCES)))
 def test_powers_and_waves_together(axis: str, force: int) -> None:

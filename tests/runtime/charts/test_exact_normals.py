@@ -67,7 +67,7 @@ SWINGS = [
 ]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("launch", "kind", "digits"), SWINGS, ids=lambda value: str(value))
 def test_pendulum(ring: ModuleType, launch: dict[str, Any], kind: str, digits: int) -> None:
     """Kind and period are right to many digits, up to the limits between swings and rounds."""
@@ -109,6 +109,7 @@ def test_late(ring: ModuleType) -> None:
         assert overstatement(motion, rows, 2.4) <= USEFUL
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lam0", ["0", "1/2", "-2"])
 def test_towards_the_top(ring: ModuleType, lam0: str) -> None:
     """On the separatrix tan((angle + pi)/4) grows as exp(omega*t), and the bound holds there too."""

@@ -254,6 +254,7 @@ def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
     assert abs(lost.t - brentq(force, run.t[0], 0.5 * (run.t[0] + run.t[-1]), xtol=1e-15)) <= 1e-10
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("s0", "v0"), [(2.5, 1e-5), (2.5, 1e-8), (1.0 - 2.0**-30, 0.0)])
 def test_slow_motion_along_a_level_line(s0: float, v0: float, tmp_path: Path) -> None:
     """Between two arcs a body turns after a pendulum's quarter period on each, however slowly it crosses the line.

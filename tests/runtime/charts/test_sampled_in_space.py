@@ -76,6 +76,7 @@ def test_losses_along_points_in_space() -> None:
         assert np.abs(getattr(found, name) - getattr(wanted, name)).max() <= allowed, name
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("cosine", "sine"), [(1.0, 0.0), (0.6, 0.8)])
 def test_points_in_a_vertical_plane(cosine: float, sine: float) -> None:
     """Points in a vertical plane give the planar answers: times to the rounding of coordinates, and the contact force

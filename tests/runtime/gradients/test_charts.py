@@ -275,6 +275,7 @@ def test_an_arc_between_cusps(generated_folder: Path) -> None:
             assert motion.gradient("half_period", key)[key] == pytest.approx(quotient(duration, given, name), rel=2e-15)
 
 
+@pytest.mark.extended
 def test_an_exponent_with_losses(generated_folder: Path) -> None:
     """With friction, too, an exponent of negative numbers alone is refused."""
     curve = gqm.Curve.implicit("(x/a)**n + (z/b)**n - 1", start=(0, "-b"), parameters={"a": 1, "b": 1, "n": 2})
@@ -393,6 +394,7 @@ def test_a_slide_in_space(generated_folder: Path) -> None:
     assert held.gradient("t_end", ("g", "v0")) == pytest.approx(motion.gradient("t_end", ("g", "v0")), rel=1e-13)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("lam0", "v0"), [("0.3", "1"), ("0.05", "0")])
 def test_a_body_that_leaves_an_ellipse(lam0: str, v0: str, generated_folder: Path) -> None:
     """A body on top of an ellipse slides down until it lifts off; this time and that of a place before have the

@@ -55,6 +55,7 @@ def slid(force: str, lam: float, v: float, stops: list[float]) -> float:
     return spent
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("force", ["free", "rough"])
 @pytest.mark.parametrize("is_reversed", [False, True])
 @pytest.mark.parametrize(

@@ -64,6 +64,7 @@ def sampled(motion: Motion, name: str) -> float:
     return float(values.max() if name.endswith("max") else values.min())
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> None:
     """No state exceeds an extreme, some are close to it, and the state at its time and place has its value."""
@@ -140,6 +141,7 @@ CUSP_FORCES = {
 }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("force", CUSP_FORCES)
 @pytest.mark.parametrize(("lam0", "direction"), [(-1.5, 1), (1.25, -1)])
 def test_a_load_that_grows_without_bound(force: str, lam0: float, direction: int, tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def answers(motion: Any) -> list[Any]:
     ]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LAUNCHES)
 def test_six_threads_get_the_answers_of_one(name: str, module_named: ModuleOf) -> None:
     """Six threads begin at the same time, each with another question, and get the same answers."""

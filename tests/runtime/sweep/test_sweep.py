@@ -216,6 +216,7 @@ def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
         assert value == pytest.approx(once, rel=ARRIVAL, abs=rounding)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("track", "v0", "size"),
     [
@@ -398,6 +399,7 @@ def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
             assert value == pytest.approx(float(time_of_flight(mpf(v0))), rel=1e-13)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("omega", [0.7, 2.0, 3.0, 4.0])
 def test_a_hoop_that_turns(omega: float) -> None:
     """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above it."""
@@ -428,6 +430,7 @@ WIDE = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", WIDE)
 def test_wide_orbits_stay_in_batches(name: str, generated_folder: Path) -> None:
     """Half periods of orbits as wide as possible have all digits."""
@@ -522,6 +525,7 @@ def test_small_swings_keep_contact(module_of: ModuleOf) -> None:
     assert swept.route_counts() == {"single": 9}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("quantity", ["half_period", "period", "turning_points"])
 def test_motions_that_end_at_cusps_are_not_solved_one_by_one(quantity: str) -> None:
     """On the hump of a cycloid bodies slide down to the cusp at either end, and none of their motions repeats."""

@@ -78,6 +78,7 @@ def test_differences_of_formulas(name: str) -> None:
                 assert abs(value - true) <= 1e-14 * size
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", FORMULAS)
 def test_python_gives_the_same_bits(name: str) -> None:
     """Programs carried out by plain Python and by compiled code have the same results."""

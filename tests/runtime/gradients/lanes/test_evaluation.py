@@ -125,7 +125,7 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(*found)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("quantity", ["turning_points", "v_min", "v_max", "normal_force_min", "normal_force_max"])
 def test_turning_points_and_extremes_in_any_company(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Derivatives of turning points and extremes have the same bits alone, anywhere among others, and by machine

@@ -79,7 +79,7 @@ def largest(function: Callable[[Any], Any], a: mpf, b: mpf) -> float:
 
 # The turns after the first of these launches lie beyond both kinks, and those after the others next to them or between
 # them.
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("start", [1.125, 0.6875, 0.5, 0.375])
 def test_droplet_past_kinks(start: float, generated_folder: Path) -> None:
     """Turns, times, extremes and places agree wherever the turns lie with respect to the kinks."""

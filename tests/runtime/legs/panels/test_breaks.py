@@ -154,6 +154,7 @@ def test_rest_on_a_corner(tmp_path: Path) -> None:
         assert abs(motion.state(0.1).lam - (2.0 * CORNER + way * down * 0.005)) <= 1e-15
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", ["friction", "droplet"])
 def test_rails_whose_curvature_jumps(force: str, tmp_path: Path) -> None:
     """Motions on arcs and lines are followed through many turns, and lose energy on all of them."""

@@ -29,6 +29,7 @@ def passed(v2: float, data: Any) -> Any:
     return pass_few(v2, data, 1, few_buffer())
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize(("width", "v2"), [(0.03125, 0.6), (0.03125, 3.0), (0.03125, 40.0), (0.05, 1.0), (0.0625, 3.0)])
 def test_a_part(direction: int, width: float, v2: float) -> None:
@@ -88,7 +89,7 @@ def rings(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], CompiledM
     return built
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("pieces", "amplitude"), [(80, 0.18), (80, 0.21), (80, 0.55), (8, 0.55), (8, 1.1)])
 def test_times_to_rest_on_a_tilted_circle(pieces: int, amplitude: float, rings: Callable[[int], CompiledModel]) -> None:
     """Legs along some short pieces, on which V**2 is far from linear, and along many; and turns sought on parts of long

@@ -245,7 +245,7 @@ LAWS: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("height", "slope", "start", "force"),
     [
@@ -330,7 +330,7 @@ IN_SPACE = [
 ]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "curve", "given", "turns", "durations", "passage", "largest"), IN_SPACE)
 def test_friction_in_space(
     name: str,

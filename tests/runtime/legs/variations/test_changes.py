@@ -151,7 +151,7 @@ def integrated(name: str, launch: dict[str, float], times: Any) -> Any:
     return out
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", TRACKS)
 @examples(2)
 @given(data=st.data())

@@ -115,6 +115,7 @@ def time_in_a_well(potential: Any, slope: Any, lam0: mpf, v0: mpf, direction: in
     return start + stop if direction < 0 else 2 * time(mp.pi) - start - stop
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("direction", "place"), [(1, 1.15), (-1, 0.95), (1, 0.8), (-1, 1.17)])
 def test_a_well_without_symmetry(direction: int, place: float) -> None:
     """In one of two wells, derivatives are those of quadratures with 40 digits."""
