@@ -109,6 +109,7 @@ def test_the_table_has_what_is_hard() -> None:
     assert {edge.expected["kind"] for edge in EDGES} == {"libration", "circulation", "transit"}
 
 
+@pytest.mark.sample(26)
 @EVERY_EDGE
 def test_kind_and_turning_points(edge: Edge, edge_motion: MotionOf) -> None:
     """The motion has the kind of the exact launch, and its turning points are the doubles nearest to the exact ones."""
@@ -236,7 +237,7 @@ def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], Module
             assert state.error <= 2.0 * POSITION
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("exponent", "side"), [(15, 1), (17, -1), (20, 1), (30, 1), (30, -1)])
 def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str], ModuleType]) -> None:
     """A launch next to the top is right on either side, whichever double is nearest (on one side it failed)."""

@@ -406,7 +406,7 @@ def test_a_viscous_law_on_the_level(build: Build) -> None:
         assert np.all(motion.error_bound(t) <= 1e-12 * max(1.0, abs(lam0) + v0 / c))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("loss", ["friction", "drag"])
 def test_every_body_that_comes_to_a_cusp_ends_there(loss: str, build: Build) -> None:
     """Every body ends at a cusp, with losses too (one in ten went through if the nodes of its panels did not show the

@@ -2,11 +2,13 @@
 
 import runpy
 
+import pytest
 from paths import ROOT
 
 import gqm_sym as gqm
 
 
+@pytest.mark.extended
 def test_pages_are_current() -> None:
     """The committed pages are those that the script writes, one for each family and an index."""
     pages = runpy.run_path(str(ROOT / "scripts" / "make_family_pages.py"))["pages"]()

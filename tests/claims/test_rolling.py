@@ -155,7 +155,7 @@ def test_on_a_flat_bottom(generated_folder: Path) -> None:
         assert ulps(motion.half_period, exact) <= NEAREST
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("share", ["1/2", "9/10", "99/100"])
 def test_small_swings_of_a_ball_that_all_but_fills_its_loop(share: str, loop: ModuleType, bowl: ModuleType) -> None:
     """The path of the centre has the rounding errors of the curve, magnified; places were up to seven bounds off."""

@@ -130,6 +130,7 @@ def test_forces_by_the_definition(
             assert on_track == pytest.approx([*map(float, track(u))], rel=1e-13, abs=1e-13)
 
 
+@pytest.mark.extended
 def test_rates_of_loads(built: Build) -> None:
     """The rates of the loads are the differences of the loads."""
     written = TRACKS[0][0]

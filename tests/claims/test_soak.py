@@ -162,7 +162,7 @@ NEAR_HILLTOP = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", SMALL)
 def test_small_swings_where_large_forces_cancel(name: str, families: dict[str, ModuleType]) -> None:
     """The turning points in doubles have an error of one rounding of the forces over their small sum."""

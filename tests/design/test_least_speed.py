@@ -43,6 +43,7 @@ def test_from_any_place_of_the_loop() -> None:
     assert near(gqm.least_speed(generated.circle, 1, between=(-4, 4)), expected)
 
 
+@pytest.mark.extended
 def test_loop_the_ellipse() -> None:
     """At the top κ is b/a², so that v0² is g a²/b + 4 g b from the lowest point."""
     a, b, g = 1.0, 2.0, 9.81

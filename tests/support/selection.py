@@ -31,6 +31,7 @@ EXTENDED_NOTEBOOKS = (
     "families",
     "kepler",
     "kernels",
+    "own_curve",
     "period_law",
     "rail",
 )

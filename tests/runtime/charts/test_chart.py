@@ -136,7 +136,7 @@ def test_divided_differences(size: float) -> None:
             assert abs(swapped - second) <= 4e-13
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("ring_", [Ring(3), Ring(9), Ring(9, closed=False)])
 def test_differences_over_one_place_and_many(ring_: Ring) -> None:
     """The differences of height, x and angle over a place and many others, in any order, are those of the circle."""

@@ -180,6 +180,7 @@ def swing(t: Any, v0: Any, L: Any, length: Any, g: Any) -> tuple[Any, ...]:
     return L * angle, L * mp.sin(angle), -L * mp.cos(angle), v, v * v / L + g * mp.cos(angle)
 
 
+@pytest.mark.extended
 def test_states(tmp_path_factory: pytest.TempPathFactory) -> None:
     """States of trains that swing or go round have the derivatives of elliptic functions, after some periods."""
     law, folder = gqm.Gravity() + gqm.Train(cars=3), tmp_path_factory.mktemp("states")

@@ -89,7 +89,7 @@ def test_no_narrow_barrier_is_jumped(
         assert abs(mpf(place) - truth) <= allowed
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("width", [1e-3, 1e-6])
 def test_a_motion_is_held_by_a_narrow_barrier(width: float, field: Callable[[str], ModuleType]) -> None:
     """In a wide bowl with a narrow spike the swing ends at the spike or goes on to the far side, as the energy

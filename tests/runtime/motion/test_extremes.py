@@ -64,7 +64,7 @@ def sampled(motion: Motion, name: str) -> float:
     return float(values.max() if name.endswith("max") else values.min())
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> None:
     """No state exceeds an extreme, some are close to it, and the state at its time and place has its value."""

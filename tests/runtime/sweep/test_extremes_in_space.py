@@ -114,7 +114,7 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
             assert abs(largest - force) <= 2e-13 * force
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
 def test_with_friction_as_solved_motions(build: Build, name: str) -> None:
     """Bodies that slide to rest have the extremes of solved motions within roundings of the largest force."""

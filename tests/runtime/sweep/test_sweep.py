@@ -488,6 +488,7 @@ def test_bodies_leave_through_the_ends_of_a_line(incline: ModuleType) -> None:
     assert incline.sweep("half_period", lam0, v0, direction).status_counts() == {STATUS_SENTENCES[2]: lam0.size}
 
 
+@pytest.mark.extended
 def test_bodies_that_leave_come_to_places(incline: ModuleType) -> None:
     """Bodies reach places before and behind the turning point, but none beyond it or against the direction of
     motion.

@@ -224,7 +224,7 @@ def test_the_bound_along_a_track_of_scattered_points(
         assert abs(mpf(duration.high) + mpf(duration.low) - truth) <= duration.error <= 1e-24 * truth
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("g", [0.4, 1.62, 9.81])
 def test_swings_too_small_for_doubles_along_a_chart(g: float, ring: ModuleType) -> None:
     """In doubles the bottom has an error of 1e-16, which the bound did not include if no extended precision was

@@ -70,6 +70,7 @@ def test_transition(tmp_path: Path) -> None:
         assert abs(mpf(float(found)) - lean) <= 4 * ROUNDING
 
 
+@pytest.mark.extended
 def test_helix(tmp_path: Path) -> None:
     """Constant curvature and torsion give a helix, many turns long."""
     radius, rise = 2.0, 0.75

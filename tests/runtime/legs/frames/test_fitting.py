@@ -52,7 +52,7 @@ def exactly(number: Fraction) -> Any:
     return mpf(number.numerator) / number.denominator
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("seed", range(12))
 def test_viscous_swings_about_a_joint(seed: int, rails: dict[str, ModuleType]) -> None:
     """Legs take as long as on two springs, and places are those of the springs within the bound.

@@ -74,7 +74,7 @@ def slide(points: Any, lam0: float, v0: float, way: int, mu: float) -> tuple[Any
     return np.array([*rows, (t, place, Long(0), Long(0), way)]), end
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
     """Random launches come to rest, on planes and on corners, at the times and places of closed forms."""
     module, points = track
