@@ -17,6 +17,7 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.motion.motion import end_of_legs
 
 # The step of a difference quotient, as a share of the parameter, for motions without gradients.
 STEP = 1e-6
@@ -276,7 +277,7 @@ class Residuals:
 
 def _until_rest(motion: Any, t: Array) -> Array:
     """Return times, with those after the body has come to rest replaced by the time of rest, because it stays there."""
-    end = motion.t_end if motion.kind == "dissipative" else inf
+    end = end_of_legs(motion) if motion.kind == "dissipative" else inf
     return np.minimum(t, end) if isfinite(end) and motion.legs[-1].end == "rest" else t
 
 
