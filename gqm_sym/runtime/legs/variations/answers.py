@@ -296,20 +296,22 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
 
     Inside a leg the extreme changes as the quantity does at a fixed time, because the quantity is stationary there
     (envelope theorem); the same holds if the horizon cuts the motion there. If the motion ends by itself there, the
-    time of the extreme changes too. An extreme at a jump of the force stays there.
+    time of the extreme changes too. An extreme at a jump of the force stays there, also if the body leaves the track
+    at the jump.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
     t_end, moved = motion._end_of_legs(), np.zeros((changes.variables, 1))
-    if abs(t_end - found.t) <= AT_END * t_end:
+    at_end, at_break = abs(t_end - found.t) <= AT_END * t_end, _is_at_break(changes, found.lam)
+    if at_end and not (at_break and motion.legs[-1].end == "liftoff"):
         t, moved = t_end, end(motion, changes)[1][:, None]
     else:
         t, is_stationary = _improved(motion, changes, of_speed, found)
-        if not is_stationary and _is_at_break(changes, found.lam):
+        if not is_stationary and at_break:
             # It is evaluated at two times on the side of the extreme, and extrapolated to the time of the extreme
             # itself.
-            sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]]) * SIDE_SHARE * t_end
+            sides = found.t + np.array([[-1.0, -2.0], [1.0, 2.0]])[: 1 if at_end else 2] * SIDE_SHARE * t_end
             states = [motion.state(side[0]) for side in sides]
             values = [abs(state.v) if of_speed else state.normal_force for state in states]
             near, far = _changed(
