@@ -13,6 +13,7 @@ import sympy
 from sympy import Expr, Function, Integer, Rational, S, Symbol
 
 from gqm_sym.budgets import check_budget
+from gqm_sym.derivation.algebra.quotients import Quotient, quotient_of
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import MEAN_HEIGHT, MEAN_PARTS, SPACE, chart_alpha, chart_x, chart_z
 
@@ -90,10 +91,11 @@ class Differences:
             return S.One
         if u.is_Add:
             return sympy.Add(*[self.first(term, i, j) for term in u.args])
-        if u.is_Mul:
+        outermost = _outermost(u, self.parameter)
+        if outermost is None:
             left, right = _halves(u, self.parameter)
             return self.first(left, i, j) * self.value(right, j) + self.value(left, i) * self.first(right, i, j)
-        outer, inner = _outermost(u, self.parameter)
+        outer, inner = outermost
         return outer.first(self.value(inner, i), self.value(inner, j), self.gap(inner, i, j)) * self.first(inner, i, j)
 
     def _build_second(self, u: Expr) -> Expr:
@@ -101,14 +103,15 @@ class Differences:
             return S.Zero
         if u.is_Add:
             return sympy.Add(*[self.second(term) for term in u.args])
-        if u.is_Mul:
+        outermost = _outermost(u, self.parameter)
+        if outermost is None:
             left, right = _halves(u, self.parameter)
             return (
                 self.second(left) * self.value(right, 2)
                 + self.first(left, 0, 1) * self.first(right, 1, 2)
                 + self.value(left, 0) * self.second(right)
             )
-        outer, inner = _outermost(u, self.parameter)
+        outer, inner = outermost
         at = [self.value(inner, k) for k in range(3)]
         low, high = self.gap(inner, 0, 1), self.gap(inner, 1, 2)
         second = outer.second(at[0], at[1], at[2], low, high) * self.first(inner, 0, 1) * self.first(inner, 0, 2)
@@ -177,8 +180,11 @@ class _Power:
         return Function(f"divdiff{order}_{'ipow' if isinstance(self.exponent, Integer) else 'rpow'}")
 
 
-def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power, Expr]:
-    """Return ``u`` as a function of a simpler expression."""
+def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power | Quotient, Expr] | None:
+    """Return ``u`` as a function of a simpler expression; None if it is a product and no such function."""
+    quotient = quotient_of(u, parameter)
+    if quotient is not None or u.is_Mul:
+        return quotient
     if type(u) in HELPERS:
         return _Named(HELPERS[type(u)]), u.args[0]
     if u.is_Pow:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
 # The number of places on each panel at which the sign of the contact force is sampled; its changes are then located by
-# bisection.
-SAMPLES_PER_PANEL = 24
+# bisection. The first and the last place lie this share of the panel inside it: the contact force may jump at an edge.
+SAMPLES_PER_PANEL, INSIDE_EDGE = 25, 1e-9
 
 # A contact force below this share of the two terms that add up to it is zero within rounding, and has no sign. (On the
 # orbit of a planet it is zero everywhere.)
@@ -170,9 +170,9 @@ def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: C
     narrowing : callable
         A function that returns the signs close to a change; it is used for bisection.
     """
-    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
+    steps = np.linspace(INSIDE_EDGE, 1.0 - INSIDE_EDGE, SAMPLES_PER_PANEL)
     edges = segment.edges
-    phi = np.append((edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1])
+    phi = np.concatenate([edges[:1], (edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1:]])
     sign = signs(phi)
     known = np.flatnonzero(sign)
     changes = known[:-1][sign[known[:-1]] != sign[known[1:]]]

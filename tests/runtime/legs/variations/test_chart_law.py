@@ -260,3 +260,32 @@ def test_liftoff_at_a_corner(tmp_path: Path) -> None:
     assert found["m"] == 0.0
     assert found["lam0"] == pytest.approx(float(by_place), rel=1e-12)
     assert found["mu"] == pytest.approx(float(by_friction), rel=1e-12)
+
+
+def test_the_load_at_a_joint_where_the_body_leaves(tmp_path: Path) -> None:
+    """On an arc with friction V**2 is a cos + b sin + c exp(-2 mu heading). The least contact force is its limit from
+    the arc where the next one bends away.
+
+    Its derivatives were those of the load that would act on the next arc.
+    """
+    pieces = [gqm.arc(radius=1, angle="1/2"), gqm.arc(radius=1, angle=-1)]
+    force = gqm.Gravity() + gqm.CoulombFriction()
+    module = gqm.build(
+        gqm.derive(gqm.Curve.piecewise(pieces, heading="-1/4"), force), name="load_at_joint", folder=tmp_path
+    )
+    given = {"lam0": 0.125, "v0": 4.0, "mu": 0.125, "g": 9.8125, "m": 0.5}
+
+    def load(lam0: complex, v0: complex, mu: complex, g: complex, m: complex) -> complex:
+        """Return the contact force in N at the heading 1/4."""
+        b = -6 * mu * g / (1 + 4 * mu * mu)
+        a = 2 * g + 2 * mu * b
+        begin, end = lam0 - 0.25, 0.25
+        c = (v0**2 - a * np.cos(begin) - b * np.sin(begin)) * np.exp(2 * mu * begin)
+        return m * (g * np.cos(end) + a * np.cos(end) + b * np.sin(end) + c * np.exp(-2 * mu * end))
+
+    motion = module.solve(contact="above", **given)
+    assert motion.legs[-1].end == "liftoff"
+    found = motion.gradient("normal_force_min")
+    for name in given:
+        truth = load(**given | {name: given[name] + 1e-30j}).imag / 1e-30
+        assert found[name] == pytest.approx(truth, rel=1e-13)

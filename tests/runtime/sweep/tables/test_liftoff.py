@@ -92,3 +92,22 @@ def test_a_body_in_a_ring_up_to_where_it_leaves(generated_folder: Path) -> None:
     assert found["normal_force_min"] == pytest.approx(np.zeros(3), abs=AT_LOSS)
     fastest = module.sweep("v_max", [1e-3, 0.2], 0.0, contact="above").values
     assert fastest == pytest.approx(2.0 * np.sqrt(G) * np.sin([5e-4, 0.1]), rel=FEW)
+
+
+def test_a_body_that_leaves_shortly_before_a_joint(tmp_path: Path) -> None:
+    """From rest beside the top of an arc of radius 1, a body leaves where cos(u) = 2/3 cos(0.1), 0.005 before the arc
+    bends up.
+
+    Single motions went on to the end of the rail: the contact force was not looked at between there and the joint.
+    """
+    pieces = [gqm.arc(radius=1, angle="-17/20"), gqm.arc(radius=1, angle="17/20"), gqm.line(length=1)]
+    module = built(tmp_path, "leaves_before_joint", pieces, start=(0, 0), heading="0")
+    place, speed = np.arccos(2.0 / 3.0 * np.cos(0.1)), np.sqrt(2.0 / 3.0 * G * np.cos(0.1))
+    assert 0.844 < place < 0.85
+    motion = module.solve(0.1, contact="above")
+    assert [event.kind for event in motion.events] == ["liftoff"]
+    assert motion.events[0].lam == pytest.approx(place, rel=FEW)
+    assert motion.v_max.value == pytest.approx(speed, rel=FEW)
+    found = _found(module, 0.1)
+    assert found["v_max"] == pytest.approx(speed, rel=FEW)
+    assert found["normal_force_min"] == pytest.approx(0.0, abs=AT_LOSS)
