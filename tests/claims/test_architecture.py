@@ -110,6 +110,7 @@ TESTED_THROUGH = {
     "double_double/interpreter.py": "runtime/double_double/test_arithmetic.py",
     "double_double/nodes.py": "runtime/double_double/test_orbit_time.py",
     "double_double/quadrature.py": "runtime/double_double/test_orbit_time.py",
+    "double_double/tapes.py": "runtime/double_double/test_recording.py",
     "gradients/charts/means.py": "runtime/gradients/test_means.py",
     "gradients/charts/train_orbits.py": "runtime/gradients/test_means.py",
     "gradients/charts/trains.py": "runtime/gradients/test_means.py",

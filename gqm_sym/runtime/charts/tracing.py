@@ -34,7 +34,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
 from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
-from gqm_sym.runtime.double_double.recording import bound_by_coordinates
+from gqm_sym.runtime.double_double.tapes import bound_by_coordinates
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
 # The largest distance of a start point from the curve, as a share of its larger coordinate; a nearer point is moved

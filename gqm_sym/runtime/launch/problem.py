@@ -7,8 +7,9 @@ import numpy as np
 
 from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.double_double.recording import BoundTape, record, record_by_coordinates
-from gqm_sym.runtime.double_double.recording import bind as bind_tape
+from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.double_double.tapes import bind as bind_tape
+from gqm_sym.runtime.double_double.tapes import record, record_by_coordinates
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues, true_pieces_of

@@ -18,7 +18,8 @@ from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.recording import BoundTape, record
+from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.double_double.tapes import record
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import MAX_LAPS, ONLY_SIGN, LaunchRequest, check_contact

@@ -9,7 +9,8 @@ from mpmath import mp, mpf
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
-from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape, bind, record
+from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape
+from gqm_sym.runtime.double_double.tapes import bind, record
 from gqm_sym.runtime.interface import ExactFormulas
 
 # These are all functions that a formula may contain, for places between 1.1 and 1.9.

@@ -25,7 +25,8 @@ from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.quadrature import TAPE
-from gqm_sym.runtime.double_double.recording import NOWHERE, bind, record_values
+from gqm_sym.runtime.double_double.recording import NOWHERE
+from gqm_sym.runtime.double_double.tapes import bind, record_values
 
 
 class TrueParts(NamedTuple):

@@ -70,7 +70,7 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
         The curve.
     tape : (address, operations, parts, registers)
         The address of the interpreter, and the potential by coordinates
-        (`recording.record_by_coordinates`).
+        (`tapes.record_by_coordinates`).
     work, p
         As for `orbit_time.orbit_time`.
     launch : tuple of float
