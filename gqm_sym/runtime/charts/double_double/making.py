@@ -148,6 +148,11 @@ class TruePieces:
         Whether the curve has a third coordinate.
     frame : callable, optional
         ``frame(k, u, u_low)`` gives the frame of a rail in space at a place on piece k.
+
+    Attributes
+    ----------
+    shaped : dict
+        The curve with its neighbours (`gradients.charts.shaped_pieces`), by the parameters that shape it.
     """
 
     def __init__(
@@ -172,6 +177,7 @@ class TruePieces:
             self._tables[3],
         )
         self._made, self.doubt, self._edges = np.zeros(count, dtype=bool), 0.0, chart.edges.tolist()
+        self.shaped: dict[tuple[int, ...], Any] = {}
         self.begin = min(int(np.argmin(np.abs(chart.edges))), count - 1)
 
     @cached_property
