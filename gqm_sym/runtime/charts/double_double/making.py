@@ -153,6 +153,8 @@ class TruePieces:
     ----------
     shaped : dict
         The curve with its neighbours (`gradients.charts.shaped_pieces`), by the parameters that shape it.
+    beside : dict
+        The step of a parameter and the neighbours for it, by the parameter.
     """
 
     def __init__(
@@ -178,6 +180,7 @@ class TruePieces:
         )
         self._made, self.doubt, self._edges = np.zeros(count, dtype=bool), 0.0, chart.edges.tolist()
         self.shaped: dict[tuple[int, ...], Any] = {}
+        self.beside: dict[int, tuple[float, *tuple[TruePieces, ...]]] = {}
         self.begin = min(int(np.argmin(np.abs(chart.edges))), count - 1)
 
     @cached_property

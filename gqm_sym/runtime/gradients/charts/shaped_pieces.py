@@ -149,7 +149,11 @@ class ShapedPieces:
         self._smoothed: dict[int, Array] = {}
         displacements = getattr(maker, "displacements", None) if shaping else None
         self._known: Displacements | None = None if displacements is None else displacements(chart)
-        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping if self._known is None]
+        varied = shaping if self._known is None else ()
+        for k in varied:
+            if k not in pieces.beside:
+                pieces.beside[k] = _beside(maker, problem.p, k, chart)
+        self._beside = [pieces.beside[k] for k in varied]
 
     @property
     def dimension(self) -> int:
