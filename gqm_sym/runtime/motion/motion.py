@@ -285,7 +285,7 @@ class Motion(History, Derivatives):
 
     def _end_of_legs(self) -> float:
         """Return the time in s at which `legs` end with the motion or its horizon; infinite if they do not."""
-        return self._known_end()
+        return self.t_end
 
     def _shown_time(self) -> float:
         """Return the time in s up to which a motion without an end is shown in pictures and tables."""
