@@ -48,6 +48,8 @@ def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
 
 def motion(found: "Motion", parameter: str) -> Iterator[str]:
     """Yield a motion line by line: its kind and times, its legs and its events."""
+    from gqm_sym.runtime.motion.motion import end_of_legs
+
     yield f"  kind            {found.kind}"
     if found.turning_points:
         places = ", ".join(_number(place) for place in found.turning_points)
@@ -56,8 +58,8 @@ def motion(found: "Motion", parameter: str) -> Iterator[str]:
         yield f"  half period     {_number(found.half_period)} s"
     if found.kind in ("libration", "circulation"):
         yield f"  period          {_number(found.period)} s"
-    elif isfinite(found.t_end):
-        yield f"  ends after      {_number(found.t_end)} s"
+    elif isfinite(end := end_of_legs(found)):
+        yield f"  ends after      {_number(end)} s"
     yield f"  quadrature      {found.quadrature_error:.1e} (estimated relative error of a time)"
     yield f"  condition       {found.condition_number:.1e} (relative change of a time per that of the launch)"
     if found.legs:

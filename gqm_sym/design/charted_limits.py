@@ -18,7 +18,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.recording import Recorder
 from gqm_sym.runtime.gradients.charts.orbit import source_along
 from gqm_sym.runtime.gradients.charts.programs import ChartSource
-from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaped_pieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import values as results
 from gqm_sym.runtime.gradients.programs import Program, range_program, with_derivatives
 from gqm_sym.runtime.interface import ExactChartLaw, ExactPotential
@@ -74,9 +74,9 @@ def along_shaped_chart(
     if pieces is None or model.path_in_space is not None or model.directed:
         return None
     shaping, columns = shaping_of(model), [list(model.parameters).index(name) for name in names]
-    shape = ShapedPieces(problem, pieces, tuple(k for k in columns if k in shaping))
+    shape = shaped_pieces(problem, pieces, tuple(k for k in columns if k in shaping))
     need_ends = between is None or from_end
-    ends = _end_changes(model, shape, columns) if need_ends else np.zeros((2, len(columns)))
+    ends = _end_changes(model, p, shape, columns) if need_ends else np.zeros((2, len(columns)))
     if ends is None:
         return None
     domain = model.domain(p).numbers
@@ -114,7 +114,7 @@ def lossy_slopes(problem: Problem, places: Array, passed: NDArray[np.bool_]) -> 
     return found
 
 
-def _end_changes(model: CompiledModel, shape: ShapedPieces, columns: list[int]) -> Array | None:
+def _end_changes(model: CompiledModel, p: ParameterValues, shape: ShapedPieces, columns: list[int]) -> Array | None:
     """Return the derivatives of both ends of the curve in arc length; None if they are not known."""
     maker, found = model.chart, np.zeros((2, len(columns)))
     if isinstance(maker, Rail) and not shape.pieces.curve.period:
@@ -123,7 +123,6 @@ def _end_changes(model: CompiledModel, shape: ShapedPieces, columns: list[int]) 
         found[:, [k in shaping_of(model) for k in columns]] = changes.T
         return found
     if isinstance(maker, Traced) and maker.domain is not None:
-        p = shape.numbers
         rows = results(range_program(maker.domain, len(p)), inputs_of(p), np.zeros(1))[:, 0, 0]
         slopes: Array = rows.reshape(-1, 1 + len(p))[:2, 1:][:, columns]
         return slopes

@@ -20,6 +20,7 @@ from gqm_sym.design.tracks import (
     read_constant,
     read_law,
     read_positive,
+    with_unit,
 )
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
@@ -108,7 +109,7 @@ def constant_load(
         parameter="psi",
         domain=domain,
         parameters=parameters,
-        title=title or f"Loop of constant contact force, N/(m*g) = {n}, from v0 = {v0} m/s",
+        title=title or f"Loop of constant contact force, N/(m*g) = {n}, from v0 = {with_unit(v0, 'm/s')}",
     )
 
 
@@ -218,9 +219,8 @@ def from_load(
             continue
         pieces.append(piece)
         u, state, width = u + width, ahead, 2 * width
-    return polynomial_curve(
-        mp, pieces, origin=0, breaks=(), title=title or f"Track of contact force N/(m*g) = {law}, from v0 = {v0} m/s"
-    )
+    title = title or f"Track of contact force N/(m*g) = {law}, from v0 = {with_unit(v0, 'm/s')}"
+    return polynomial_curve(mp, pieces, origin=0, breaks=(), title=title)
 
 
 def _piece(motion: _Motion, state: _State, at: Any, width: Any) -> tuple[Piece | None, _State]:

@@ -30,6 +30,7 @@ from gqm_sym.design.tracks import (
     powers,
     read_law,
     read_positive,
+    with_unit,
 )
 from gqm_sym.errors import DeclarationError, SolutionError
 from gqm_sym.expressions import Source
@@ -139,7 +140,7 @@ def from_period(
         pieces,
         origin=count,
         breaks=() if smooth else (count,),
-        title=title or f"Track of period {law} s, up to h = {float(end):.9g} m{note}",
+        title=title or f"Track of period {with_unit(law, 's')}, up to h = {float(end):.9g} m{note}",
     )
 
 
@@ -184,9 +185,14 @@ def _read(
         raise DeclarationError(f"{where}: share: must be between 0 and 1, got {short(share)}")
     h = sp.Symbol("h", real=True)
     at_bottom = form.xreplace({h: sp.Integer(0)})
-    if not (at_bottom.is_finite and at_bottom > 0):
+    if not (at_bottom.is_finite and at_bottom.is_real):
         raise DeclarationError(
-            f"{where}: law: the period at the bottom must be positive and finite, got {short(str(at_bottom))} at h = 0 "
+            f"{where}: law: the period at the bottom, h = 0, must be positive and finite, but {short(str(law))} has no "
+            "finite real value there; give a law that has one, as 2 + log(1 + h) has and 2 + log(h) has not"
+        )
+    if not at_bottom > 0:
+        raise DeclarationError(
+            f"{where}: law: the period at the bottom must be positive, got {short(str(at_bottom))} at h = 0 "
             "(a track of period 0 there has a corner)"
         )
     gravity = read_positive(g, "g", where=where, unit="m/s**2")

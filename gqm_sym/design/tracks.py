@@ -13,6 +13,7 @@ from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
 from gqm_sym.literals.grammar import FUNCTIONS
+from gqm_sym.literals.units import split_unit
 from gqm_sym.parameters import Given, exact_value, read_value
 from gqm_sym.sympy_charts import chart_x, chart_z
 
@@ -170,6 +171,12 @@ def read_positive(given: Source, name: str, *, where: str, unit: str) -> sp.Expr
     if not number > 0:
         raise DeclarationError(f"{where}: {name}: must be positive, got {short(given)}")
     return number
+
+
+def with_unit(given: object, unit: str) -> str:
+    """Return a quantity as it was given, and its unit in SI behind it if it was given without one."""
+    has_unit = split_unit(given) is not None if isinstance(given, str) else hasattr(given, "units")
+    return str(given) if has_unit else f"{given} {unit}"
 
 
 def extended_precision() -> Any:

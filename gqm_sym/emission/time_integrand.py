@@ -1,9 +1,11 @@
 """The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
-from sympy import Expr, Function, Symbol, sinh
+from dataclasses import replace
 
-from gqm_sym.derivation.algebra.angles import is_power_of_two
-from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
+from sympy import Expr, Function, S, Symbol, cos, sin, sinh
+
+from gqm_sym.derivation.algebra.angles import is_power_of_two, of_sum
+from gqm_sym.derivation.wells.symmetric_orbits import COSINE_AT_TURN, HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, FunctionIR
 from gqm_sym.emission.sharing import hoist
@@ -107,6 +109,14 @@ def _with_exact_arguments(value: Expr, half: Symbol) -> Expr:
     return value.replace(lambda t: isinstance(t, sinh), exact)
 
 
+def _with_rest(value: Expr, half: Symbol, rest: Symbol) -> Expr:
+    """Let sines and cosines of multiples of half the orbit's width be those of a sum of two numbers.
+
+    Next to a pole of the curve the rounding of the width is many roundings of the cosine.
+    """
+    return value.replace(lambda t: isinstance(t, sin | cos), lambda t: of_sum(t, (half,), (half, rest, S.Zero)))
+
+
 def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr) -> tuple[FunctionIR, ...]:
     names = lowering.names
     sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
@@ -131,12 +141,21 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr
     if not held:
         return (emitted,)
     halves = names("halves")
+    values, inside = [_with_exact_arguments(value, own[HALF]) for _, value in held], [(own[HALF], at(halves))]
+    next_to_pole = own.get(COSINE_AT_TURN) in used
+    if next_to_pole:
+        rest = names.symbol("rest")
+        values = [_with_rest(value, own[HALF], rest) for value in values]
+        inside = [(own[HALF], at(halves, 0)), (rest, at(halves, 1))]
     invariants = lowering.function(
         "integrand_invariants_batch",
         (halves,),
         "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters.",
-        inside=[(own[HALF], at(halves))],
-        outputs=tuple(_with_exact_arguments(value, own[HALF]) for _, value in held),
+        inside=inside,
+        outputs=tuple(values),
         batch=True,
     )
+    if next_to_pole:
+        (_, n), *views = invariants.views
+        invariants = replace(invariants, views=((halves, f"(2, {n})"), *views))
     return emitted, invariants

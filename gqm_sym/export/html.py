@@ -22,8 +22,8 @@ def summary(motion: "Motion") -> list[tuple[str, Any]]:
         rows.append(("half period (s)", motion.half_period))
     if motion.kind in ("libration", "circulation"):
         rows.append(("period (s)", motion.period))
-    elif isfinite(motion.t_end):
-        rows.append(("ends after (s)", motion.t_end))
+    elif isfinite(end := motion._end_of_legs()):
+        rows.append(("ends after (s)", end))
     rows += [(key, number.text) for key, number in zip(problem.formulas.parameters, problem.p, strict=True)]
     return rows
 

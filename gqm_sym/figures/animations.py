@@ -11,7 +11,7 @@ from gqm_sym.figures.motions import FORCE_LABEL, draw_in_space, sampled, track
 from gqm_sym.figures.rides import LOAD_LABEL
 from gqm_sym.optional import require
 from gqm_sym.runtime.charts.train import TrackOfTrain
-from gqm_sym.runtime.motion.motion import horizon
+from gqm_sym.runtime.motion.motion import end_of_legs, horizon
 
 # Formats of animations, by the extension of the file.
 ANIMATED = (".gif", ".mp4")
@@ -46,7 +46,7 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
     """
     from matplotlib.animation import FuncAnimation
 
-    end = min(horizon(motion), motion.t_end) if duration is None else float(duration)
+    end = min(horizon(motion), end_of_legs(motion)) if duration is None else float(duration)
     if not end > 0.0:
         raise InputError(f"animate: duration: must be positive, got {duration!r}")
     if Path(path).suffix.lower() not in ANIMATED:

@@ -12,7 +12,7 @@ from gqm_sym.figures.portraits import portrait_of
 from gqm_sym.optional import require
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.model import CompiledModel
-from gqm_sym.runtime.motion.motion import horizon
+from gqm_sym.runtime.motion.motion import end_of_legs, horizon
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -250,7 +250,7 @@ def sampled(motion: "Motion") -> "State":
     times: Array = np.concatenate(
         [start + (stop - start) * fractions for start, stop in pairwise(marks)] or [np.zeros(1)]
     )
-    return motion.state(np.minimum(times, motion.t_end))
+    return motion.state(np.minimum(times, end_of_legs(motion)))
 
 
 def _marks(motion: "Motion") -> list[tuple[str, float, float]]:

@@ -12,7 +12,7 @@ from gqm_sym.figures.motions import LINE_COLOUR, draw_in_space, sampled
 from gqm_sym.optional import require
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.rider import check_banked
-from gqm_sym.runtime.motion.motion import horizon
+from gqm_sym.runtime.motion.motion import end_of_legs, horizon
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,7 +123,7 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
 
 def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
     """Yield the first, the middle and the last car of a train, each with the smallest and the largest of its loads."""
-    cars = motion.cars(np.linspace(0.0, min(horizon(motion), motion.t_end), SEAT_TIMES))
+    cars = motion.cars(np.linspace(0.0, min(horizon(motion), end_of_legs(motion)), SEAT_TIMES))
     loads = [getattr(cars, f"n_{load}") for load in LOADS]
     for seat, car in _seats(cars.lam.shape[0]):
         yield seat, *(end(felt[car]) for felt in loads for end in (np.min, np.max))

@@ -7,16 +7,19 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import compiled_model, short, unknown_argument
 from gqm_sym.errors import GQMError, InputError, SolutionError
 from gqm_sym.fitting.data import Measurements, read_measurements
+from gqm_sym.fitting.least_squares import least_squares_between
 from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.fitting.result import Fit
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.motion.motion import end_of_legs
 
 # The step of a difference quotient, as a share of the parameter, for motions without gradients.
 STEP = 1e-6
@@ -31,9 +34,6 @@ MIN_SHARE = 1e-3
 # Motions that lose energy are followed further than the last measured time by this factor, and not to their end, which
 # may be many swings later.
 HORIZON_FACTOR = 1.5
-
-# The largest number of steps of the solver, which takes ten from a good guess.
-MAX_STEPS = 200
 
 # Arguments of a launch that may be free, and those that select a launch.
 LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
@@ -64,7 +64,7 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     free : mapping
         The unknowns, which are run-time parameters, "lam0" or "v0", each with a first guess, limits ``(low, high)``,
         all three ``(low, guess, high)``, either limit None where there is none, or None for the value that is given by
-        keyword or the model's default.
+        keyword or the model's default. With two limits and no guess it begins halfway between them.
     fixed
         All other arguments of the launch and the parameters, as for ``module.solve``.
 
@@ -84,11 +84,10 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     -----
     Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, or
     difference quotients of solved motions if there are no such derivatives. Without ``sigma`` all measurements have the
-    same unknown standard deviation, which is estimated from the residuals. First guesses for long series of positions
-    must be so near that the fitted motion does not slip by a swing.
+    same unknown standard deviation, which is estimated from the residuals. An estimate on a limit is held there, and
+    the deviations of the others are those for this value. First guesses for long series of positions must be so near
+    that the fitted motion does not slip by a swing.
     """
-    from scipy.optimize import least_squares
-
     model: CompiledModel = compiled_model(module, where="fit")
     unknown = _free(model, free, fixed)
     known = [*LAUNCH, *CHOICES, *model.parameters]
@@ -109,18 +108,8 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.isfinite(residuals(unknown.start)).all():
             raise InputError("sigma: is so small that the first guess is infinitely many deviations away")
-    found = least_squares(
-        residuals,
-        unknown.start,
-        jac=residuals.jacobian,
-        bounds=(unknown.low, unknown.high),
-        x_scale="jac",
-        xtol=1e-12,
-        ftol=1e-14,
-        gtol=1e-14,
-        max_nfev=MAX_STEPS,
-    )
-    return _result(residuals, np.asarray(found.x), bool(found.success))
+    x, held = least_squares_between(residuals, residuals.jacobian, unknown.start, unknown.low, unknown.high)
+    return _result(residuals, x, held)
 
 
 def units_of(model: CompiledModel) -> dict[str, str | None]:
@@ -143,14 +132,16 @@ def _free(model: CompiledModel, free: Mapping[str, Any], fixed: Mapping[str, Any
         parts = list(given) if isinstance(given, tuple | list) else [given]
         unit = units_of(model)[name]
         numbers = [None if p is None else read_number(p, where=f"free: {name}", unit=unit).value for p in parts]
-        low, *guess, high = numbers if len(numbers) > 1 else (None, *numbers, None)
-        if len(guess) > 1 or (len(numbers) > 1 and None in (guess or numbers)):
+        if not 1 <= len(numbers) <= 3:
             raise InputError(
-                f"free: {name}: must be a guess, (low, high), None, or (low, guess, high), where low and high may be "
-                f"None, got {given!r}"
+                f"free: {name}: must be a guess, (low, high), None, or (low, guess, high), each of which may be None, "
+                f"got {given!r}"
             )
+        low, *guess, high = numbers if len(numbers) > 1 else (None, *numbers, None)
+        start = guess[0] if guess else None
+        if start is None and low is not None and high is not None:
+            start = 0.5 * (low + high)
         low, high = -inf if low is None else low, inf if high is None else high
-        start = guess[0] if guess else 0.5 * (low + high)
         if start is None:
             value = fixed.get(name, 0 if name == "v0" else model.parameters.get(name))
             if value is None:
@@ -276,7 +267,7 @@ class Residuals:
 
 def _until_rest(motion: Any, t: Array) -> Array:
     """Return times, with those after the body has come to rest replaced by the time of rest, because it stays there."""
-    end = motion.t_end if motion.kind == "dissipative" else inf
+    end = end_of_legs(motion) if motion.kind == "dissipative" else inf
     return np.minimum(t, end) if isfinite(end) and motion.legs[-1].end == "rest" else t
 
 
@@ -320,27 +311,25 @@ def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
     return float(brentq(lambda t: float(motion.lam(t)) - place, leg.t_start, leg.t_end, xtol=1e-15, rtol=1e-15))
 
 
-def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
-    """Return the description of a fit."""
+def _result(residuals: Residuals, x: Array, held: NDArray[np.bool_]) -> Fit:
+    """Return the description of a fit, in which some of the unknowns are held at limits."""
     names, measured = residuals.free.names, residuals.measured
-    if not converged:
-        raise SolutionError(
-            f"fit: no minimum was found within {MAX_STEPS} steps; begin nearer than at {short(x.tolist())}"
-        )
-    off, jacobian = residuals(x), residuals.jacobian(x)
+    off, jacobian, moving = residuals(x), residuals.jacobian(x)[:, ~held], tuple(compress(names, ~held))
     size = np.linalg.norm(jacobian, axis=0)
     scale = np.where(size > 0.0, size, 1.0)
     _, values, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     tolerance = RANK_TOLERANCE if residuals.exact else RANK_TOLERANCE_OF_DIFFERENCES
-    rank = int(np.count_nonzero(values > tolerance * values[0]))
+    rank = int(np.count_nonzero(values > tolerance * values.max(initial=0.0)))
     blind = np.abs(rows[rank:]) > MIN_SHARE
     free = max(residuals.values.size - rank, 0)
     chi2 = float(off @ off)
     variance = 1.0 if measured.sigma is not None else (chi2 / free if free else nan)
     kept = rows[:rank].T / values[:rank]
-    covariance = variance * (kept @ kept.T) / np.outer(scale, scale)
+    moved = variance * (kept @ kept.T) / np.outer(scale, scale)
     for row in blind:
-        covariance[np.ix_(row, row)] = inf
+        moved[np.ix_(row, row)] = inf
+    covariance = np.zeros((x.size, x.size))
+    covariance[np.ix_(~held, ~held)] = moved
     split = np.split(-off * residuals.sigma, np.cumsum([v.size for v in measured.values.values()])[:-1])
     return Fit(
         names=names,
@@ -351,7 +340,8 @@ def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
         chi2=chi2,
         degrees_of_freedom=free,
         rank=rank,
-        unidentified=tuple(tuple(compress(names, row)) for row in blind),
+        unidentified=tuple(tuple(compress(moving, row)) for row in blind),
+        at_limits=tuple(compress(names, held)),
         arguments=residuals.arguments(x),
         measured=measured,
     )

@@ -22,9 +22,10 @@ class Fit:
     estimates : dict
         The value of each in its unit.
     std : dict
-        The standard deviation of each; infinite where the data do not determine it.
+        The standard deviation of each; infinite where the data do not determine it, and zero on a limit.
     covariance : (k, k) array
-        The covariance of the estimates. Without ``sigma`` it is scaled by the deviation of the residuals.
+        The covariance of the estimates, for fixed values of those on limits. Without ``sigma`` it is scaled by the
+        deviation of the residuals.
     residuals : dict
         Measured minus fitted values, for each quantity, in its unit.
     chi2 : float
@@ -35,6 +36,8 @@ class Fit:
         The number of independent combinations of the unknowns that the data determine.
     unidentified : tuple of tuples of str
         For each combination of unknowns without effect on the measured values, the names in it.
+    at_limits : tuple of str
+        The names whose estimates are limits, beyond which the data would be fitted better. They are held there.
     arguments : dict
         All arguments of ``module.solve`` that give the fitted motion.
     measured : data.Measurements
@@ -50,12 +53,13 @@ class Fit:
     degrees_of_freedom: int
     rank: int
     unidentified: tuple[tuple[str, ...], ...]
+    at_limits: tuple[str, ...]
     arguments: dict[str, Any]
     measured: Measurements
 
     @property
     def correlation(self) -> Array:
-        """The correlations of the estimates, a (k, k) array; NaN where the data do not determine them."""
+        """The correlations of the estimates, a (k, k) array; NaN on limits and where the data do not determine them."""
         with np.errstate(invalid="ignore"):
             deviations = np.sqrt(np.diag(self.covariance))
             correlation: Array = self.covariance / np.outer(deviations, deviations)
@@ -79,6 +83,8 @@ class Fit:
         )
 
     def _estimate(self, name: str) -> str:
+        if name in self.at_limits:
+            return f"{self.estimates[name]!r}, which is its limit"
         return with_deviation(self.estimates[name], self.std[name])
 
     def __repr__(self) -> str:

@@ -185,7 +185,8 @@ class BatchFunctions(NamedTuple):
     """The functions of one module that serve many orbits at once, each a `emitted.Emitted`.
 
     A function that a module does not have is None. ``orbit_rows`` and ``integrand_rows`` are the numbers of rows that
-    ``orbit_invariants`` and ``integrand_invariants`` fill.
+    ``orbit_invariants`` and ``integrand_invariants`` fill. The latter is given half the width of each orbit, and behind
+    these numbers what rounding took from them, which it reads where the curve has a pole.
     """
 
     potential_divdiff1: Any

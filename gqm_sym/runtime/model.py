@@ -3,14 +3,14 @@
 from collections.abc import Callable, Mapping
 from functools import cache
 from math import nan
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.arguments import unknown_argument
-from gqm_sym.errors import ArgumentError, InputError, SolutionError
+from gqm_sym.errors import ArgumentError, InputError, LaunchError, SolutionError
 from gqm_sym.literals.numbers import flat_doubles, read_numbers, without_unit
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
@@ -73,11 +73,11 @@ def _solver(dissipative: bool) -> "Callable[[Formulas, ParameterValues, Launch],
 
 
 @cache
-def _checks_of_rolling() -> "tuple[Callable[..., None], Callable[..., None]]":
-    """Return what checks the launch and the end of a body with a radius, imported when needed."""
-    from gqm_sym.runtime.motion.rolling import check_end, check_launch
+def _rolling() -> ModuleType:
+    """Return what checks the track, the launch and the end of a body with a radius, imported when needed."""
+    from gqm_sym.runtime.motion import rolling
 
-    return check_launch, check_end
+    return rolling
 
 
 class CompiledModel(Formulas):
@@ -252,11 +252,16 @@ class CompiledModel(Formulas):
         solve = _solver(self.dissipation is not None)
         if not self.rolling_radius:
             return solve(self, p, launch)
-        check_launch, check_end = _checks_of_rolling()
-        check_launch(self, bind_all(self, p), launch.lam0.value)
-        motion = solve(self, p, launch)
-        if motion.kind not in ("libration", "circulation"):
-            check_end(self, motion.legs)
+        rolling, f, lam0 = _rolling(), bind_all(self, p), launch.lam0.value
+        rolling.check_track(self, f)
+        try:
+            motion = solve(self, p, launch)
+        except (LaunchError, SolutionError):
+            rolling.check_launch(self, f, lam0)
+            raise
+        if motion.kind not in ("libration", "circulation"):  # the search for the ends of these has proved that ds > 0
+            rolling.check_launch(self, f, lam0)
+            rolling.check_end(self, motion.legs)
         return motion
 
     def sweep(

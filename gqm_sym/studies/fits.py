@@ -46,12 +46,12 @@ def _split_unknown(value: object) -> object:
         if names is None:
             what = f"must be a first guess, [low, high] or [low, guess, high], got {len(value)} values"
             raise PydanticCustomError("gqm", "{what}", {"what": what, "column": 0})
-        return dict(zip(names, value, strict=True))
+        return {name: number for name, number in zip(names, value, strict=True) if number is not None}
     return value
 
 
 class Unknown(Section):
-    """First guess and limits of a number to be fitted. A guess alone, limits alone, or null are enough."""
+    """First guess and limits of a number to be fitted, each of which may be missing, or null if none is given."""
 
     start: Number = Field(default=ABSENT, description="first guess", examples=["1.2"])
     low: Number = Field(default=ABSENT, description="lower limit", examples=["0"])
@@ -75,7 +75,7 @@ class FitFile(Section):
     )
     free: Annotated[dict[Name, Annotated[Unknown, BeforeValidator(_split_unknown)]], Field(min_length=1)] = Field(
         description="run-time parameters, lam0 and v0 to be fitted, each with a first guess, [low, high], "
-        "[low, guess, high], or null, which starts from the value in the curve file",
+        "[low, guess, high], in which null is no limit, or null, which starts from the value in the curve file",
         examples=[{"L": "1.2", "mu": ["0", "0.1", "1"]}],
     )
     sigma: dict[Name, Annotated[Quantity, BeforeValidator(split_value)]] = Field(
@@ -154,6 +154,7 @@ class FitPlan:
             "degrees_of_freedom": found.degrees_of_freedom,
             "rank": found.rank,
             "unidentified": [list(names) for names in found.unidentified],
+            "at_limits": list(found.at_limits),
             "rms_of_residuals": rms,
             "fixed": self.fixed,
         }
@@ -185,6 +186,15 @@ def fit_schema() -> dict[str, Any]:
     return json_schema(FitFile)
 
 
+def _unknown(given: tuple[Any, Any, Any], default: Any) -> Any:
+    """Return an unknown as `gqm_sym.fit` takes it; without a guess it begins between two limits or with a default."""
+    low, start, high = given
+    if low is not None and start is None and high is not None:
+        return low, high
+    start = default if start is None else start
+    return start if low is None and high is None else (low, start, high)
+
+
 class _FitReader(StudyReader[FitPlan]):
     """A reader of a fit file."""
 
@@ -207,7 +217,7 @@ class _FitReader(StudyReader[FitPlan]):
             return None
         data = self._data(file, columns)
         known = self._known(file, spec, model)
-        free = {name: known.get(name) if given is None else given for name, given in self._free(file, spec, model)}
+        free = {name: _unknown(given, known.get(name)) for name, given in self._free(file, spec, model)}
         fixed = {name: value for name, value in known.items() if name not in free}
         if not self.mistakes:
             self._check(data, model)
@@ -246,21 +256,17 @@ class _FitReader(StudyReader[FitPlan]):
             data["place"] = read_number(in_si(file.place.value, file.place.unit), where="place").value
         return data | ({SIGMA: sigma} if sigma else {})
 
-    def _free(self, file: FitFile, spec: Spec, model: Model) -> Iterator[tuple[str, Any]]:
-        """Return the unknowns, with guesses and limits in the form of `gqm_sym.fit`."""
+    def _free(self, file: FitFile, spec: Spec, model: Model) -> Iterator[tuple[str, tuple[Any, Any, Any]]]:
+        """Return the unknowns, each with its lower limit, first guess and upper limit; None for what is not given."""
         known = (*LAUNCH, *(name for name, _ in model.defaults))
         for name, entry in file.free.items():
-            place = place_of(self.tree, ("free", name))
             if not self.check_known(("free", name), spec, known):
                 continue
             self.check_unit(name, entry.unit, "free", name, "unit")
-            limits = {"low", "high"} & entry.model_fields_set
-            if len(limits) == 1:
-                self.mistakes.add(place, f"free: {name} has one limit", "give both, low and high")
-                continue
-            rows = (entry.low, entry.start, entry.high) if limits else (entry.start,)
-            numbers = tuple(in_si(value, entry.unit) for value in rows if value is not None)
-            yield name, None if not numbers else numbers if limits else numbers[0]
+            low, start, high = (
+                None if value is None else in_si(value, entry.unit) for value in (entry.low, entry.start, entry.high)
+            )
+            yield name, (low, start, high)
 
     def _known(self, file: FitFile, spec: Spec, model: Model) -> dict[str, Any]:
         """Return the known launch and parameters."""

@@ -80,6 +80,13 @@ def test_loads_that_no_track_has(case: str) -> None:
 
 
 @pytest.mark.extended
+def test_titles_have_one_unit() -> None:
+    """The speed in a title is as it was given, with one unit."""
+    for speed, said in ((12, "12 m/s"), ("12 m/s", "12 m/s"), ("45 km/h", "45 km/h")):
+        assert gqm.design.constant_load("3", speed).title.endswith(f"from v0 = {said}")
+        assert gqm.design.from_load("1", speed, until=1).title.endswith(f"from v0 = {said}")
+
+
 def test_a_load_with_a_pole() -> None:
     """Where a load grows without bound the track ends."""
     with pytest.raises(GQMError, match=r"the track ends near s = 0\.99|no finite value"):

@@ -104,6 +104,8 @@ BAD = {
     "too high": (("2",), {"up_to": 0.5}, "exists up to a height of 0.49698"),
     "falls to nothing": (("1 - 9*h",), {"up_to": 0.2}, "exists up to a height of"),
     "no period at the bottom": (("sqrt(h)",), {}, "the period at the bottom must be positive"),
+    "no finite period at the bottom": (("2 + log(h)",), {}, "'2 + log(h)' has no finite real value there"),
+    "no real period at the bottom": (("2 + sqrt(h - 1)",), {}, "has no finite real value there"),
     "negative": (("h - 1",), {}, "the period at the bottom must be positive"),
     "a pole": (("2/(1 - 40*h)",), {}, "finite value"),
     "no value": (("T0",), {}, "'T0' has no value"),

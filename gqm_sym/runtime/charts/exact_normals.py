@@ -38,9 +38,10 @@ class TrueCurve(Protocol):
 
     def intersect_normal(
         self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
-    ) -> tuple[Any, Any, Any, Any]:
-        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the unit
-        tangent there.
+    ) -> tuple[Any, Any, Any, Any, Any]:
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, the unit tangent
+        there, and the arc length to it from a place that all pieces of one part of the curve have in common; None if
+        this has no closed form.
 
         Parameters
         ----------
@@ -58,13 +59,16 @@ class TrueCurve(Protocol):
 
 
 class CurvePoint(NamedTuple):
-    """A point of the true curve: coordinates, unit tangent, and ds/dlam."""
+    """A point of the true curve: coordinates, unit tangent, ds/dlam, and arc length on its part of the curve, if it has
+    a closed form.
+    """
 
     x: Any
     z: Any
     tx: Any
     tz: Any
     ds: Any
+    length: Any
 
 
 class ChartTrack:
@@ -186,9 +190,16 @@ class ChartTrack:
         total = context.mpf(0)
         for k, (left, right) in enumerate(pairwise(edges)):
             inside = 0 < k < len(edges) - 2
-            whole = self._curve.length(self._piece((left + right) / 2)) if inside else None
+            whole = self._curve.length(self._piece((left + right) / 2)) if inside else self._length_on(left, right)
             total += gauss(context, self._length_rate, (left, right), context.dps)[0] if whole is None else whole
         return total
+
+    def _length_on(self, left: Any, right: Any) -> Any:
+        """Return the arc length between two places on one piece of the chart; None if it has no closed form."""
+        k = self._piece((left + right) / 2)
+        back = self._shifts[k] - self._lap((left + right) / 2)
+        begin, end = self._on(k, left + back).length, self._on(k, right + back).length
+        return None if begin is None else end - begin
 
     def _length_rate(self, lam: Any) -> Any:
         """Return the derivative of arc length with respect to lam, which is close to 1."""
@@ -305,9 +316,9 @@ class ChartTrack:
         middle, scale, rows = self._polynomials[k] = self._polynomials[k] or self._read(k)
         u = (c - middle) * scale
         (x, dx, ddx), (z, dz, ddz) = ((value, first * scale, second * scale**2) for value, first, second in rows(u))
-        at_x, at_z, tx, tz = self._curve.intersect_normal(k, float(u), x, z, dx, dz, self._size(k))
+        at_x, at_z, tx, tz, length = self._curve.intersect_normal(k, float(u), x, z, dx, dz, self._size(k))
         ds = (dx * dx + dz * dz - (at_x - x) * ddx - (at_z - z) * ddz) / (tx * dx + tz * dz)
-        return CurvePoint(at_x, at_z, tx, tz, ds)
+        return CurvePoint(at_x, at_z, tx, tz, ds, length)
 
     def _read(self, k: int) -> tuple[Any, Any, Polynomials]:
         """Return the middle of a piece, one over its half length, and the polynomials of its coordinates."""

@@ -23,10 +23,25 @@ MAX_STEPS = 60
 
 
 class Parts:
-    """Successive parts of a curve at one precision; the chart's ``origins`` say which piece belongs to which part."""
+    """Successive parts of a curve at one precision; the chart's ``origins`` say which piece belongs to which part.
 
-    def __init__(self, context: Any, chart: Chart, part: Callable[[int], Part]) -> None:
-        self._context, self._part = context, cache(part)
+    Parameters
+    ----------
+    part
+        Gives each part.
+    speed
+        Gives the derivative of arc length with respect to the parameter of a part if it is the same everywhere, else
+        None.
+    """
+
+    def __init__(
+        self,
+        context: Any,
+        chart: Chart,
+        part: Callable[[int], Part],
+        speed: Callable[[int], Any] = lambda part: None,
+    ) -> None:
+        self._context, self._part, self._speed = context, cache(part), cache(speed)
         self._origins = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
         self.ends = cache(self._ends)
         self.start = self.ends(int(np.argmin(np.abs(chart.edges[:-1]))))[0]  # where arc length is 0
@@ -40,11 +55,15 @@ class Parts:
     def length(self, k: int) -> Any:
         """Return the arc length between them."""
         context, (part, *places) = self._context, self._origins[k]
+        low, high = (context.mpf(place) for place in places)
+        constant = self._speed(part)
+        if constant is not None:
+            return (high - low) * constant
 
         def speed(place: Any) -> Any:
             return context.hypot(*self._part(part)(place)[2:])
 
-        return gauss(context, speed, [context.mpf(place) for place in places], context.dps)[0]
+        return gauss(context, speed, [low, high], context.dps)[0]
 
     def sample(self, k: int) -> Samples:
         """Return a piece at the Chebyshev points in double-double arithmetic (`double_double.pieces`)."""
@@ -54,9 +73,9 @@ class Parts:
 
     def intersect_normal(
         self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
-    ) -> tuple[Any, Any, Any, Any]:
-        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
-        there.
+    ) -> tuple[Any, Any, Any, Any, Any]:
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, the tangent
+        there, and the arc length from the beginning of the part if the speed is constant on it, else None.
         """
         context, (part, low, high) = self._context, self._origins[k]
         at, enough = self._part(part), context.ldexp(size, -context.prec // 2)
@@ -68,7 +87,9 @@ class Parts:
             if abs(ahead) <= enough:  # convergence is quadratic: the next step would be below rounding
                 at_x, at_z, rate_x, rate_z = at(place)
                 speed = context.sqrt(rate_x * rate_x + rate_z * rate_z)
-                return at_x, at_z, rate_x / speed, rate_z / speed
+                constant = self._speed(part)
+                length = None if constant is None else place * constant
+                return at_x, at_z, rate_x / speed, rate_z / speed, length
         raise SolutionError(f"the track near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to it")
 
 

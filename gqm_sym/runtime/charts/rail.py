@@ -130,9 +130,11 @@ class Rail:
         pose = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
         formulas, counts = iter(self.formulas), np.bincount(chart.origins[:, 0].astype(np.int64))
         parts: list[Part] = []
+        speeds: list[Any] = []
         for kind, count in zip(self.pieces, counts.tolist(), strict=True):
             if kind == "curve":
                 parts.append(along_range(context, next(formulas), p, *islice(numbers, 2)))
+                speeds.append(None)
                 x, z, dx, dz = parts[-1](context.mpf(1))
                 pose = x, z, context.atan2(dz, dx)
                 continue
@@ -140,8 +142,9 @@ class Rail:
             given = {name: context.mpf(next(numbers)) for name in PIECE_NUMBERS[kind]}
             length, first, last = ends_of(kind, given)
             parts.append(spiral(context, pose, length, first, last, count))
+            speeds.append(length / count)
             pose = *parts[-1](context.mpf(count))[:2], pose[2] + length * (first + last) / 2
-        return Parts(context, chart, parts.__getitem__)
+        return Parts(context, chart, parts.__getitem__, speeds.__getitem__)
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces:
         """Return the rail in double-double arithmetic."""

@@ -84,11 +84,19 @@ class Sampled:
         numbers = [read_number(number, where="points").at(context) for number in self.points.split()]
         count = len(numbers) // 2
 
+        def ends(k: int) -> tuple[list[Any], list[Any]]:
+            begin, end = (numbers[2 * i : 2 * i + 2] for i in (k, (k + 1) % count))
+            return begin, end
+
         def plane(k: int) -> Part:
-            (x, z), (to_x, to_z) = (numbers[2 * i : 2 * i + 2] for i in (k, (k + 1) % count))
+            (x, z), (to_x, to_z) = ends(k)
             return polynomial(context, 0, 1, (x, to_x - x), (z, to_z - z))
 
-        return Parts(context, chart, plane)
+        def width(k: int) -> Any:
+            (x, z), (to_x, to_z) = ends(k)
+            return context.hypot(to_x - x, to_z - z)
+
+        return Parts(context, chart, plane, width)
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces:
         """Return the track in double-double arithmetic."""

@@ -284,9 +284,9 @@ class Zeros:
 
     def intersect_normal(
         self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float
-    ) -> tuple[Any, Any, Any, Any]:
-        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent
-        there.
+    ) -> tuple[Any, Any, Any, Any, None]:
+        """Return the point at which the line through (x, z) perpendicular to (dx, dz) meets the curve, the tangent
+        there, and None for its arc length, which has no closed form.
         """
         context, at_x, at_z = self._context, x, z
         enough = context.ldexp(size, -context.prec // 2)
@@ -297,7 +297,7 @@ class Zeros:
             if abs(step) <= enough:  # convergence is quadratic: the next step would be below rounding
                 _, fx, fz = self._level(context, at_x, at_z, self._p)
                 slope = self._tangent * context.sqrt(fx * fx + fz * fz)
-                return at_x, at_z, -fz / slope, fx / slope
+                return at_x, at_z, -fz / slope, fx / slope, None
         raise SolutionError(
             f"the curve near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to F = 0; "
             "is there a singular point?"

@@ -18,6 +18,7 @@ from gqm_sym.runtime.legs.body import (
     BRANCH_HEIGHT,
     CONTACT_SIGN,
     DIRECTION,
+    EARLY_WIDTH,
     ELAPSED,
     ELAPSED_LOW,
     ENDING,
@@ -308,6 +309,8 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
         note_blocks(body, body[LAST_WIDTH], found.blocks)
     body[BRANCH], body[BRANCH_HEIGHT] = found.branch
     body[TURNS] += 1.0
+    if body[TURNS] == 2.0:
+        body[EARLY_WIDTH] = body[LAST_WIDTH]
     body[PAUSES], body[NO_TURN_UNTIL] = 0.0, 0.0
     body[MAY_END] = 1.0 if found.could_stay or may_end(dissipation, p, body, record) else 0.0
     return rests

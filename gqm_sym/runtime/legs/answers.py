@@ -50,6 +50,8 @@ from gqm_sym.runtime.legs.questions import (
     LEAST_SPEED,
     LEFT,
     LEGS,
+    MOST_TURNS,
+    REST_PLACE,
     RUN_AGAIN,
     Findings,
     after_leg,
@@ -68,8 +70,8 @@ from gqm_sym.runtime.legs.runs.route import Reading
 # The code for a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
 END_NEAR_EQUILIBRIUM = 14
 
-# The largest number of legs of one body.
-MAX_LEGS = 250_000
+# The largest number of legs of one body; and of one whose motion has no horizon if its end is asked for.
+MAX_LEGS, MOST_LEGS = 250_000, 4 * MOST_TURNS
 
 # The number of successive predictions of the time of rest on a corner that must agree with the one before.
 AGREEMENTS = 2
@@ -117,7 +119,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     function, sign = sought_extreme(question)
     has_length = function == LENGTH and dissipation.squared_contact != 0
     predicted, agreements = np.nan, 0
-    for _ in range(MAX_LEGS):
+    for _ in range(MAX_LEGS if question > REST_PLACE or body[HORIZON] < inf else MOST_LEGS):
         reading, before = Reading(reads, function != SPEED, has_length, sign, findings.peak), body[LEG_BEFORE]
         what = advance(dissipation, p, joints, body, reading, record)
         # For a run without room for a panel, `solve` decides whether the curve or the arithmetic ends there.

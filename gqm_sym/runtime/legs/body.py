@@ -32,6 +32,7 @@ WIDTH_BEFORE          0 if there was none
 UNRESOLVED, ..._2,    that of the last leg that was not one polynomial with so many blocks (`runs.whole_tables`); 0 if
 ..._3                 the last one was
 TURNS, PAUSES         how often the body has turned, and how many runs without an end have paused since
+EARLY_WIDTH           the distance in the curve parameter between the first two turns; 0 if it is not known
 MAY_END               whether the motion may end after the last turn without a horizon (`advance.may_end`); 1 before the
                       first turn
 FROM_REST             1 if the launch was from rest
@@ -59,7 +60,8 @@ LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_END = range(18, 26)
 LAST_WIDTH, WIDTH_BEFORE, FROM_REST, ENDING, PANEL_COUNT, LEAST_SIZE, VALUE, STATUS = range(26, 34)
-UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, RETRY_WIDTH, KINKS = range(34, 43)
+UNRESOLVED, UNRESOLVED_2, UNRESOLVED_3, TOTAL, LAST_AT, BRANCH, BRANCH_HEIGHT, RETRY_WIDTH = range(34, 42)
+EARLY_WIDTH, KINKS = 42, 43
 SIZE = KINKS + ROOM_FOR_KINKS
 
 # A swing about an equilibrium at 0 has died away when it is so small that V**2 and its errors approach the smallest

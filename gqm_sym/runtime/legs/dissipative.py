@@ -74,7 +74,23 @@ class DissipativeMotion(FollowedMotion):
     @property
     @locked
     def t_end(self) -> float:
-        """The time in s at which the body rests or leaves the track, or ``t_max``; infinite if there is neither."""
+        """The time in s at which the body rests or leaves the track, or ``t_max``; infinite if there is neither.
+
+        It is also infinite if no loss of energy shows in doubles.
+
+        Raises
+        ------
+        BudgetError
+            If the body turns more than a million times, and there is no ``t_max``.
+        """
+        return self._end_of(self._driver_at_end)
+
+    def _last_end(self) -> tuple[str, float]:
+        driver = self._driver_at_end
+        return super()._last_end() if driver is self._driver else (driver.ending, driver.reached)
+
+    @locked
+    def _end_of_legs(self) -> float:
         self._look_ahead()
         return self._known_end()
 

@@ -181,8 +181,10 @@ class Driver:
         turns = number(TURNS)
         return bool((turns and not number(MAY_END)) or turns > MAX_TURNS or number(PAUSES) >= MAX_PAUSES)
 
-    def go_on(self) -> None:
-        """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
+    def go_on(self, legs: int = 1) -> None:
+        """Follow the body to its next turn, to the end of the motion, or as far as one run goes; or by several legs, if
+        there is a horizon, or as many are given.
+        """
         number = self.body.item
         if number(PANEL_COUNT) >= MAX_STORED:
             if self._force_cancels(self._last_record):
@@ -191,7 +193,7 @@ class Driver:
                 f"motion: {number(PANEL_COUNT):.0f} pieces of legs reach t = {self.elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        self._store(*self._completed(*self._drive(LEGS_PER_CALL if self._horizon < inf else 1)))
+        self._store(*self._completed(*self._drive(LEGS_PER_CALL if self._horizon < inf else legs)))
 
     def _store(self, what: int, records: Array) -> None:
         """Store the runs of some legs, given the code for the end of the last of them (`advance`)."""

@@ -3,6 +3,7 @@ begin.
 """
 
 from contextlib import suppress
+from copy import copy
 from math import inf, isfinite
 
 import numpy as np
@@ -11,19 +12,23 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import DIRECTION, STATUS, TURNS, VALUE
+from gqm_sym.runtime.legs.body import DIRECTION, MAY_END, PANEL_COUNT, STATUS, TURNS, VALUE
 from gqm_sym.runtime.legs.conditions import follow_first_legs
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
 from gqm_sym.runtime.legs.leg_record import HEADING
-from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.leg_segments import Run, Runs
+from gqm_sym.runtime.legs.questions import MAX_TURNS, may_still_end, turns_at_this_rate
 from gqm_sym.runtime.legs.runs.ends import END_TURN
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import computed_once
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.parts.tabulated import Tabulated
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
+
+# The number of legs that are followed in one call once a body swings, where the end of its motion is searched for.
+LEGS_OF_SWINGS = 64
 
 
 class FollowedMotion(Tabulated, Motion):
@@ -157,8 +162,11 @@ class FollowedMotion(Tabulated, Motion):
 
     def _known_end(self) -> float:
         """Return the time at which the motion ends, as far as is known; infinite if it is not."""
-        ends = self._driver.ending not in ("", "asymptote")
-        return min(self._horizon, self._driver.elapsed if ends else inf)
+        return self._end_of(self._driver)
+
+    def _end_of(self, driver: Driver) -> float:
+        ends = driver.ending not in ("", "asymptote")
+        return min(self._horizon, driver.elapsed if ends else inf)
 
     @property
     def _beginning(self) -> int:
@@ -172,10 +180,10 @@ class FollowedMotion(Tabulated, Motion):
             self._has_no_end = not driver.ending and driver.is_endless
         return self._runs_to_turn if self._has_no_end else 0
 
-    def _follow_next(self) -> None:
-        """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
+    def _follow_next(self, legs: int = 1) -> None:
+        """Follow the body to its next turn, to the end of the motion, or as far as one run goes; or by several legs."""
         _ = self._beginning  # the runs up to the first turn are counted before there are more
-        self._driver.go_on()
+        self._driver.go_on(legs)
 
     def _follow(self, reach: float) -> None:
         """Compute legs up to a time in s, and up to the horizon if there is one."""
@@ -198,7 +206,34 @@ class FollowedMotion(Tabulated, Motion):
                 driver.go_on()
             return
         while not driver.ending and not self._beginning:
-            self._follow_next()
+            self._follow_next(1 if driver.number(TURNS) < 2.0 else LEGS_OF_SWINGS)
+
+    @computed_once
+    def _driver_at_end(self) -> Driver:
+        """The body at the end of its motion; it is followed to there without storing its legs, if they are many.
+
+        Raises
+        ------
+        BudgetError
+            If it turns too often for that.
+        """
+        self._look_ahead()
+        driver = self._driver
+        if driver.ending or self._horizon < inf or not driver.number(MAY_END) or driver.number(TURNS) <= MAX_TURNS:
+            return driver
+        driver = copy(driver)
+        driver.body = driver.body.copy()
+        while not driver.ending and may_still_end.py_func(driver.body[0]):
+            driver.runs, driver.body[0, PANEL_COUNT] = Runs(), 0.0
+            driver.go_on(LEGS_OF_SWINGS)
+        turns = driver.number(TURNS)
+        if not driver.ending and driver.number(MAY_END) and (rate := turns_at_this_rate.py_func(driver.body[0])) < inf:
+            expected = f"and at this rate would swing on for some {rate:.1e} turns; " if rate else ""
+            raise BudgetError(
+                f"motion: after {turns:.0f} turns, at t = {driver.elapsed!r}, the body has not come to an end, "
+                f"{expected}give a horizon, t_max"
+            )
+        return driver
 
     def _follow_again(self) -> None:
         """Follow the runs without panels once more for their panels, each in as many parts as necessary."""

@@ -9,12 +9,14 @@ from gqm_sym.runtime.compiled.calls import call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
 from gqm_sym.runtime.legs.body import (
+    EARLY_WIDTH,
     ELAPSED,
     ENDING,
     FROM_REST,
     HORIZON,
     LAM0,
     LAPS,
+    LAST_WIDTH,
     MAY_END,
     ONLY_SIGN,
     PAUSES,
@@ -36,14 +38,19 @@ from gqm_sym.runtime.legs.runs.peaks import LENGTH, LOAD, SPEED, peak_of_leg
 FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
 LEAST_LENGTH, MOST_LENGTH = 10, 11
 
-# The status of an answer; LEFT is that of a body that the loop does not decide.
-FOUND, LEFT, NONE = range(3)
+# The status of an answer; LEFT is that of a body that the loop does not decide, and TOO_LONG that of one whose motion
+# has more turns than are followed.
+FOUND, LEFT, NONE, TOO_LONG = range(4)
 
 # On a curve without ends, the number of successive runs without a turn after which the search for an end stops.
 MAX_PAUSES = 60
 
-# The number of turns after which the search for the place of rest stops.
-MAX_TURNS = 20000
+# The number of turns up to which legs are stored in search of an end of the motion, and the number of turns up to which
+# the end is searched for without storing them.
+MAX_TURNS, MOST_TURNS = 20_000, 1_000_000
+
+# If at the present rate the swings would vanish after more turns than this, no loss of energy shows in doubles.
+UNSEEN_TURNS = 2.0**50
 
 # Where the contact force at the end of the domain is this many times its largest value at the nodes of panels, it grows
 # without bound there, as at a cusp.
@@ -66,6 +73,27 @@ class Findings(NamedTuple):
 
 
 @Inner
+def turns_at_this_rate(body):  # type: ignore[no-untyped-def]
+    """Return the number of turns after which the swings of a body would vanish if they went on to become shorter as
+    they have since its second turn; 0 if that is not known.
+    """
+    if body[EARLY_WIDTH] == 0.0:
+        return 0.0
+    shortened = 1.0 - body[LAST_WIDTH] / body[EARLY_WIDTH]
+    return body[TURNS] / shortened if shortened * UNSEEN_TURNS > body[TURNS] else inf
+
+
+@Inner
+def may_still_end(body):  # type: ignore[no-untyped-def]
+    """Return whether the end of a motion without a horizon is to be searched for beyond the last turn."""
+    if body[PAUSES] >= MAX_PAUSES or (body[TURNS] > 0.0 and body[MAY_END] == 0.0):
+        return False
+    if body[TURNS] <= MAX_TURNS:
+        return True
+    return body[TURNS] <= MOST_TURNS and turns_at_this_rate(body) <= 2.0 * MOST_TURNS
+
+
+@Inner
 def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
     """Return whether the next leg has to be followed too."""
     if body[ENDING] != 0.0 or arrival < inf:
@@ -77,7 +105,7 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
         return body[ELAPSED] < body[HORIZON]
     if question == ARRIVAL:
         return True
-    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_END] == 0.0 or body[TURNS] > MAX_TURNS))
+    return may_still_end(body) and (question <= REST_PLACE or body[TURNS] <= MAX_TURNS)
 
 
 @Inner
@@ -154,7 +182,8 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
     ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
     if not isfinite(end):
-        return np.nan, NONE
+        is_slow = body[TURNS] > MAX_TURNS and body[MAY_END] != 0.0 and turns_at_this_rate(body) < inf
+        return np.nan, TOO_LONG if question <= REST_PLACE and is_slow else NONE
     if question == END_TIME:
         return end, FOUND
     if question == REST_PLACE:

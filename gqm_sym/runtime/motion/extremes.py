@@ -165,7 +165,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     SolutionError
         If the motion goes on for ever without repeating.
     """
-    if motion.kind == "rest" or motion.t_end == 0.0:  # the body stays, or lifts off at once
+    if motion.kind == "rest" or motion._end_of_legs() == 0.0:  # the body stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
     trajectory, end = whole_trajectory(motion)
@@ -198,11 +198,13 @@ def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
         If the motion goes on for ever without repeating.
     """
     repeats = motion.kind in ("libration", "circulation")
-    if not repeats and not isfinite(motion.t_end):
+    end = motion._end_of_legs()
+    if not repeats and not isfinite(end):
         raise SolutionError(
-            "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
+            "this motion goes on for ever, or for too many turns to search them all, and does not repeat; launch it "
+            "with a horizon, t_max, for its extremes"
         )
-    end = min(motion.t_end, motion.period) if repeats else motion.t_end
+    end = min(end, motion.period) if repeats else end
     return motion._listed_trajectory if repeats else motion._trajectory(end), end
 
 

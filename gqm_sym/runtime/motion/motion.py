@@ -61,10 +61,10 @@ class Motion(History, Derivatives):
             return self.problem.lam0
         if not self.t_end < inf:
             raise SolutionError("rest_position: this motion goes on for ever and does not come to rest")
-        last = self.legs[-1]
-        if last.end != "rest":
-            raise SolutionError(f"rest_position: this motion does not come to rest; it ends with {last.end!r}")
-        return last.lam_end
+        end, place = self._last_end()
+        if end != "rest":
+            raise SolutionError(f"rest_position: this motion does not come to rest; it ends with {end!r}")
+        return place
 
     @property
     def half_period(self) -> float:
@@ -278,6 +278,15 @@ class Motion(History, Derivatives):
         problem = self.problem
         return _solved_again, (problem.formulas, problem.launch, tuple(problem.p))
 
+    def _last_end(self) -> tuple[str, float]:
+        """Return how and where a motion with an end ends."""
+        last = self.legs[-1]
+        return last.end, last.lam_end
+
+    def _end_of_legs(self) -> float:
+        """Return the time in s at which `legs` end with the motion or its horizon; infinite if they do not."""
+        return self.t_end
+
     def _shown_time(self) -> float:
         """Return the time in s up to which a motion without an end is shown in pictures and tables."""
         return max((leg.t_end for leg in self.legs if isfinite(leg.t_end)), default=1.0)
@@ -298,6 +307,10 @@ def horizon(motion: "Motion") -> float:
     """
     if motion.kind in ("libration", "circulation"):
         return motion.period
-    if isfinite(motion.t_end):
-        return motion.t_end
-    return motion._shown_time()
+    end = end_of_legs(motion)
+    return end if isfinite(end) else motion._shown_time()
+
+
+def end_of_legs(motion: "Motion") -> float:
+    """Return the time in s at which a motion ends, infinite if it has no end or one only after too many turns."""
+    return motion._end_of_legs()

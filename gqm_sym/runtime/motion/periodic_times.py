@@ -65,7 +65,8 @@ class PeriodicTimes(Motion):
 
     Its times come from double-double arithmetic. If that does not suffice, doubles are used within the first period,
     and extended precision beyond it and for the legs and events of a period. The choice depends on the latest time in
-    the call, and not on earlier calls.
+    the call, and not on earlier calls. A segment that is given by a function, which makes it when it is needed, has a
+    known duration.
     """
 
     def __init__(
@@ -146,7 +147,9 @@ class PeriodicTimes(Motion):
         """The orbit of a launch from a turning point, or of a circulation, for which the trapezoidal rule has converged
         in doubles; None for others, and along charts.
         """
-        is_smooth = self._segment_in_doubles.known_duration is not None and self.problem.formulas.chart is None
+        given = self._given_segment
+        has_duration = not isinstance(given, Segment) or given.known_duration is not None
+        is_smooth = has_duration and self.problem.formulas.chart is None
         if not is_smooth or (self.kind == "libration" and self.problem.w0 > 0.0):
             return None
         return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets)

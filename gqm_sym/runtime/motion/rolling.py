@@ -48,14 +48,18 @@ def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float)
     return at_launch + changes[0 if rolls else 1 :: 2]
 
 
-def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
-    """Refuse a track with corners, and a launch at a place where the body does not fit into the track."""
+def check_track(formulas: "Formulas", f: BoundFunctions) -> None:
+    """Refuse a track with corners."""
     if f.corners.size:
         raise LaunchError(
             f"{formulas.rolling_radius}: the track has a corner at {formulas.parameter} = {float(f.corners[0])!r}, "
             "where the centre of a body with a radius has no path beside the track; round the corners off, as by "
             "Curve.piecewise with arcs, or leave the radius out"
         )
+
+
+def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
+    """Refuse a launch at a place where the body does not fit into the track."""
     ds = path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[2, 0]
     if not ds > 0.0:
         raise LaunchError(f"lam0: {_what(formulas, lam0)}; launch elsewhere, or {_remedy(formulas)}")

@@ -124,6 +124,7 @@ def answer_driven(
         if without.any():
             none = quantities.NEVER_THERE if asked.question == questions.ARRIVAL else quantities.NOT_PERIODIC
             values[without], status[without] = nan, none
+            status[ended == questions.TOO_LONG] = quantities.REFUSED
             decided = ended != questions.LEFT
             values, status = values[decided], status[decided]
             chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]

@@ -10,7 +10,7 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.gradients.charts import trains
+from gqm_sym.runtime.gradients.charts import shaped_pieces, trains
 
 # The means are known in doubles, to some units in the last place, and derivatives are a few times as sensitive.
 ROUNDING = 2e-14
@@ -143,6 +143,16 @@ def test_a_fixed_shape_needs_no_neighbours(hoop: ModuleType, monkeypatch: pytest
     for place in ("6/5", "1"):
         hoop.solve(place, 1, **given).gradient("half_period", "L")
     assert len(made) == 1
+
+
+def test_neighbouring_tracks_are_made_once(hoop: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trains of other lengths, from other places and under other forces share the neighbours of their track."""
+    changed = {"L": 3, "k": 1, "Omega": 0}
+    known = hoop.solve(1, 0, length=1, **changed).gradient("half_period", "L")["L"]
+    monkeypatch.setattr(shaped_pieces, "_beside", None)
+    for launch in ({"lam0": 2, "length": 1}, {"lam0": 1, "length": 1.5}, {"lam0": 1, "length": 1, "g": 9}):
+        assert hoop.solve(v0=0, **changed | launch).gradient("half_period", "L")["L"] != known
+    assert hoop.solve(1, 0, length=1, **changed).gradient("half_period", "L")["L"] == known
 
 
 def test_turning_points_and_times(hoop: ModuleType) -> None:

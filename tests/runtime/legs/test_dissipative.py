@@ -14,7 +14,7 @@ from mpmath import mp, mpf
 import generated.circle_coulomb
 import generated.circle_droplet
 import gqm_sym as gqm
-from gqm_sym.errors import InputError, LaunchError, SolutionError
+from gqm_sym.errors import BudgetError, InputError, LaunchError, SolutionError
 from gqm_sym.runtime.legs import answers, leg_record
 from gqm_sym.runtime.legs.runs import ends
 
@@ -171,6 +171,36 @@ def test_contact_that_is_lost_after_two_turns(build: Build) -> None:
     assert swept[0] == pytest.approx(motion.t_end, rel=1e-15)
     assert np.isnan(swept[1])
     assert loop.solve(0.5, contact="above").t_end == math.inf
+
+
+def test_an_end_after_many_turns() -> None:
+    """A pendulum with so little friction that it turns 33 000 times rests when its mean loss says so, give or take one
+    turn, in a sweep too. It was said to swing for ever. One that would turn 3e8 times is refused, and one whose loss
+    does not show has no end.
+
+    A swing of amplitude a loses the energy mu m g L (6 sin a - 4 a cos a), and rests below the angle of static
+    friction.
+    """
+    pendulum, mu, mu_static = generated.circle_coulomb, 1e-5, 0.2
+    with mp.workdps(20):
+        expected = mp.quad(
+            lambda a: 2 * mp.ellipk(mp.sin(a / 2) ** 2) * mp.sin(a) / (6 * mp.sin(a) - 4 * a * mp.cos(a)),
+            [mp.atan(mu_static), 1],
+        ) / (mu * mp.sqrt(G))
+    motion = pendulum.solve(1, mu=mu, mu_static=mu_static)
+    assert abs(motion.t_end - expected) <= 1.1
+    assert 0.0 <= math.atan(mu_static) - abs(motion.rest_position) <= 4.0 * mu
+    assert [leg.end for leg in motion.legs] == ["turn"]
+    with pytest.raises(SolutionError, match="too many turns to follow its derivatives"):
+        motion.gradient("t_end")
+    for quantity in ("t_end", "rest_position"):
+        found = pendulum.sweep(quantity, [1.0], mu=[mu, 1e-9, 1e-17], mu_static=mu_static)
+        assert found.values[0] == getattr(motion, quantity)
+        assert np.isnan(found.values[1:]).all()
+        assert found.status.tolist() == [0, 6, 2]
+    with pytest.raises(BudgetError, match=r"after 20\d\d\d turns, .* for some 2\.9e\+08 turns; give a horizon, t_max"):
+        pendulum.solve(1, mu=1e-9).rest_position  # noqa: B018
+    assert pendulum.solve(1, mu=1e-17).t_end == math.inf
 
 
 @pytest.fixture(scope="module")

@@ -148,6 +148,13 @@ class TruePieces:
         Whether the curve has a third coordinate.
     frame : callable, optional
         ``frame(k, u, u_low)`` gives the frame of a rail in space at a place on piece k.
+
+    Attributes
+    ----------
+    shaped : dict
+        The curve with its neighbours (`gradients.charts.shaped_pieces`), by the parameters that shape it.
+    beside : dict
+        The step of a parameter and the neighbours for it, by the parameter.
     """
 
     def __init__(
@@ -172,6 +179,8 @@ class TruePieces:
             self._tables[3],
         )
         self._made, self.doubt, self._edges = np.zeros(count, dtype=bool), 0.0, chart.edges.tolist()
+        self.shaped: dict[tuple[int, ...], Any] = {}
+        self.beside: dict[int, tuple[float, *tuple[TruePieces, ...]]] = {}
         self.begin = min(int(np.argmin(np.abs(chart.edges))), count - 1)
 
     @cached_property

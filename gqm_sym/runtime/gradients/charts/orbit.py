@@ -36,7 +36,7 @@ from gqm_sym.runtime.gradients.charts.second_programs import (
     chart_libration_seconds,
     chart_turn_seconds,
 )
-from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaped_pieces, shaping_of
 from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_path_program
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs
@@ -148,7 +148,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         return source_along(problem)
 
     def _shaped(self, problem: Problem, pieces: TruePieces) -> ShapedPieces:
-        return ShapedPieces(problem, pieces, self.source.shaping)
+        return shaped_pieces(problem, pieces, self.source.shaping)
 
     @property
     def launch_changes(self) -> Array:

@@ -6,6 +6,7 @@ because the polynomials have 31. Of some curves the maker of the chart knows the
 """
 
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -39,7 +40,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, multiply
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.gradients.charts.programs import size_of_point
-from gqm_sym.runtime.launch.formulas import Formulas, true_pieces_of
+from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
 
 # The step of a difference quotient of the curve's points in double-double arithmetic, as a share of the parameter. It
@@ -142,13 +143,17 @@ class ShapedPieces:
     """
 
     def __init__(self, problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> None:
-        self.pieces, self.numbers = pieces, problem.p
+        self.pieces = pieces
         maker, chart = problem.formulas.chart, problem.formulas.charted(problem.p)
         assert maker is not None
         self._smoothed: dict[int, Array] = {}
         displacements = getattr(maker, "displacements", None) if shaping else None
         self._known: Displacements | None = None if displacements is None else displacements(chart)
-        self._beside = [_beside(maker, problem.p, k, chart) for k in shaping if self._known is None]
+        varied = shaping if self._known is None else ()
+        for k in varied:
+            if k not in pieces.beside:
+                pieces.beside[k] = _beside(maker, problem.p, k, chart)
+        self._beside = [pieces.beside[k] for k in varied]
 
     @property
     def dimension(self) -> int:
@@ -311,15 +316,26 @@ class ShapedPieces:
         samples = self.coordinates(places)[2 * size_of_point(self.dimension) :]
         series = np.empty((len(samples) // 2, NODES))
         fill_series(samples, chebyshev_fit(), series)
-        powers = np.zeros_like(series)
-        for row, terms in zip(powers, series, strict=True):
-            is_large = np.abs(terms) > MAX_NOISE * np.abs(terms).max()
-            if np.isnan(terms).any():
-                row[:] = np.nan
-                continue
-            used = next((k for k in range(NODES) if not is_large[k : k + TERMS_IN_A_ROW].any()), NODES)
-            row[:used] = cheb2poly(np.append(terms[:used], 0.0))[:used]
+        is_large = np.abs(series) > MAX_NOISE * np.abs(series).max(axis=1, keepdims=True)
+        ahead = np.pad(is_large, ((0, 0), (0, TERMS_IN_A_ROW - 1)))
+        is_used = sum(ahead[:, k : k + NODES] for k in range(TERMS_IN_A_ROW))
+        kept = np.where(np.logical_and.accumulate(is_used, axis=1) | np.isnan(series), series, 0.0)
+        powers: Array = kept @ _powers()
         return powers
+
+
+@lru_cache(maxsize=1)
+def _powers() -> Array:
+    """Return the matrix that takes Chebyshev coefficients to those of powers of u."""
+    return np.array([np.pad(cheb2poly(row[: k + 1]), (0, NODES - 1 - k)) for k, row in enumerate(np.eye(NODES))])
+
+
+def shaped_pieces(problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> ShapedPieces:
+    """Return the true pieces of a curve with those of its neighbours, which are kept with them."""
+    if shaping not in pieces.shaped:
+        pieces.shaped[shaping] = ShapedPieces(problem, pieces, shaping)
+    shape: ShapedPieces = pieces.shaped[shaping]
+    return shape
 
 
 def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tuple[float, *tuple[TruePieces, ...]]:
@@ -334,7 +350,7 @@ def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tup
         moved = Fraction(p[k].value) + Fraction(p[k].low) if value is None else value
         numbers = list(p)
         numbers[k] = read_number(moved + sign * Fraction(step), where="p")
-        sides.append(true_pieces_of(maker, tuple(numbers), chart))
+        sides.append(maker.true_pieces(tuple(numbers), chart))
     return (step,) if None in sides else (step, *sides)
 
 

@@ -29,6 +29,8 @@ class SpaceSource(ChartSource):
     ``potential`` takes x, y and z, and gives derivatives with respect to each.
     """
 
+    __slots__ = ()
+
     @property
     def dimension(self) -> int:
         """The number of coordinates of a place."""

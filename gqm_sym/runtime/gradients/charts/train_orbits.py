@@ -23,35 +23,22 @@ from gqm_sym.runtime.launch.problem import Problem
 
 
 class TrainSource(ChartSource):
-    """The formulas of a train with one mean."""
+    """The formulas of a train with one mean, with the known derivatives with respect to parameters that shape it."""
+
+    __slots__ = ()
 
     def _at(self, op: Recorder, numbers: Sequence[TapeNumber]) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        return _changed(self, ChartSource(*self[:4], ()), op, numbers)
+        value, slope, partials = super(TrainSource, self._replace(shaping=()))._at(op, numbers)
+        for k, (change, *_) in zip(self.shaping, self._moves(numbers), strict=True):
+            partials[k] = change
+        return value, slope, partials
 
     def _strains(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
         return [(k, moved[1]) for k, moved in zip(self.shaping, self._moves(numbers), strict=True)]
 
 
-class TrainSourceInSpace(SpaceSource):
+class TrainSourceInSpace(TrainSource, SpaceSource):  # type: ignore[misc]
     """The formulas of a train with two means."""
-
-    def _at(self, op: Recorder, numbers: Sequence[TapeNumber]) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-        return _changed(self, SpaceSource(*self[:4], ()), op, numbers)
-
-    def _strains(self, op: Recorder, numbers: Sequence[TapeNumber]) -> list[tuple[int, TapeNumber]]:
-        return [(k, moved[1]) for k, moved in zip(self.shaping, self._moves(numbers), strict=True)]
-
-
-def _changed(
-    source: ChartSource, fixed: ChartSource, op: Recorder, numbers: Sequence[TapeNumber]
-) -> tuple[TapeNumber, TapeNumber, list[TapeNumber]]:
-    """Return what `ChartSource._at` does, from the formulas without parameters that shape the curve and the known
-    derivatives with respect to these.
-    """
-    value, slope, partials = fixed._at(op, numbers)
-    for k, (change, *_) in zip(source.shaping, source._moves(numbers), strict=True):
-        partials[k] = change
-    return value, slope, partials
 
 
 class CurveOfTrain(ShapedPieces):

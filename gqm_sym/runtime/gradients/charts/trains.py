@@ -35,7 +35,7 @@ from gqm_sym.runtime.gradients.charts.means import (
     value_on,
 )
 from gqm_sym.runtime.gradients.charts.orbit import path_along, source_along
-from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces
+from gqm_sym.runtime.gradients.charts.shaped_pieces import shaped_pieces
 from gqm_sym.runtime.gradients.orbit import pairs, without_formulas
 from gqm_sym.runtime.gradients.path import DS, POTENTIAL, PathRows
 from gqm_sym.runtime.launch.formulas import ParameterValues, chart_with
@@ -76,7 +76,7 @@ class TrackOfBody:
         if pieces is None:
             raise without_formulas()
         self._source = source_along(body)
-        self._shape = ShapedPieces(body, pieces, self._source.shaping)
+        self._shape = shaped_pieces(body, pieces, self._source.shaping)
         self._parameters = pairs(*((n.value, n.low, 0.0) for n in p))
 
     @property

@@ -194,9 +194,11 @@ def gradient(motion: Any, quantity: str) -> Array:
     changes = motion._changes
     if quantity in EXTREMES:
         return extreme(motion, changes, quantity)
-    t_end = motion.t_end
-    if not t_end < np.inf:
-        raise SolutionError(f"gradient: this motion goes on for ever and has no {quantity}")
+    if not motion._end_of_legs() < np.inf:
+        raise SolutionError(
+            f"gradient: this motion goes on for ever and has no {quantity}, or only after too many turns to follow its "
+            "derivatives"
+        )
     place, delay = end(motion, changes)
     if quantity == "t_end":
         return delay
@@ -230,7 +232,7 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     at once.
     """
     what, k, zero = motion.legs[-1].end, len(changes.runs) - 1, np.zeros(changes.variables)
-    if what == "horizon" or motion.t_end == 0.0:
+    if what == "horizon" or motion._end_of_legs() == 0.0:
         return zero, zero
     run, (sigma, y, delay, arc) = changes.runs[k], changes.ends[k]
     if what == "rest":
@@ -300,7 +302,7 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
-    t_end, moved = motion.t_end, np.zeros((changes.variables, 1))
+    t_end, moved = motion._end_of_legs(), np.zeros((changes.variables, 1))
     at_end, at_break = abs(t_end - found.t) <= AT_END * t_end, _is_at_break(changes, found.lam)
     if at_end and not (at_break and motion.legs[-1].end == "liftoff"):
         t, moved = t_end, end(motion, changes)[1][:, None]
@@ -353,14 +355,14 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tupl
 
     The time is left where it is not.
     """
-    t = found.t
+    t, t_end = found.t, motion._end_of_legs()
     for _ in range(NEWTON_STEPS):
         changed = states_at(changes, motion._march_points(np.array([t]))[0])
         law = changed.law
         slope, by_place, by_w = law.force if of_speed else changes.law.loads(changed.states)
         slope_rate, v = by_place[0] + by_w[0] * law.force[0, 0], motion.state(t).v
         step = -slope[0] / slope_rate * law.ds[0] / v if slope_rate and v else np.inf
-        if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
+        if not abs(step) <= MAX_STEP * t_end or not 0.0 <= t + step <= t_end:
             return float(found.t), False
         t += step
     return float(t), True

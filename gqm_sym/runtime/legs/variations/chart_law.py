@@ -10,7 +10,7 @@ import numpy as np
 from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import CurveOfMeans
-from gqm_sym.runtime.gradients.charts.shaped_pieces import ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.charts.shaped_pieces import shaped_pieces, shaping_of
 from gqm_sym.runtime.gradients.evaluation import fill_values
 from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.gradients.path import PathRows
@@ -58,7 +58,7 @@ class ChartLaw(Law):
             2 if formulas.path_in_space is None else 3,
         )
         self._forces = ChartForces(formulas.exact, self.count, self.mass, varied, dimension)
-        self._shape = ShapedPieces(problem, pieces, self._forces.shaping)
+        self._shape = shaped_pieces(problem, pieces, self._forces.shaping)
         self._launch, self._chart = problem.launch.lam0, chart
 
     @property

@@ -35,8 +35,8 @@ class History(Positions):
         Returns
         -------
         tuple of Leg
-            For a motion that goes on for ever without repeating, the legs up to its first turn; a horizon ``t_max``
-            extends them.
+            For a motion that goes on for ever without repeating, or turns more than 20 000 times before it ends, the
+            legs up to its first turn; a horizon ``t_max`` extends them.
         """
         legs = []
         trajectory = self._listed_trajectory

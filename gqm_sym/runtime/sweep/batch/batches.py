@@ -205,7 +205,7 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
 
 
 @Inner
-def load_launches(columns, begin, number, orbits, domain, monotone, scratch):  # type: ignore[no-untyped-def]
+def load_launches(fns, columns, begin, number, orbits, domain, monotone, scratch):  # type: ignore[no-untyped-def]
     """Copy ``number`` launches into a batch; SEARCH_DIRECTION is 0 for those that are not finite."""
     n, rows, count = orbits.size, orbits.rows, scratch.param_count
     p = orbits.params[: count * n].reshape(count, n)
@@ -220,7 +220,7 @@ def load_launches(columns, begin, number, orbits, domain, monotone, scratch):  #
     fill_row(columns, DIRECTION, begin, number, direction)
     for j in range(n):
         rests[j] = fma(v2[j], v2[j], -(v2[j] * v2[j]))
-    fill_axis_offsets(n, rows, domain, monotone)
+    fill_axis_offsets(n, rows, domain, monotone, fns.time_integrand != 0)
     for j in range(n):
         index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
         v2[j] *= v2[j]
@@ -331,7 +331,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
         orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
-        load_launches(columns, begin, number, orbits, domain, monotone, scratch)
+        load_launches(fns, columns, begin, number, orbits, domain, monotone, scratch)
         if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
             kind = OrbitKind(fastest_method(fns), True, True, True, True)
             answer_orbits(fns, kind, orbits, (spare, laps), wells, scratch, quantity, answers)

@@ -18,6 +18,7 @@ from gqm_sym.runtime.double_double.interpreter import BLOCK, LOW, ROW, call_inte
 from gqm_sym.runtime.sweep.batch.rows import (
     END_HIGH,
     END_LOW,
+    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LAUNCH_PLACE,
@@ -84,6 +85,7 @@ def find_exact_ends(exact, count, orbits, lacks):  # type: ignore[no-untyped-def
             place, rounding = two_sum(start[j], offsets[j])
             ends[j] = place + (rounding + lost[j])
             lacks[2 + side, j] = (place - ends[j]) + (rounding + lost[j])
+    rows[HALF_REST, :n] = 0.0
     for j in range(n):  # the width is rounded too
         width, rounding = two_sum(above[j], -below[j])
         rows[HALF_WIDTH, j], lows[j], highs[j] = 0.5 * width, lows[j] - 0.5 * rounding, highs[j] + 0.5 * rounding

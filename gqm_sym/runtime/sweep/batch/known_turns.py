@@ -14,6 +14,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
     AXIS_OFFSET,
     FOUND,
+    HALF_REST,
     HALF_WIDTH,
     LAUNCH_PLACE,
     LAUNCH_V2,
@@ -34,8 +35,9 @@ NEAR_MAXIMUM = 1e-9
 
 
 @Inner
-def fill_axis_offsets(n, rows, domain, monotone):  # type: ignore[no-untyped-def]
-    """Fill the offsets of launches from the axis of symmetry in their own period.
+def fill_axis_offsets(n, rows, domain, monotone, with_rests):  # type: ignore[no-untyped-def]
+    """Fill the offsets of launches from the axis of symmetry in their own period, and ``with_rests`` also what rounding
+    took from those of bodies at rest.
 
     In other periods than that of the known axis they are NaN unless V**2 is ``monotone`` between axes. There, what
     rounding takes from the place may be many roundings of the offset. ``domain`` has the rows DOMAIN_LOW to
@@ -55,6 +57,13 @@ def fill_axis_offsets(n, rows, domain, monotone):  # type: ignore[no-untyped-def
             lacking = (rounding + lost) - periods * (2.0 * steps_low[j])
             offset = fma(-periods, period, distance) + lacking
             offsets[j] = choose(monotone | (periods == 0.0), offset, nan)
+    if with_rests:
+        rests, w0 = rows[HALF_REST, :n], rows[LAUNCH_V2, :n]
+        for j in range(n):
+            distance, rounding = two_sum(start[j], -places[j])
+            offset, lost = two_sum(distance, -places_low[j])
+            known = (w0[j] == 0.0) & (offset == offsets[j])  # otherwise in another period, or there is no axis
+            rests[j] = choose(known, choose(offset < 0.0, -(rounding + lost), rounding + lost), 0.0)
 
 
 @Inner

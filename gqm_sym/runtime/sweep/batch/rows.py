@@ -20,6 +20,7 @@ END_LOW, END_HIGH    both ends as values of the curve's parameter               
 LAUNCH_PLACE         the launch place                                                     all
 LAUNCH_V2            V**2 at launch                                                       all
 HALF_WIDTH           half the orbit's width if a closed form gives it, otherwise NaN      time about axes
+HALF_REST            what rounding took from it for bodies at rest                         time about axes
 SEARCH_DIRECTION     the sign of the direction in which is searched; 0 for none           search
 SEARCH_LENGTH        how far the search goes at most                                      search
 LENGTH_BEHIND        how far it goes the other way; CLOSED on a closed curve              search
@@ -54,9 +55,9 @@ from gqm_sym.runtime.compiled.types import Array
 BATCH, LANES = 128, 8
 
 INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 17)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(17, 22)
-ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(22, 30)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 18)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(18, 23)
+ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(23, 31)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.

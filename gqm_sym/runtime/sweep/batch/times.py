@@ -38,6 +38,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
+    HALF_REST,
     HALF_WIDTH,
     INDEX,
     LAUNCH_PLACE,
@@ -214,12 +215,13 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
     count, n, rows, params = scratch.param_count, orbits.size, orbits.rows, orbits.params
     more = 0 if kind == CIRCULATION else scratch.layout[kind // AXIS_LIBRATION]
     if more:
-        p, halves = params[: count * n].reshape(count, n), scratch.work[0, :n]
-        middles, rests = scratch.work[1, :n], scratch.work[2, :n]
+        p, pairs = params[: count * n].reshape(count, n), scratch.work[:2].reshape(-1)[: 2 * n]
+        halves, middles, rests = pairs[:n], scratch.work[2, :n], scratch.work[3, :n]
         invariants = params[count * n : (count + more) * n].reshape(more, n)
         fill_halves(n, rows, halves)
         if kind == AXIS_LIBRATION:
-            call_integrand_invariants_batch(fns.integrand_invariants, n, halves, p, invariants)
+            pairs[n:] = rows[HALF_REST, :n]
+            call_integrand_invariants_batch(fns.integrand_invariants, n, pairs, p, invariants)
         else:
             for j in range(n):
                 total, lost = two_sum(rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j])
