@@ -115,7 +115,8 @@ def _read(value: Any, count: int) -> tuple[str, float]:
             raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not a number") from None
     number = float(text)
     if not isfinite(number):
-        raise DeclarationError(f"sampled: row {count}: {value!r:.40} is not finite; leave the row out or mend it")
+        shown = repr(value) if isinstance(value, str) else str(value)  # NumPy names its types in its representations
+        raise DeclarationError(f"sampled: row {count}: {shown[:40]} is not finite; leave the row out or mend it")
     return text, number
 
 

@@ -37,6 +37,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw, ExactPotential
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.motion.motion import end_of_legs
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
 
 # The largest number of steps of the optimiser, and the share by which a limit may be exceeded.
@@ -271,8 +272,9 @@ class _Tracks(ABC):
 
 def _arrival(motion: Any, low: float, high: float) -> float:
     """Return the time at which a body leaves the track at its upper end; NaN if it does not."""
-    ends = isfinite(motion.t_end) and abs(motion.legs[-1].lam_end - high) <= NEAR_END * (high - low)
-    return float(motion.t_end) if ends else nan
+    t_end = end_of_legs(motion)
+    ends = isfinite(t_end) and abs(motion.legs[-1].lam_end - high) <= NEAR_END * (high - low)
+    return float(t_end) if ends else nan
 
 
 class _Family(_Tracks):

@@ -50,25 +50,27 @@ def _polynomial(n, xs, zs, p, out):
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = f, fx, fz, fxx, fxz, fzz
 
 
-SQUARE, BEND, ROOT, WAVE = range(4)
+SQUARE, BEND, ROOT, WAVE, WALLS = range(5)
 
 
 @compiled(FIELD)
 def _other(n, xs, zs, p, out):
-    """Return |x| + |z| - 1, z - x|x|, z - sqrt(x) or z - sin(x), by the number p[0]."""
+    """Return |x| + |z| - 1, z - x|x|, z - sqrt(x), z - sin(x) or exp(z) - cosh(x), by the number p[0]."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 1), carray(out, (6, n))
     for i in range(n):
         x, z, which = xs[i], zs[i], int(p[0])
-        fx, fz, fxx = 0.0, 1.0, 0.0
+        fx, fz, fxx, fzz = 0.0, 1.0, 0.0, 0.0
         if which == 0:
             f, fx, fz = abs(x) + abs(z) - 1.0, math.copysign(1.0, x), math.copysign(1.0, z)
         elif which == 1:
             f, fx, fxx = z - x * abs(x), -2.0 * abs(x), -2.0 * math.copysign(1.0, x)
         elif which == 2:
             f, fx, fxx = z - math.sqrt(x), -0.5 / math.sqrt(x), 0.25 * x**-1.5
-        else:
+        elif which == 3:
             f, fx, fxx = z - math.sin(x), -math.cos(x), math.sin(x)
-        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = f, fx, fz, fxx, 0.0, 0.0
+        else:
+            f, fx, fz, fxx, fzz = math.exp(z) - math.cosh(x), -math.sinh(x), math.exp(z), -math.cosh(x), math.exp(z)
+        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = f, fx, fz, fxx, 0.0, fzz
 
 
 def trace(

@@ -47,6 +47,9 @@ MIN_LENGTH = 1e-15
 MAX_BREAK_PIECE = 1e-12
 BREAK_DISTANCE = 1e-9
 
+# The curve ends where so many steps over a break are not enough to lay a piece again: F is no longer finite there.
+MAX_STEPS_OVER = 8
+
 # The curve is closed if it returns to the start in the same direction, with at most this gap, as a share of a piece.
 MAX_GAP = 1e-9
 
@@ -278,7 +281,7 @@ def trace_one_way(field, p, sign, start, limit, may_close):  # type: ignore[no-u
     last = np.array([direction[0], direction[1], piece[4, ANCHOR], 0.0])
     size = max(fabs(at[0]), fabs(at[2]))
     distance, length = predicted_distance(piece, ANCHOR), _first_length(piece, size)
-    count, end, s, reach, after_break = 0, FAR, 0.0, inf, False
+    count, end, s, reach, after_break, steps_over = 0, FAR, 0.0, inf, False, 0
     while count < MAX_PIECES and s < reach:
         if limit - s <= 0.0 or distance <= MAX_SINGULAR_DISTANCE * size:
             end = LIMIT if limit - s <= 0.0 else SINGULAR
@@ -289,10 +292,11 @@ def trace_one_way(field, p, sign, start, limit, may_close):  # type: ignore[no-u
             if distance <= MAX_SINGULAR_AHEAD * size:
                 end = SINGULAR
                 break
-            if not _pass_break(curve, at, last, piece, trace, count, size):
-                end = UNREAL
+            if steps_over == MAX_STEPS_OVER or not _pass_break(curve, at, last, piece, trace, count, size):
+                count, end = count - steps_over, UNREAL
+                at, jumps[count:] = anchors[count], SMOOTH
                 break
-            count += 1
+            count, steps_over = count + 1, steps_over + 1
             s, after_break = edges[count], True
             distance, length = predicted_distance(piece, ANCHOR), _first_length(piece, size)
             continue
@@ -316,7 +320,7 @@ def trace_one_way(field, p, sign, start, limit, may_close):  # type: ignore[no-u
         before, distance = distance, predicted_distance(piece, END)
         last[3] = _distance_to_singular(before, distance, edge - s)
         count += 1
-        edges[count], after_break = edge, False
+        edges[count], after_break, steps_over = edge, False, 0
         if edge - s <= MAX_BREAK_PIECE * size and edge < limit:
             _mark(jumps, edges, count, BREAK, BREAK_DISTANCE * size)
         s = edge

@@ -3,7 +3,8 @@
 This equation is solved at Chebyshev nodes: the tangents there are integrated, and are evaluated again at the resulting
 places, until nothing changes. The tangents have unit length to rounding, so arc length is preserved, and rounding of F
 enters only the direction. Along the exact solution F is constant. The mean of its values at the nodes, in which
-rounding averages out, is the distance of the piece from F = 0, and the piece is moved by that along the gradient.
+rounding averages out, is the distance of the piece from F = 0, and the piece is moved by that along the gradient. Since
+the rounding of F is a distance times the gradient, each value has the weight of the gradient's inverse square.
 """
 
 from math import fabs, inf, isfinite, sqrt
@@ -26,10 +27,16 @@ ROWS = 6
 # The largest number of iterations; a piece that needs more is too long.
 MAX_ITERATIONS = 40
 
-# The iteration has converged when places change by less than the first share of the length, or by less than the second
-# and the changes no longer decrease, because they are rounding then.
+# The iteration has converged when places change by less than the first share of the length, and not more than before;
+# or by less than the second share if they are rounding: the change was not smaller for so many iterations.
 MAX_LAST_CHANGE = 4e-16
 MAX_ROUNDING_CHANGE = 1e-8
+MIN_STALLED = 3
+
+# The n-th change is that before times K/n, where K is the length times the derivative of the tangent across the curve.
+# A piece is too long if one of the first changes is so many times that before, and more than this share of the length:
+# rounding would be amplified too.
+FIRST_CHANGES, MAX_RISE, MIN_RISEN_CHANGE = 4, 1.5, 4e-16
 
 # The largest shift of a piece onto F = 0, as a share of its length.
 MAX_SHIFT = 1e-3
@@ -156,8 +163,8 @@ def solve_piece(curve, start, length, piece):  # type: ignore[no-untyped-def]
         s = half * _FROM_LEFT[i]
         piece[0, i] = s * (piece[2, ANCHOR] - 0.5 * s * kappa * piece[3, ANCHOR])
         piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * kappa * piece[2, ANCHOR])
-    before, moved = inf, False
-    for _ in range(MAX_ITERATIONS):
+    before, least, stalled, first, moved = 0.0, inf, 0, 0, False
+    for n in range(MAX_ITERATIONS):
         if not evaluate_points(curve, start, piece):
             return False
         change = 0.0
@@ -170,24 +177,29 @@ def solve_piece(curve, start, length, piece):  # type: ignore[no-untyped-def]
                 offset = half * (_FROM_LEFT[i] * base + gained)
                 change = max(change, fabs(offset - piece[row, i]))
                 piece[row, i] = offset
-        converged = change <= MAX_LAST_CHANGE * length or (
-            change <= MAX_ROUNDING_CHANGE * length and change >= 0.5 * before
+        if first < n <= first + FIRST_CHANGES and change > max(MAX_RISE * before, MIN_RISEN_CHANGE * length):
+            return False
+        stalled = stalled + 1 if change >= least else 0
+        least = min(least, change)
+        converged = (change <= MAX_LAST_CHANGE * length and change <= before) or (
+            change <= MAX_ROUNDING_CHANGE * length and stalled >= MIN_STALLED
         )
         if converged and moved:
             return True
         if converged:
             moved = True
-            level = 0.0
+            level, weights = 0.0, 0.0
             for j in range(TERMS):
-                level += piece[6, j] / TERMS
-            shift = -level / piece[7, ANCHOR]
+                weight = (piece[7, ANCHOR] / piece[7, j]) ** 2
+                level, weights = level + weight * piece[6, j], weights + weight
+            shift = -level / weights / piece[7, ANCHOR]
             if fabs(shift) > MAX_SHIFT * length:
                 return False
             s, e = two_sum(start[0], sign * shift * piece[3, ANCHOR])
             start[0], start[1] = two_sum(s, e + start[1])
             s, e = two_sum(start[2], -sign * shift * piece[2, ANCHOR])
             start[2], start[3] = two_sum(s, e + start[3])
-            change = inf
+            change, least, stalled, first = 0.0, inf, 0, n + 1
         before = change
     return False
 

@@ -175,7 +175,7 @@ LINE = [(float(k), 0.5 * k, -1.0 * k) for k in range(9)]
     [
         (LINE[:5], {}, "5 different points; an open track of kind 'spline' needs 6 or more"),
         ([*LINE[:4], LINE[3], *LINE[4:]], {}, "row 5: repeats row 4; leave one of them out"),
-        ([*LINE[:4], (4.0, float("nan"), -4.0), *LINE[5:]], {}, "row 5: nan is not finite"),
+        ([*LINE[:4], (4.0, np.float64("nan"), -4.0), *LINE[5:]], {}, "row 5: nan is not finite"),
         ([*LINE[:4], (4.0, 2.0), *LINE[5:]], {}, "row 5: must be three numbers, x, y and z, as in row 1, got"),
         ([(*row, 0.0) for row in LINE], {}, "row 1: must be two numbers, x and z, or in space three, x, y and z, got"),
         ([*LINE[:4], (1.0, 0.5, 9.0), *LINE[5:]], {}, r"row \d: the track turns by 1\d\d degrees there"),

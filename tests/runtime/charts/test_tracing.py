@@ -2,6 +2,7 @@
 
 import json
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -127,6 +128,20 @@ def test_curves_that_touch() -> None:
     parabola = mp.asinh(2) / 4 + mp.sqrt(5) / 2
     assert error(chart.high, parabola) <= 4 * ROUNDING
     assert np.abs(chart.points([chart.high])[:2]).max() <= 4 * ROUNDING
+
+
+def test_folium() -> None:
+    """The loop of x**3 + z**3 = 3xz is smooth up to the node, and its places are on it to rounding, in fractions.
+
+    Towards the node there were breaks between its pieces.
+    """
+    chart = trace("x**3 + z**3 - 3*x*z", (1.5, 1.5))
+    assert chart.ends == ("singular-point", "singular-point")
+    assert chart.breaks.size == 0
+    for x, z in chart.points(np.linspace(0.99 * chart.low, 0.99 * chart.high, 99))[:2].T.tolist():
+        a, b = Fraction(x), Fraction(z)
+        gradient = math.hypot(3 * (a * a - b), 3 * (b * b - a))
+        assert abs(a**3 + b**3 - 3 * a * b) <= ROUNDING * gradient
 
 
 def test_narrow_waist() -> None:

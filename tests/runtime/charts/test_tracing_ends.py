@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 from naive import error, ulps
-from traced import BEND, ROOT, ROUNDING, SQUARE, WAVE, other, trace
+from traced import BEND, ROOT, ROUNDING, SQUARE, WALLS, WAVE, other, trace
 
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.charts.continuation import MAX_PIECES
@@ -98,3 +98,18 @@ def test_budget() -> None:
     assert chart.edges.size == 2 * MAX_PIECES + 1
     x, z, _, _ = chart.points(np.linspace(chart.low, chart.high, 999))
     assert np.abs(z - np.sin(x)).max() <= 2e-13
+
+
+def test_between_walls_that_grow_exponentially() -> None:
+    """On exp(z) = cosh(x) curvature falls as the gradient of F grows; the curve is smooth up to where F overflows.
+
+    Its pieces were too long, 1e-5 beside the curve and with corners between them, and 2000 pieces of the length of
+    roundings lay beside the end.
+    """
+    chart = other(WALLS, (0.0, 0.0))
+    assert chart.breaks.size == 0
+    assert chart.ends == ("domain-end", "domain-end")
+    x, z = chart.points(np.linspace(-700.0, 700.0, 500))[:2]
+    on_curve = np.abs(x) + np.log1p(np.exp(-2.0 * np.abs(x))) - math.log(2.0)
+    assert np.abs(z - on_curve).max() <= ROUNDING * 700.0
+    assert 709.0 < -chart.points([chart.high])[0, 0] < 711.0

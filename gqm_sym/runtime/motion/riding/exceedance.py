@@ -5,8 +5,7 @@ on parts that are halved until they resolve it; all roots of these are found, an
 make each of them exact to rounding.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any, NamedTuple, TypeAlias
 
@@ -23,6 +22,11 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 # The number of nodes of each polynomial, the share of its last coefficients below which it resolves the load well
 # enough to separate its roots, and the largest number of times that a part is halved.
 NODES, MAX_TAIL, MAX_HALVINGS = 16, 1e-9, 10
+
+# The nodes of a polynomial on [-1, 1], and the matrix that takes values there to Chebyshev coefficients.
+_ANGLES = np.pi * (np.arange(NODES) + 0.5) / NODES
+_AT, _FIT = np.cos(_ANGLES), (2.0 / NODES) * np.cos(np.outer(_ANGLES, np.arange(NODES)))
+_FIT[:, 0] *= 0.5
 
 # The number of steps that make a root exact, and the distance by which rounding may put a root of the polynomial
 # outside of its part.
@@ -71,11 +75,11 @@ class Exceedance(NamedTuple):
         return self.longest <= self.allowed
 
 
-class _Part(NamedTuple):
-    """A polynomial that represents the load between two phase angles."""
+class _Parts(NamedTuple):
+    """Polynomials that represent the load between phase angles: their Chebyshev coefficients are rows of ``terms``."""
 
-    low: float
-    high: float
+    low: Array
+    high: Array
     terms: Array
 
 
@@ -142,7 +146,7 @@ def _times_beyond(spans: Sequence[Span], period: float | None) -> tuple[float, f
 
 def _spans(motion: Any, quantity: Quantity, levels: Array, sign: int) -> list[tuple[list[Span], float | None]]:
     """Return, for each level, the spans of time in which the load is beyond it, and the period if they repeat."""
-    if motion.kind == "rest" or motion.t_end == 0.0:
+    if motion.kind == "rest" or motion._end_of_legs() == 0.0:
         here = quantity.of_state(motion.state(0.0))
         return [([(0.0, motion.t_end)] if sign * (here - level) > 0.0 else [], None) for level in levels.tolist()]
     trajectory, end = whole_trajectory(motion)
@@ -157,7 +161,7 @@ def _spans(motion: Any, quantity: Quantity, levels: Array, sign: int) -> list[tu
             return quantity.at(timed, phi)
 
         low, high = min(start, stop), max(start, stop)
-        parts = list(_parts(load, timed.segment.edges, low, high))
+        parts = _parts(load, timed.segment.edges, low, high)
         for level, theirs in zip(levels.tolist(), spans, strict=True):
             for span in _beyond(parts, load, level, sign, (low, high)):
                 times = sorted(_time(timed, trajectory, phi, end) for phi in span)
@@ -169,43 +173,42 @@ def _time(timed: TimedSegment, trajectory: Trajectory, phi: float, end: float) -
     return min(time_of(timed, trajectory, phi), end)
 
 
-def _parts(load: Callable[[Array], Array], edges: Array, low: float, high: float) -> Iterator[_Part]:
+def _parts(load: Callable[[Array], Array], edges: Array, low: float, high: float) -> _Parts:
     """Return polynomials that resolve a load between two phase angles."""
-    inside = edges[(edges > low) & (edges < high)]
-    ends = [low, *inside.tolist(), high]
-    waiting = [(a, b, 0) for a, b in pairwise(ends)]
-    nodes = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    while waiting:
-        a, b, halvings = waiting.pop()
-        values = load(0.5 * (a + b) + 0.5 * (b - a) * nodes)
-        terms: Array = chebyshev.chebfit(nodes, values, NODES - 1).astype(np.float64)
-        size = np.abs(terms).max()
+    ends, found = np.concatenate([[low], edges[(edges > low) & (edges < high)], [high]]), list[_Parts]()
+    a, b = ends[:-1], ends[1:]
+    for halvings in range(MAX_HALVINGS + 1):
         middle = 0.5 * (a + b)
-        if np.abs(terms[-2:]).max() <= MAX_TAIL * max(size, 1.0) or halvings == MAX_HALVINGS or not a < middle < b:
-            yield _Part(a, b, terms)
-        else:
-            waiting += [(a, middle, halvings + 1), (middle, b, halvings + 1)]
+        phi = middle[:, None] + 0.5 * (b - a)[:, None] * _AT
+        terms = load(phi.ravel()).reshape(phi.shape) @ _FIT
+        sizes = np.abs(terms)
+        waits = sizes[:, -2:].max(axis=1) > MAX_TAIL * np.maximum(sizes.max(axis=1), 1.0)
+        waits &= (halvings < MAX_HALVINGS) & (a < middle) & (middle < b)
+        found.append(_Parts(a[~waits], b[~waits], terms[~waits]))
+        if not waits.any():
+            break
+        a, b = np.concatenate([a[waits], middle[waits]]), np.concatenate([middle[waits], b[waits]])
+    return _Parts(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def _beyond(
-    parts: Sequence[_Part], load: Callable[[Array], Array], level: float, sign: int, ends: tuple[float, float]
+    parts: _Parts, load: Callable[[Array], Array], level: float, sign: int, ends: tuple[float, float]
 ) -> list[Span]:
     """Return the phase angles between which a load is beyond a level."""
-    low, high = ends
-    roots = np.array([root for part in parts for root in _roots(part, load, level)])
+    (low, high), terms = ends, parts.terms
+    may_cross = np.abs(terms[:, 1:]).sum(axis=1) >= np.abs(terms[:, 0] - level)
+    crossed = zip(parts.low[may_cross], parts.high[may_cross], terms[may_cross], strict=True)
+    roots = np.array([root for a, b, row in crossed for root in _roots(a, b, row, load, level)])
     marks = np.unique(np.concatenate([[low], roots[(roots > low) & (roots < high)], [high]]))
     middles = 0.5 * (marks[:-1] + marks[1:])
     beyond = sign * (load(middles) - level) > 0.0
     return [(float(a), float(b)) for a, b, out in zip(marks, marks[1:], beyond, strict=False) if out]
 
 
-def _roots(part: _Part, load: Callable[[Array], Array], level: float) -> list[float]:
+def _roots(low: float, high: float, terms: Array, load: Callable[[Array], Array], level: float) -> list[float]:
     """Return the phase angles of one part at which a load equals a level."""
-    low, high, terms = part
     terms = terms.copy()
     terms[0] -= level
-    if np.abs(terms[1:]).sum() < abs(terms[0]):
-        return []
     kept = np.flatnonzero(np.abs(terms) > 1e-15 * np.abs(terms).max())
     if not kept.size or kept[-1] == 0:
         return []
