@@ -8,6 +8,11 @@ from paths import ROOT
 import gqm_sym as gqm
 
 
+def test_each_family_has_a_page() -> None:
+    """There is one page for each family, and an index."""
+    assert {path.stem for path in (ROOT / "docs" / "families").glob("*.md")} == {"index", *gqm.families.names()}
+
+
 @pytest.mark.extended
 def test_pages_are_current() -> None:
     """The committed pages are those that the script writes, one for each family and an index."""
