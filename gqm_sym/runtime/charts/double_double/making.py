@@ -124,6 +124,11 @@ def chebyshev_fit() -> Array:
     return _tables()[1]
 
 
+def chebyshev_powers() -> Array:
+    """Return the matrix that takes rows of Chebyshev coefficients to those of powers."""
+    return _tables()[2]
+
+
 # The coordinates of one piece at the Chebyshev points as an array (d, 2, NODES), in the order x, z, y, and a bound on
 # their errors; and its type in compiled code.
 Samples = tuple[Array, float]

@@ -6,17 +6,15 @@ because the polynomials have 31. Of some curves the maker of the chart knows the
 """
 
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 from numba import types
-from numpy.polynomial.chebyshev import cheb2poly
 
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
 from gqm_sym.runtime.charts.chart import ChartMaker
-from gqm_sym.runtime.charts.double_double.making import TruePieces, chebyshev_fit, sample_places
+from gqm_sym.runtime.charts.double_double.making import TruePieces, chebyshev_fit, chebyshev_powers, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import (
     DX,
     DY,
@@ -320,14 +318,8 @@ class ShapedPieces:
         ahead = np.pad(is_large, ((0, 0), (0, TERMS_IN_A_ROW - 1)))
         is_used = sum(ahead[:, k : k + NODES] for k in range(TERMS_IN_A_ROW))
         kept = np.where(np.logical_and.accumulate(is_used, axis=1) | np.isnan(series), series, 0.0)
-        powers: Array = kept @ _powers()
+        powers: Array = kept @ chebyshev_powers()
         return powers
-
-
-@lru_cache(maxsize=1)
-def _powers() -> Array:
-    """Return the matrix that takes Chebyshev coefficients to those of powers of u."""
-    return np.array([np.pad(cheb2poly(row[: k + 1]), (0, NODES - 1 - k)) for k, row in enumerate(np.eye(NODES))])
 
 
 def shaped_pieces(problem: Problem, pieces: TruePieces, shaping: tuple[int, ...]) -> ShapedPieces:
