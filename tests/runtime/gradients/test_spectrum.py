@@ -50,6 +50,7 @@ def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.extended
 def test_beside_a_hilltop() -> None:
     """A body that passes a hilltop slowly has coefficients too: those of the velocity, times k, are those of the arc
     length.
