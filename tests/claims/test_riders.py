@@ -158,6 +158,17 @@ def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
     assert (state.onset_vertical, state.onset_lateral, state.onset_longitudinal) == (0.0, 0.0, 0.0)
 
 
+def test_a_rider_who_starts_or_turns(rough: ModuleType) -> None:
+    """At a launch from rest and at a turn, the loads are the limits of those of the motion afterwards."""
+    motion = rough.solve(-1, t_max=12)
+    assert [leg.end for leg in motion.legs[:2]] == ["turn", "turn"]
+    for leg in motion.legs[:2]:
+        state = motion.state(leg.t_start)
+        true = newton("angle", mpf(leg.lam_start), mpf(0), leg.direction, mpf("0.02"), mpf("0.005"))[0]
+        found = [state.n_vertical, state.n_lateral, state.n_longitudinal]
+        assert found == pytest.approx([float(load) for load in true], rel=1e-14, abs=1e-14)
+
+
 def test_a_vertical_loop(loop: ModuleType) -> None:
     """Between top and bottom the load changes by six g, all the way round the rider is upright, and levels are crossed
     where closed forms say.

@@ -437,6 +437,13 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     # A coupling balances what the cars behind it lack, which is the potential's force over their part of the track.
     lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
+    # At a launch from rest, friction is that of the motion that begins.
+    launch = 10.0
+    start, force = module.solve(launch, length=length, mu=mu, t_max=1), pressed(launch, 0.0)
+    way, edges = start.legs[0].direction, energy(launch + length * (np.arange(5) / 4 - 0.5))
+    acceleration = -(edges[-1] - edges[0]) / length - way * mu * force.mean()
+    lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + way * mu * force / 4)
+    assert start.cars(0).coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
 
 
 def test_cars_pass_jumps_of_curvature(build: Build) -> None:
