@@ -243,7 +243,7 @@ def test_all_explicit_curves_are_here() -> None:
     assert {motion.expect["kind"] for motion in MOTIONS} == {"libration", "circulation", "transit"}
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("famous", **of_kind("libration"))
 def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
     """A libration goes between two turning points, which it meets in order, half a period apart."""
@@ -313,6 +313,7 @@ def test_derivatives_of_transits(famous: FamousMotion, famous_motion: MotionOf) 
         assert error(found, wanted) <= TIME * max(abs(float(wanted)), float(famous.expect["transit_time"])), name
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """A compiled loop gives the same times, also for bodies that leave the curve."""
@@ -322,7 +323,7 @@ def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> No
     assert error(swept.values.item(), expected) <= TIME * float(expected)
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """ds, kappa, V**2 and N are correct at the sampled places, relative to the largest value among the samples."""
@@ -334,7 +335,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
             assert error(actual, row[name]) <= SAMPLE * largest
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @EVERY_MOTION
 def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """lam, x, z and v are correct at each time; a periodic motion's last time is more than 1000 periods late."""
@@ -350,7 +351,7 @@ def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
         assert error(states.v[k], row["v"]) <= POSITION * of.v
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @EVERY_MOTION
 def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """No position, early or late, has a larger error than ``error_bound`` says."""
@@ -359,7 +360,7 @@ def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
 
 
-@pytest.mark.sample(12)
+@pytest.mark.sample(8)
 @EVERY_MOTION
 def test_the_error_bound_is_useful(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The error bound is at most a hundred times the error. The worst ratio measured is 31."""
@@ -372,7 +373,7 @@ def first_launch(curve: FamousCurve) -> FamousMotion:
     return next(motion for motion in MOTIONS if motion.curve == curve)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @EVERY_CURVE
 def test_a_curve_file_gives_the_same_module(
     curve: FamousCurve, famous_module: ModuleOf, generated_folder: Path, tmp_path: Path

@@ -112,6 +112,7 @@ def test_extremes(quantity: str, omega: float, built: Build) -> None:
             assert slope == pytest.approx(truth, rel=1e-12, abs=1e-12 * abs(extreme.value)), name
 
 
+@pytest.mark.extended
 def test_sweeps_have_the_same(built: Build) -> None:
     """Swept derivatives of extremes are those of single motions."""
     module = built("turning", VIVIANI, FRAME)

@@ -139,7 +139,7 @@ class OnLeaningRail(OnRail):
     is_leaning = True
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("way", [1, -1])
 def test_along_a_curve_with_formulas(way: int, built: Build) -> None:
     """All derivatives of the time of lift-off are right to rounding, on both ways in a frame that turns; so are those

@@ -87,7 +87,7 @@ def test_turning_points(problem: Problem, motion_of: MotionOf) -> None:
         assert ulps(lam, expected) <= TURNING_POINT_ULPS
 
 
-@pytest.mark.sample(24)
+@pytest.mark.sample(14)
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_positions(problem: Problem, motion_of: MotionOf) -> None:
     """In the first ten periods lam, x, z and v are right to the rounding of their scales."""

@@ -204,6 +204,7 @@ def test_without_a_potential() -> None:
         gqm.derive(gqm.families.circle(), gqm.Train(length=1) + gqm.QuadraticDrag())
 
 
+@pytest.mark.extended
 def test_friction_on_a_rotating_hoop(build_train: Build) -> None:
     """The Coriolis force presses the cars against the side of the hoop, which DOP853 integrates in time."""
     law = gqm.Gravity() + gqm.RotatingFrame() + gqm.CoulombFriction()

@@ -126,6 +126,7 @@ def test_a_time_along_a_rail(tmp_path: Path) -> None:
     assert found[0] == pytest.approx(0.5 / np.sqrt(2 * 9.81 / 4), rel=1e-14)
 
 
+@pytest.mark.extended
 def test_a_minimum_with_limits(tmp_path: Path) -> None:
     """The lowest arc on which the load stays below a limit is found: a rail that leads a body round a bend."""
     pieces = [gqm.line(length=1), gqm.arc(radius="r", angle="1")]

@@ -155,6 +155,7 @@ def coil(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="coil", folder=tmp_path_factory.mktemp("coil"))
 
 
+@pytest.mark.extended
 def test_corkscrew(coil: ModuleType) -> None:
     """On a helix about a level axis v0**2 from the lowest point is 4 g R + g (R**2 + c**2)/R, by the load on riders; a
     bead needs 4 g R.

@@ -130,7 +130,7 @@ def loads(truth: Truth, curve: gqm.Curve, s: np.ndarray | None = None) -> tuple[
     return np.cos(alpha) + 2.0 * (top - z) * kappa - right, 2.0 * (top - z)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scatter", [0.001, 0.01, 0.1])
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("known", [True, False], ids=["known", "auto"])
@@ -154,7 +154,7 @@ def test_loads_are_within_their_error(name: str, scatter: float, known: bool) ->
     assert 0.2 < np.sqrt(np.mean(size**2)) < 1.0
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", TRACKS)
 def test_there_is_little_bias(name: str) -> None:
     """The bias of the curvature is less than half of the stated error.

@@ -214,17 +214,26 @@ class DissipativeMotion(FollowedMotion):
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""
-        done, lap = 0, self.problem.period
+        done, lap, laps = 0, self.problem.period, 0.0
+        order = np.argsort(places, kind="stable")
+        ordered, squares = places[order], v2[order]
+        within = ordered
         while True:
             for piece in self._pieces[done:]:
                 segment = piece.segment
-                within = places - piece.laps * lap
-                on = (within >= min(segment.a, segment.b)) & (within <= max(segment.a, segment.b)) & np.isnan(v2)
-                phi = [segment.phase_angle_of(*segment.offsets(place)) for place in within[on].tolist()]
-                v2[on] = segment.speeds(np.minimum(phi, segment.stop)) ** 2
+                if piece.laps != laps:
+                    laps, within = piece.laps, ordered - piece.laps * lap
+                first = int(np.searchsorted(within, min(segment.a, segment.b)))
+                last = int(np.searchsorted(within, max(segment.a, segment.b), side="right"))
+                on = first + np.flatnonzero(np.isnan(squares[first:last]))
+                if on.size:
+                    phi = segment.phase_angles_of(within[on])
+                    squares[on] = segment.speeds(np.minimum(phi, segment.stop)) ** 2
                 if piece.end not in ("", "contact-sign"):
+                    v2[order] = squares
                     return
             done = len(self._pieces)
             if not self._is_ahead(places):
+                v2[order] = squares
                 return
             self._follow_next()

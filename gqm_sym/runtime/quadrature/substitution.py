@@ -12,7 +12,7 @@ FROM_SLOW       a + (b-a) phi                           0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
-There are three forms of it here: for one place, for an array, and for compiled loops. `integrands` and `trapezoid` need
+There are three forms of it here: for one place, for arrays, and for compiled loops. `integrands` and `trapezoid` need
 the offsets of a place from both ends instead of the place, and compute them in their own loops, which vectorise.
 """
 
@@ -28,6 +28,9 @@ from gqm_sym.runtime.compiled.types import Array
 # Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium, and
 # from a place where the body is slowest, such as next to a hilltop that it passes.
 TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM, FROM_SLOW = range(5)
+
+# Smaller than the square root of any positive double, so that a quotient by the greater of both is defined at zero too.
+MIN_ROOT = 1e-200
 
 
 def phase_angle_of(kind: int, offset: float, from_a: float, to_b: float, width: float) -> float:
@@ -53,6 +56,23 @@ def phase_angle_of(kind: int, offset: float, from_a: float, to_b: float, width: 
         return share
     scaled = share * (1.0 + 2.0 * offset)
     return scaled / (offset + sqrt(offset**2 + scaled))
+
+
+def phase_angles_of(kind: int, offset: float, from_a: Array, to_b: Array, width: float) -> Array:
+    """Return the phase angles of many places; the arguments are those of `phase_angle_of`."""
+    if kind == TURN_TURN:
+        angles: Array = 2.0 * np.arctan2(np.sqrt(from_a), np.sqrt(to_b))
+        return angles
+    if kind == TO_EQUILIBRIUM:
+        with np.errstate(divide="ignore"):
+            angles = -np.log(to_b / width)
+        return angles
+    share = np.where(from_a <= to_b, from_a / width, 1.0 - to_b / width)
+    if kind == REGULAR:
+        return share
+    scaled = share * (1.0 + 2.0 * offset)
+    angles = np.where(share <= 0.0, share, scaled / np.maximum(offset + np.sqrt(offset**2 + scaled), MIN_ROOT))
+    return angles
 
 
 def places_at(

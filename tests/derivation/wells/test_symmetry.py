@@ -30,6 +30,7 @@ CASES = {
 }
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("name", CASES)
 def test_symmetry(name: str) -> None:
     """The places are those of textbooks, and numerical values agree."""

@@ -83,6 +83,7 @@ def test_over_the_arch(arch: ModuleType) -> None:
     assert abs(motion.t_end - truth) <= 1e-14 * truth
 
 
+@pytest.mark.extended
 def test_at_rest_in_a_cusp(arch: ModuleType, chain: ModuleType) -> None:
     """A cusp that is the lowest point holds the body; from the highest one it moves in the requested direction."""
     assert arch.solve(0).kind == "rest"

@@ -15,7 +15,7 @@ from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.quadrature.integrands import speeds_at
 from gqm_sym.runtime.quadrature.kronrod import GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES
-from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, phase_angles_of
 from gqm_sym.runtime.quadrature.time_panels import (
     CONVERGED,
     COUNT,
@@ -278,3 +278,21 @@ def test_the_stated_error_is_no_less_than_the_true_one(amplitude: float, module_
     with mp.workdps(40):
         truth = 2 * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2) / mp.sqrt(mpf("9.81"))
     assert share(laid.whole, truth, float(truth)) <= laid.error + 2 * ULP + ULP / laid.balance
+
+
+@pytest.mark.parametrize("kind", [TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM])
+def test_phase_angles_of_places(kind: int) -> None:
+    """The phase angles of many places are those by whose closed forms the places were made, from 0 on, both near the
+    start of a segment and near its end.
+    """
+    width, phi = 3.0, np.append(0.0, np.geomspace(1e-9, 0.99, 50))
+    shares = {
+        TURN_TURN: (np.sin(0.5 * phi) ** 2, np.cos(0.5 * phi) ** 2),
+        FROM_TURN: (phi**2, (1.0 - phi) * (1.0 + phi)),
+        REGULAR: (phi, 1.0 - phi),
+        TO_EQUILIBRIUM: (-np.expm1(-phi), np.exp(-phi)),
+    }
+    from_a, to_b = (width * share for share in shares[kind])
+    found = phase_angles_of(kind, 0.0, from_a, to_b, width)
+    # The rounding of 1 where an angle is found from the distance to the end; else of the angle.
+    assert np.all(np.abs(found - phi) <= 4 * ULP * (1.0 if kind == TO_EQUILIBRIUM else phi))

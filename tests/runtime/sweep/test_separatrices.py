@@ -126,6 +126,7 @@ def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str,
             assert ulps(float(arrival), 2 / mpf(speed) * mp.ellipf(mpf(9) / 2, m)) <= MAX_PASSING_ULPS
 
 
+@pytest.mark.extended
 def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
     """The time until bodies leave is that of the integral, whether they turn before or not."""
     curve = gqm.Curve.graph("a*(x**4 - 2*x**2)", parameter="x", domain=(-2, "3/2"))

@@ -20,6 +20,7 @@ from gqm_sym.runtime.quadrature.substitution import (
     REGULAR,
     TURN_TURN,
     phase_angle_of,
+    phase_angles_of,
     places_at,
 )
 from gqm_sym.runtime.quadrature.time_panels import (
@@ -280,7 +281,7 @@ class Segment:
             return ahead, behind
         return self._exact_offsets(place, low)
 
-    def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
+    def _offsets_in_doubles(self, place: Any, low: float = 0.0) -> tuple[Any, Any]:
         """Return `offsets` from the ends in doubles."""
         return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
@@ -321,6 +322,18 @@ class Segment:
     def phase_angle_of(self, offset_a: float, offset_b: float) -> float:
         """Return the phase angle of a place, which is given by its signed distances ``lam - a`` and ``b - lam``."""
         return self._phase_angles([(offset_a, offset_b)])[0]
+
+    def phase_angles_of(self, places: Array) -> Array:
+        """Return the phase angles of places within a lap."""
+        ahead, behind = self._offsets_in_doubles(places)
+        sign, width = self.direction, self.width
+        ahead, behind = np.maximum(ahead * sign, 0.0), np.maximum(behind * sign, 0.0)
+        ahead[places == self.a], behind[places == self.b] = 0.0, 0.0
+        phi = phase_angles_of(self.kind, self.turn_offset, ahead, behind, abs(width))
+        if self._is_conservative and self.kind in (TURN_TURN, FROM_TURN):
+            for i in np.flatnonzero(np.minimum(ahead, behind) <= NEAR_TURN * abs(width)).tolist():
+                phi[i] = self.phase_angle_of(*self.offsets(float(places[i])))
+        return phi
 
     def _phase_angles(self, offsets: list[tuple[float, float]]) -> list[float]:
         kind, offset, width, sign = self.kind, self.turn_offset, abs(self.width), self.direction

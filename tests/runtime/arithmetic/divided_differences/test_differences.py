@@ -278,6 +278,7 @@ def test_first_difference_keeps_its_digits(row: Row) -> None:
     assert error <= FIRST_ULPS, f"{row.slug}1{points}: {error:.1f} ulps"
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 def test_second_difference_keeps_its_digits(row: Row) -> None:
     """f[x,y,w] is right to a few ulps at any spread and in any order of the points."""

@@ -262,7 +262,7 @@ def test_parameters_of_every_launch(bend: ModuleType) -> None:
     assert np.flatnonzero(swept.status).tolist() == [5]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("kind", ["rail", "implicit", "sampled"])
 def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None:
     """Launches with their own g, Omega and m are answered as by `solve`, from one table, alone or with others."""
