@@ -17,9 +17,9 @@ from gqm_sym.runtime.arithmetic.elementary import cos
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined
 
-# sinc(t) as a polynomial in t**2 - CENTER, highest power first, for |t| <= MAX_ARGUMENT: sums of two places on the branch
-# of the cotangent about 0 are below a whole turn, where powers about 0 would cancel. It interpolates at Chebyshev nodes,
-# and its error with rounded coefficients is below 2e-17.
+# sinc(t) as a polynomial in t**2 - CENTER, highest power first, for |t| <= MAX_ARGUMENT: sums of two places on the
+# branch of the cotangent about 0 are below a whole turn, where powers about 0 would cancel. It interpolates at
+# Chebyshev nodes; with rounded coefficients, it is right to 2e-17.
 CENTER, MAX_ARGUMENT = 20.0, 6.32
 SINC_OF_TURN = (
     -7.378518043090475e-41,
