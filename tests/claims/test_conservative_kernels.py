@@ -206,7 +206,7 @@ def eccentric_anomaly(e: str, t: float) -> mpf:
         return mp.findroot(lambda E: E - number(e) * mp.sin(E) - mean, mean)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @ECCENTRICITIES
 def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
     """V**2 is k*(2/r - 1/a) all round, and N is zero to rounding."""

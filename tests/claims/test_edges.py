@@ -172,7 +172,7 @@ def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
             assert motion.half_period
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("loss", [None, gqm.QuadraticDrag(b="1/100")], ids=["free", "drag"])
 def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
     """Motions to it are refused with a remedy (there was a ZeroDivisionError, or times were wrong by 1e-9); what

@@ -51,6 +51,7 @@ def weaker(length: Any, radius: Any) -> Any:
     return G * mp.sin(half) / half
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("radius", "length", "place"),
     [(1, 1, 1.2), (5, 9.5, 1.5), (2, 6, 5.0), (1, 0.1, 0.01), (3, 12, 4.0), (1, 1e-6, 1.2), (1, 2.0**-40, 2.0)],
@@ -148,6 +149,7 @@ def test_forces_on_cars(circle: ModuleType) -> None:
     assert one.t == 0.3
 
 
+@pytest.mark.extended
 def test_parabola(build: Build) -> None:
     """On an open track the half period is that of the mean height, whose integral has a closed form there."""
     length, reach = mpf(3) / 2, 2

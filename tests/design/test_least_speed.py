@@ -77,6 +77,7 @@ def sizes(derivatives: dict[str, float], wanted: dict[str, float]) -> bool:
     return derivatives == pytest.approx(wanted, rel=1e-14, abs=1e-15)
 
 
+@pytest.mark.extended
 def test_derivatives_of_loops() -> None:
     """The derivatives are those of the closed forms above."""
     circle, speed = generated.circle, sqrt(5 * 9.81 * 1.5)

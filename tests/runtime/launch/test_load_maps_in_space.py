@@ -180,6 +180,7 @@ def banked(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="banked_points", folder=folder)
 
 
+@pytest.mark.extended
 def test_nothing_is_known_beyond_the_ends(banked: ModuleType) -> None:
     """Beyond the ends of a track through points all numbers are NaN, those of riders too."""
     path = banked.pass1(np.array([-1.0, 5.0, 1e3]), 5.0, 1.0)

@@ -197,6 +197,7 @@ def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
     assert np.isnan(out[:3, 0]).all()
 
 
+@pytest.mark.extended
 def test_released_beside_the_top(module_of: ModuleOf) -> None:
     """A body released beside the top swings nearly all the way round and back, and does not go round."""
     beside = 10.0 ** -np.arange(1.0, 13.0)
