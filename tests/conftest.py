@@ -60,9 +60,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out what is for the extended run only, unless tests are chosen by name or mark."""
     chosen = config.getoption("keyword") or config.getoption("markexpr") or any("::" in name for name in config.args)
     if not config.getoption("extended") and not chosen:
-        kept = usual(items)
-        config.hook.pytest_deselected(items=[item for item in items if item not in set(kept)])
-        items[:] = kept
+        items[:], found = usual(items), list(items)
+        kept = set(items)
+        config.hook.pytest_deselected(items=[item for item in found if item not in kept])
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ def _beside_the_benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mp, "dps", 40)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", TABLES)
 def test_our_rows_are_within_their_limits(name: str) -> None:
     """Each row of ours is run once and compared with its reference of 40 digits."""

@@ -116,7 +116,7 @@ def test_parentheses_of_older_printers_are_drawn() -> None:
     assert _with_written_parentheses(old) == new
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])
 def test_other_motions(launch: list[str], here: Path) -> None:
     """Rest, circulation and a horizon have pages; the options of the launch are those of gqm solve."""

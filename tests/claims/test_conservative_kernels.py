@@ -135,6 +135,7 @@ def test_the_cases_are_all_here() -> None:
     assert len(CASES) == 5
 
 
+@pytest.mark.sample(3)
 @EVERY_CASE
 def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNamed) -> None:
     """The kind, the turning points, the half period and the time of the first turn agree with the tables."""
@@ -150,6 +151,7 @@ def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNam
     assert error(motion.legs[0].t_end, first) <= TIME * float(first)
 
 
+@pytest.mark.sample(3)
 @EVERY_CASE
 def test_positions(case: PaperCase, module_named: ModuleNamed) -> None:
     """lam, x, z and v agree with the tables, early and after thousands of periods."""
@@ -167,6 +169,7 @@ def test_positions(case: PaperCase, module_named: ModuleNamed) -> None:
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
 
 
+@pytest.mark.sample(3)
 @EVERY_CASE
 def test_speed_field(case: PaperCase, module_named: ModuleNamed) -> None:
     """V**2, N and kappa agree with the tables at the sampled places, relative to the largest value."""
@@ -203,7 +206,7 @@ def eccentric_anomaly(e: str, t: float) -> mpf:
         return mp.findroot(lambda E: E - number(e) * mp.sin(E) - mean, mean)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @ECCENTRICITIES
 def test_a_planet_needs_no_track(e: str, module_named: ModuleNamed) -> None:
     """V**2 is k*(2/r - 1/a) all round, and N is zero to rounding."""
@@ -231,7 +234,7 @@ def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None
         assert error(motion.lam(t), truth) <= KEPLER_POSITION * float(max(truth, 2 * mp.pi))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @ECCENTRICITIES
 def test_the_centre_may_be_anywhere(e: str, module_named: ModuleNamed) -> None:
     """If the centre is an expression in a parameter, the period is the same and the track is still not needed."""
@@ -273,7 +276,7 @@ def test_a_harmonic_well_at_its_bottom_is_rest(module_named: ModuleNamed) -> Non
 SUM_LAUNCH = {"lam0": "-0.3", "v0": "1.1", "a": "2", "b": "1", "Omega": "0.8", "k": "5", "g": "9.81"}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("summed", "written", "more"),
     [
@@ -338,6 +341,7 @@ def test_off_speed_the_track_carries_what_is_missing(factor: str, module_named: 
             assert error(actual, truth) <= KEPLER_FIELD * float(mpf("1.5") * kappa * speed**2)
 
 
+@pytest.mark.extended
 def test_through_the_centre_nothing_is_nan(generated_folder: Path) -> None:
     """On a line through the centre of attraction the fall ends at the centre, and a launch from there is refused."""
     model = gqm.derive(gqm.Curve.graph("x/2"), gqm.CentralForce())

@@ -75,6 +75,7 @@ def reference(build: Build, name: str) -> tuple[Any, dict[str, Any]]:
     return motion, expected
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", GRADIENTS)
 def test_derivatives_of_reference_cases(name: str, build: Build) -> None:
     """Turning points and places of rest have the derivatives of differences of 30 digits, leg after leg."""
@@ -435,7 +436,7 @@ LOSSES = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("name", CUSPED)
 def test_cusps_at_places_that_are_not_zero(name: str, loss: str, build: Build) -> None:

@@ -66,7 +66,7 @@ def test_from_end_to_end_of_planes(lam0: Any, built: Build) -> None:
     assert motion.half_period == pytest.approx(2 * math.sqrt(4 / 9.81), rel=1e-15)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
 )
@@ -127,6 +127,7 @@ def test_the_time_at_a_turning_point_given_exactly(built: Build) -> None:
     assert thrown.time_at("50/981") == pytest.approx(100 / 981, rel=1e-15)
 
 
+@pytest.mark.extended
 def test_a_body_that_slips_at_launch_begins_to_slip_once(built: Build) -> None:
     """The event at launch occurs once; later ones follow after every half period."""
     circle = gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi")
@@ -171,7 +172,7 @@ def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
             assert motion.half_period
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("loss", [None, gqm.QuadraticDrag(b="1/100")], ids=["free", "drag"])
 def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
     """Motions to it are refused with a remedy (there was a ZeroDivisionError, or times were wrong by 1e-9); what
@@ -237,6 +238,7 @@ def test_a_climb_beside_a_pole(built: Build) -> None:
     assert turn.lam == pytest.approx(1 / (1 / 0.3 + 18 / 9.81), rel=4e-16)
 
 
+@pytest.mark.extended
 def test_speeds_at_a_pole_are_infinite(built: Build) -> None:
     """The largest speed and contact force were those at the last double before the pole."""
     bowl = gqm.Curve.graph("x**2")
@@ -330,6 +332,7 @@ def test_a_force_without_a_bound_that_is_no_pole(built: Build) -> None:
     assert near.turning_points == pytest.approx((0.7, -0.7), rel=1e-15)
 
 
+@pytest.mark.extended
 def test_a_ball_that_will_not_fit_is_told_at_once(built: Build) -> None:
     """In waves that become ever narrower, a ball that fits at its launch but not at places that it reaches is refused
     at once.

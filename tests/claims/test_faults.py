@@ -386,8 +386,8 @@ RING = "name: ring\ncurve: {implicit: {F: x**2 + z**2 - 1, start: [0, -1]}}\nker
 # A row has the function that is interrupted, and the command.
 STAGES = {
     "a chart": ("gqm_sym.runtime.launch.formulas.Formulas.charted", ["solve", "ring.yaml"]),
-    "a figure": ("os.fsync", ["plot", "ring.yaml", "ring.svg"]),
     "a page": ("os.fsync", ["report", "ring.yaml"]),
+    "a figure": ("os.fsync", ["plot", "ring.yaml", "ring.svg"]),
 }
 INTERRUPTED_AT = """
 import os, pkgutil, signal, sys
@@ -405,6 +405,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("stage", STAGES)
 def test_interrupted_at_work(stage: str, tmp_path: Path, forked: Forked) -> None:
     """The same holds while a chart is made, and while a figure or a page is written; temporary files are gone."""

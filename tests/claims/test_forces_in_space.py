@@ -107,7 +107,7 @@ def upright_on(track: Callable[[float], Any], u: float, roll: float) -> Vector:
     return np.cross(tangent, left) * np.cos(roll) + left * np.sin(roll)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("mu", [0.0, 0.05])
 def test_a_track_that_pushes_upwards_only(mu: float, built: Build) -> None:
     """Contact is lost at the place that DOP853 finds, where the contact force has no component along the upward

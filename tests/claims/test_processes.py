@@ -164,6 +164,7 @@ def test_the_wheel_holds_the_package_and_its_templates(unpacked_wheel: Path) -> 
     assert {name.partition("-")[0] for name in top} == {"gqm_sym"}
 
 
+@pytest.mark.extended
 def test_the_wheel_generates_outside_the_repository(unpacked_wheel: Path, tmp_path: Path) -> None:
     """Installed from the wheel, the command writes the same module as in the repository."""
     code = "import gqm_sym\nprint(gqm_sym.__file__)\n" + GENERATE

@@ -70,7 +70,7 @@ def newton(roll: str, u: Any, w: Any, way: int, mu: Any, b: Any) -> tuple[list[A
     return [dot(felt, axis) / g0 for axis in (upright, cross(upright, tangent), tangent)], along, upright
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("roll", ROLLS)
 @pytest.mark.parametrize("lossy", [False, True])
 def test_closed_forms_against_newton(roll: str, lossy: bool) -> None:
@@ -156,6 +156,17 @@ def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
     weight = np.sqrt(state.n_vertical**2 + state.n_lateral**2 + state.n_longitudinal**2)
     assert weight == pytest.approx(9.81 / G0, rel=1e-14)
     assert (state.onset_vertical, state.onset_lateral, state.onset_longitudinal) == (0.0, 0.0, 0.0)
+
+
+def test_a_rider_who_starts_or_turns(rough: ModuleType) -> None:
+    """At a launch from rest and at a turn, the loads are the limits of those of the motion afterwards."""
+    motion = rough.solve(-1, t_max=12)
+    assert [leg.end for leg in motion.legs[:2]] == ["turn", "turn"]
+    for leg in motion.legs[:2]:
+        state = motion.state(leg.t_start)
+        true = newton("angle", mpf(leg.lam_start), mpf(0), leg.direction, mpf("0.02"), mpf("0.005"))[0]
+        found = [state.n_vertical, state.n_lateral, state.n_longitudinal]
+        assert found == pytest.approx([float(load) for load in true], rel=1e-14, abs=1e-14)
 
 
 def test_a_vertical_loop(loop: ModuleType) -> None:

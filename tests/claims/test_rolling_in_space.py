@@ -18,6 +18,7 @@ STANDARD_GRAVITY = 9.80665
 VIVIANI = {"x": "1 + cos(u)", "y": "sin(u)", "z": "2*sin(u/2)", "parameter": "u"}
 
 
+@pytest.mark.extended
 def test_on_a_helix_the_centre_moves_along_a_helix(built: Build) -> None:
     """The centre falls with a constant acceleration along a helix of the same pitch and another radius."""
     radius, pitch, roll, rho = mp.mpf(2), mp.mpf("-0.5"), mp.pi / 6, mp.mpf("0.1")

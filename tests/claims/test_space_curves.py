@@ -35,7 +35,7 @@ def derived(row: dict[str, Any]) -> gqm.Model:
     return gqm.derive(gqm.Curve.space(x=x, y=y, z=z, parameter="u"), force)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", ROWS)
 def test_closed_forms_of_the_twelve(name: str) -> None:
     """Closed forms of the twelve give V**2 and the contact force, along each axis and in length, to 30 digits."""
@@ -54,6 +54,7 @@ def test_closed_forms_of_the_twelve(name: str) -> None:
             assert abs(abs(force) - size) < 1e-30 * size
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", [*BUILT, "viviani"])
 def test_motions_of_some_of_the_twelve(name: str, built: Build) -> None:
     """Periods are right to half an ulp, turning points to one, and contact forces to some roundings of their terms."""
@@ -105,6 +106,7 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
     assert (data.y.item(), data.normal_y.item(), data.y.units) == (one.y, one.normal_y, "m")
 
 
+@pytest.mark.extended
 def test_states_of_laps_and_of_legs_in_space(built: Build) -> None:
     """After a thousand laps the body is still on the curve; along legs, states at one time are those at many."""
     model = derived(ROWS["saddle_lap"])
@@ -156,7 +158,7 @@ def test_a_helix_with_friction() -> None:
     assert [leg.end for leg in motion.legs] == ["horizon"]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("mu", ["0.2", "0"])
 def test_sweeps_of_a_helix_in_pieces(mu: str, built: Build) -> None:
     """Along a rail of many pieces of a helix, with friction or with drag alone, sweeps agree with the closed forms."""
@@ -189,7 +191,7 @@ def test_sweeps_of_a_helix_in_pieces(mu: str, built: Build) -> None:
             assert found["normal_force_min"] == pytest.approx(9.81 * cosine, rel=4e-15)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("force", [gqm.CoulombFriction(), gqm.QuadraticDrag(b="1/20")])
 def test_a_length_that_almost_vanishes_is_not_negative(force: gqm.Kernel, built: Build) -> None:
     """On a vertical part of a rail N is zero, and its square has few digits beside that; further on a body begins with
@@ -277,6 +279,7 @@ def generated_curve() -> gqm.Curve:
 PLANAR = (("u", "u**2/2"), ("2*sin(u)", "-cos(u)"), ("u - sin(u)", "cos(u) - 1"))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(("h", "z"), PLANAR)
 @pytest.mark.parametrize(("cosine", "sine"), [("1", "0"), ("0", "1"), ("3/5", "4/5")])
 def test_a_vertical_plane_is_the_planar_case(h: str, z: str, cosine: str, sine: str) -> None:

@@ -51,6 +51,7 @@ def weaker(length: Any, radius: Any) -> Any:
     return G * mp.sin(half) / half
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("radius", "length", "place"),
     [(1, 1, 1.2), (5, 9.5, 1.5), (2, 6, 5.0), (1, 0.1, 0.01), (3, 12, 4.0), (1, 1e-6, 1.2), (1, 2.0**-40, 2.0)],
@@ -148,6 +149,7 @@ def test_forces_on_cars(circle: ModuleType) -> None:
     assert one.t == 0.3
 
 
+@pytest.mark.extended
 def test_parabola(build: Build) -> None:
     """On an open track the half period is that of the mean height, whose integral has a closed form there."""
     length, reach = mpf(3) / 2, 2
@@ -341,6 +343,7 @@ def test_what_riders_feel_in_each_car(build: Build) -> None:
     assert not hasattr(build("train_on_circle", gqm.families.circle()).solve(1, length=1, L=1).cars(0), "n_vertical")
 
 
+@pytest.mark.extended
 def test_how_fast_loads_on_riders_change_under_friction(build: Build) -> None:
     """The onset of each load is the derivative of the load, which under friction depends on the loads of all cars."""
     track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))
@@ -368,7 +371,7 @@ def test_friction_on_a_helix(build: Build) -> None:
     assert np.abs(cars.coupling_force).max() < 1e-12
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("in_space", [True, False])
 def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     """Friction acts on each car by its own contact force, as in Newton's law for all cars by DOP853; couplings add
@@ -434,6 +437,13 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     # A coupling balances what the cars behind it lack, which is the potential's force over their part of the track.
     lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
+    # At a launch from rest, friction is that of the motion that begins.
+    launch = 10.0
+    start, force = module.solve(launch, length=length, mu=mu, t_max=1), pressed(launch, 0.0)
+    way, edges = start.legs[0].direction, energy(launch + length * (np.arange(5) / 4 - 0.5))
+    acceleration = -(edges[-1] - edges[0]) / length - way * mu * force.mean()
+    lacking = np.cumsum(acceleration / 4 + np.diff(edges) / length + way * mu * force / 4)
+    assert start.cars(0).coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
 
 
 def test_cars_pass_jumps_of_curvature(build: Build) -> None:

@@ -27,6 +27,7 @@ def derived(text, domain=None, force=GRAVITY):
     return gqm.derive(gqm.Curve.graph(text, domain=domain), force)
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize(
     ("text", "what"),
     [
@@ -41,12 +42,14 @@ def test_what_is_not_smooth_is_refused(text, what):
         derived(text)
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("text", [*SMOOTH, *CUSPS])
 def test_what_is_smooth_or_a_cusp_passes(text):
     """Absolute values alone are no corner, and a motion that reaches a cusp ends there, as before."""
     derived(text)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("axis", ["x", "z"])
 def test_a_cusp_inside_is_refused_with_a_radius(axis):
     """The centre would jump from one side of the cusp to the other; a motion went through it as if nothing were."""
@@ -70,6 +73,7 @@ def test_a_corner_is_described_by_its_angle(text, degrees):
         derived(text)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("text", ["abs(x)", "(x**2)**(2/3)", "x**2 + x*abs(x)/2"])
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_domain_may_end_there(text, side, tmp_path):

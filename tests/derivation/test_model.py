@@ -61,6 +61,7 @@ def defaults(model: Model) -> dict[sp.Symbol, sp.Expr]:
     return {real(name): read(str(given)) for name, given in model.defaults if given is not None}
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("name", CORPUS)
 def test_the_corpus(name):
     """ds, κ, V² and N have all the digits that the corpus gives, on every explicit curve."""
@@ -337,6 +338,7 @@ def test_latex_is_one_aligned_block():
     assert text.count("&=") == 13
 
 
+@pytest.mark.extended
 def test_the_forms_are_the_same_under_every_hash_seed(tmp_path, capsys):
     """No order depends on a set: this process and another one, whose seeds differ, print the same."""
     script = (

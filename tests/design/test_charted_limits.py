@@ -41,7 +41,7 @@ def compare(found: Limited, place: int, values: list[Any], wanted: list[list[Any
             assert abs(got - slope) <= enough * max(scale, float(abs(slope))), (place, name)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("between", [None, (-0.5, 1.25)])
 @pytest.mark.parametrize("given", [{}, {"lam0": "-1/4"}])
 def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: Path) -> None:
@@ -126,6 +126,7 @@ def test_a_time_along_a_rail(tmp_path: Path) -> None:
     assert found[0] == pytest.approx(0.5 / np.sqrt(2 * 9.81 / 4), rel=1e-14)
 
 
+@pytest.mark.extended
 def test_a_minimum_with_limits(tmp_path: Path) -> None:
     """The lowest arc on which the load stays below a limit is found: a rail that leads a body round a bend."""
     pieces = [gqm.line(length=1), gqm.arc(radius="r", angle="1")]

@@ -77,6 +77,7 @@ def sizes(derivatives: dict[str, float], wanted: dict[str, float]) -> bool:
     return derivatives == pytest.approx(wanted, rel=1e-14, abs=1e-15)
 
 
+@pytest.mark.extended
 def test_derivatives_of_loops() -> None:
     """The derivatives are those of the closed forms above."""
     circle, speed = generated.circle, sqrt(5 * 9.81 * 1.5)
@@ -155,6 +156,7 @@ def coil(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="coil", folder=tmp_path_factory.mktemp("coil"))
 
 
+@pytest.mark.extended
 def test_corkscrew(coil: ModuleType) -> None:
     """On a helix about a level axis v0**2 from the lowest point is 4 g R + g (R**2 + c**2)/R, by the load on riders; a
     bead needs 4 g R.

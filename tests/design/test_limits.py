@@ -108,7 +108,7 @@ def test_a_launch_that_moves(tmp_path: Path) -> None:
     assert tracks.gradient("time_at", np.array([1.0])) == pytest.approx([-np.sqrt(2 / 2.25) / 2], rel=1e-12)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("force", [gqm.Gravity(), gqm.Gravity() + gqm.Rolling(beta="2/5")])
 @pytest.mark.parametrize("between", [None, (0.2, 1.1)])
 def test_derivatives_along_a_spline(force: Any, between: Any, tmp_path: Path, monkeypatch: Any) -> None:

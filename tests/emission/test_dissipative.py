@@ -188,6 +188,7 @@ def near(actual: float, truth: mpf, size: mpf) -> None:
     assert abs(mpf(float(actual)) - truth) <= allowed, (actual, mp.nstr(truth, 20))
 
 
+@pytest.mark.sample(3)
 def test_drive(case: tuple[Case, Loss, Textbook]) -> None:
     """Rows σ, n₀, κ are the curve's, and P - Q W is dW/dλ on a leg of either direction and with either sign of N."""
     row, loss, truth = case

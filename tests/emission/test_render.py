@@ -102,7 +102,7 @@ def test_the_interface_is_the_runtimes() -> None:
     assert INTERFACE == interface.INTERFACE
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("head", HEADS)
 def test_numbers_of_every_head(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values, differences and bounds are those of the declared text; exact forms to 60 digits.
@@ -157,6 +157,7 @@ def test_taken_names_as_parameters(folder: Path) -> None:
     check_numbers(gqm.build(model, name="taken", folder=folder), text, values)
 
 
+@pytest.mark.extended
 def test_the_exponential_of_the_height_of_a_rolling_body(folder: Path) -> None:
     """The size of an exponential is itself: SymPy's absolute value wrote the exponent's real part, by atan2."""
     force = gqm.Potential("4*x**2 + exp(z)") + gqm.Rolling(radius="0.05", beta="0.4")
@@ -175,7 +176,7 @@ def test_the_exponential_of_the_height_of_a_rolling_body(folder: Path) -> None:
             assert abs(v2 - truth) <= 1e-14 * abs(height(place))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
 def test_taken_names_as_the_curves_parameter(name: str) -> None:
     """The curve's parameter may have any of these names too."""
@@ -260,6 +261,7 @@ def test_the_input_digest() -> None:
     assert len(set(digests)) == len(inputs)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(
     ("form", "name"),
     [

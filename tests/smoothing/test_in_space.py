@@ -54,7 +54,7 @@ def parameter_near(places: np.ndarray) -> np.ndarray:
     return u
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("scatter", [0.001, 0.01, 0.1])
 @pytest.mark.parametrize(("stop", "known"), [(FINE[-1], True), (4.5, False)], ids=["closed-known", "open-auto"])
 def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
@@ -279,7 +279,7 @@ def _limits_at_joints(
     limits = np.array([quantity.beside(timed, phi, joints + side * clear) for side in (-1.0, 1.0)])
     jumps = np.abs(limits[1] - limits[0]) > LEAST_JUMP * np.abs(limits).max(axis=0)
     phi, places, limits = phi[jumps], joints[jumps] + timed.laps * trajectory.lap, limits[:, jumps]
-    times = [time_of(timed, trajectory, angle) for angle in phi.tolist()]
+    times = [trajectory.time_of(timed, angle) for angle in phi.tolist()]
     return phi, [
         Extreme(*one) for values in limits.tolist() for one in zip(values, times, places.tolist(), strict=True)
     ]
@@ -357,15 +357,4 @@ def _size(values: Array) -> float:
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:
     """Return an extreme with the time and the place of a phase angle."""
     lam = float(timed.segment.places(np.array([phi]))[0]) + timed.laps * trajectory.lap
-    return Extreme(value, time_of(timed, trajectory, phi), lam)
-
-
-def time_of(timed: TimedSegment, trajectory: Trajectory, phi: float) -> float:
-    """Return the time in s from launch of a phase angle of a timed segment."""
-    if phi == timed.phi_start:
-        return timed.t_start[0]
-    if phi == timed.phi_stop:
-        return timed.t_stop[0]
-    r = float(timed.segment.times(np.array([phi]))[0])
-    spent = minus((r, -r * trajectory.time_scale_error), timed.r_start)
-    return plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1]))[0]
+    return Extreme(value, trajectory.time_of(timed, phi), lam)

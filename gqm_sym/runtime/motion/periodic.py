@@ -229,7 +229,8 @@ class PeriodicMotion(PeriodicTimes):
     @locked
     def fourier(self, quantity: str, n: int) -> Fourier:
         """Return the Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
-        return fourier(self, quantity, n)
+        is_smooth = self.problem.functions.breaks.size == 0
+        return fourier(self, quantity, n, None if is_smooth else self._listed_trajectory.panel_times)
 
     def lam(self, t: Any) -> Any:
         """Return the curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""

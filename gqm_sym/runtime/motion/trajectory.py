@@ -122,6 +122,30 @@ class Trajectory:
         low = low + r * self.time_scale_error
         return timed.segment.phase_angle(np.ascontiguousarray(r), np.ascontiguousarray(low))
 
+    def time_of(self, timed: TimedSegment, phi: float) -> float:
+        """Return the time in s from launch of a phase angle of a timed segment."""
+        if phi == timed.phi_start:
+            return timed.t_start[0]
+        if phi == timed.phi_stop:
+            return timed.t_stop[0]
+        r = float(timed.segment.times(np.array([phi]))[0])
+        spent = minus((r, -r * self.time_scale_error), timed.r_start)
+        return plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1]))[0]
+
+    @property
+    def panel_times(self) -> Array:
+        """The times in s from launch at which panels begin and end, in increasing order.
+
+        Between two of them all that moves with the body is a smooth function of time.
+        """
+        times = []
+        for timed in self.segments:
+            low, high = sorted((timed.phi_start, timed.phi_stop))
+            edges = timed.segment.edges
+            inside = edges[(low < edges) & (edges < high)].tolist()
+            times += [self.time_of(timed, phi) for phi in (low, *inside, high)]
+        return np.unique(times)
+
 
 def libration(
     segment: Segment, direction: int, duration: Pair, phase_time: Pair, phi: float, s_a: float

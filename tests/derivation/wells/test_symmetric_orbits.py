@@ -159,6 +159,7 @@ def test_a_cycloid_has_one_period() -> None:
     assert {str(4 * square) for square in orbits.agm_arguments} == {"g"}
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("name", TURNING_POINTS)
 @pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
@@ -177,6 +178,7 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
         assert 0 <= square(offset, left) < 1
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "z", ["x**3", "exp(x)", "cos(x) + x**2", "cos(x) + cosh(x)", "cos(x) + cos(9*x)", "exp(-x**2)"]
 )
@@ -269,7 +271,7 @@ def test_parameters_with_the_names_of_variables_of_an_orbit(tmp_path: Path) -> N
 
 
 # The times of these orbits were taken for converged when one change of the rule was small by accident.
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("track", "z", "places"),
     [

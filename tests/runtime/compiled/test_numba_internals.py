@@ -171,7 +171,7 @@ def truth(compiled_answers: Callable[..., str], tmp_path_factory: pytest.TempPat
     return found
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "hidden", [*((name,) for name in ALONE), *PAIRS, LIBRARIES[:3], LIBRARIES[3:], ALL], ids=" ".join
 )

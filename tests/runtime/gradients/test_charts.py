@@ -82,7 +82,7 @@ CASES = [
 ]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("name", "launch"), CASES)
 def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
     """Durations have derivatives with respect to launch, forces and shape; at rest the one with respect to speed is

@@ -123,6 +123,7 @@ def test_periods(hoop: ModuleType, time: Callable[..., Any], quantity: str, v0: 
     assert swept.gradient[0] == pytest.approx(truth, rel=ROUNDING, abs=ROUNDING)
 
 
+@pytest.mark.extended
 def test_a_fixed_shape_needs_no_neighbours(hoop: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """The changes along the track, which are dear, are made only for what shapes the means, and once for the same
     parameters.

@@ -50,6 +50,7 @@ def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.extended
 def test_beside_a_hilltop() -> None:
     """A body that passes a hilltop slowly has coefficients too: those of the velocity, times k, are those of the arc
     length.
@@ -59,6 +60,31 @@ def test_beside_a_hilltop() -> None:
     order = 2 * np.pi / motion.period * np.arange(10)
     np.testing.assert_allclose(v.a, order * s.b, atol=2e-15, rtol=0)
     np.testing.assert_allclose(v.b, -order * s.a, atol=2e-15, rtol=0)
+
+
+def test_on_stitched_planes() -> None:
+    """On planes the velocity is linear in time between corners: its coefficients are those of its accelerations' jumps.
+
+    The half period from a height z0 consists of the times on the planes, each 2 l/(v + v') for their length l and the
+    speeds at their ends, v**2 = 2 g (z0 - z).
+    """
+    x, z = np.loadtxt(ROOT / "curves" / "track.csv", delimiter=",", skiprows=1, unpack=True)
+    corners = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
+    launch = 10.0
+    top = float(np.interp(launch, corners, z))
+    beyond = 10 + int(np.argmax(z[10:] > top))  # the eleventh corner is the lowest of this valley
+    far = float(np.interp(top, z[beyond - 1 : beyond + 1], corners[beyond - 1 : beyond + 1]))
+    places = np.concatenate([[launch], corners[(corners > launch) & (corners < far)], [far]])
+    speeds = np.sqrt(2 * 9.81 * np.maximum(top - np.interp(places, corners, z), 0.0))
+    times = np.concatenate([[0.0], np.cumsum(2 * np.diff(places) / (speeds[1:] + speeds[:-1]))])
+    rates = np.diff(speeds) / np.diff(times)
+    motion = load(str(ROOT / "generated" / "planes.py"), "planes").solve(lam0=10, g="9.81")
+    assert motion.half_period == pytest.approx(times[-1], rel=2e-15)
+    found, omega = motion.fourier("v", 5), np.pi / times[-1]
+    order = np.arange(1, 6)
+    wanted = -np.sin(omega * np.outer(order, times[1:-1])) @ np.diff(rates) * 2 / np.pi / (order**2 * omega)
+    np.testing.assert_allclose(found.b[1:], wanted, rtol=0, atol=1e-14 * np.abs(wanted).max())
+    np.testing.assert_allclose(found.a, 0.0, atol=1e-14 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_pendulums() -> None:
             assert abs(value - wanted) <= 2 * ULP * abs(wanted)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("lam0", [0.6, 1.2, -0.5])
 def test_wells_of_two_shapes(lam0: float, generated_folder: Path) -> None:
     """An attraction in a turning frame has wells about both ends of an ellipse's axis, which have different shapes.

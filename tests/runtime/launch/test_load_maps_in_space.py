@@ -118,7 +118,7 @@ def by_definition(
     return rows
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["trefoil", "torus_knot", "saddle", "bowl_spiral", "catenary_weave", "tilted_ring"])
 def test_the_vector_of_sines_of_multiples(name: str, tmp_path: Path) -> None:
     """The contact force has all digits where sines of many multiples of the parameter would add up to it."""
@@ -180,6 +180,7 @@ def banked(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="banked_points", folder=folder)
 
 
+@pytest.mark.extended
 def test_nothing_is_known_beyond_the_ends(banked: ModuleType) -> None:
     """Beyond the ends of a track through points all numbers are NaN, those of riders too."""
     path = banked.pass1(np.array([-1.0, 5.0, 1e3]), 5.0, 1.0)
@@ -187,6 +188,7 @@ def test_nothing_is_known_beyond_the_ends(banked: ModuleType) -> None:
         assert np.isnan(row).tolist() == [True, False, True]
 
 
+@pytest.mark.extended
 def test_along_a_chart_next_to_the_launch_and_to_height_zero(tmp_path: Path) -> None:
     """Along a helix without its formulas the height is linear in arc length, so that V**2 is known at every place."""
     helix = gqm.Curve.space(x="cos(u)", y="sin(u)", z="3*u/4", parameter="u", domain=(-10, 10)).in_arc_length()

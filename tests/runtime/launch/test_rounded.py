@@ -35,7 +35,7 @@ def time_to(x: float) -> float:
     return (one - two) / sqrt(1.5 * G)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("off", [0.0, 1e-15, -1e-15])
 def test_the_speed_that_just_reaches_the_top(hill: ModuleType, off: float) -> None:
     """With the speed that just reaches the top, the body comes as near as doubles can resolve, after any time."""

@@ -156,6 +156,7 @@ def test_out_of_the_domain_after_a_turn(build: Build) -> None:
     assert incline.sweep("t_end", [0.0], 3.0).values == pytest.approx([expected], rel=1e-15)
 
 
+@pytest.mark.extended
 def test_contact_that_is_lost_after_two_turns(build: Build) -> None:
     """Inside a loop between two slopes a body swings over the top until drag has made it too slow: there N vanishes.
     One that never comes near the top swings for ever.
@@ -309,6 +310,7 @@ def test_over_a_joint_and_back(build: Build) -> None:
         assert event.t == pytest.approx(float(time), rel=1e-14)
 
 
+@pytest.mark.extended
 def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
     """On a parabola of free fall N is zero at the launch, and the track then carries the body that drag has slowed
     down.

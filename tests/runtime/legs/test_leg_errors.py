@@ -269,6 +269,7 @@ def test_a_creeping_spring(t: float, build: Build) -> None:
     assert motion.t_end == math.inf
 
 
+@pytest.mark.extended
 def test_creeping_to_the_bottom_of_a_valley(build: Build) -> None:
     """Next to the bottom the body creeps by x - 3 = A exp(-r t), until it is closer than doubles can resolve
     ("lost").

@@ -79,6 +79,7 @@ def test_any_order(name: str, modules: dict[str, ModuleType], order: list[int], 
         assert questions[question]() == asked(solved(), end)[question](), question
 
 
+@pytest.mark.extended
 def test_times_that_grow(modules: dict[str, ModuleType]) -> None:
     """Each of several increasing times has the digits that it has among many, before and after the part that was
     followed.

@@ -415,7 +415,7 @@ def answers(motion: Any) -> list[Any]:
     return [motion.kind, motion.t_end, motion.turning_points, *motion.legs, *motion.events, motion.condition_number]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 @pytest.mark.parametrize(
     ("track", "launch"),

@@ -53,6 +53,7 @@ def test_from_rest_at_the_top_cusp(hanging: ModuleType, lam0: object, end: float
     assert np.abs(np.abs(state.v) - 4 * R * W * np.sin(W * t)).max() <= 1e-14
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("v0", [1e-4, 1e-2, 0.3, 1.0, 20.0])
 def test_thrown_from_a_cusp(hanging: ModuleType, v0: float) -> None:
     """A body thrown from one cusp moves through to the other."""
@@ -83,6 +84,7 @@ def test_over_the_arch(arch: ModuleType) -> None:
     assert abs(motion.t_end - truth) <= 1e-14 * truth
 
 
+@pytest.mark.extended
 def test_at_rest_in_a_cusp(arch: ModuleType, chain: ModuleType) -> None:
     """A cusp that is the lowest point holds the body; from the highest one it moves in the requested direction."""
     assert arch.solve(0).kind == "rest"

@@ -55,7 +55,7 @@ def slid(force: str, lam: float, v: float, stops: list[float]) -> float:
     return spent
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("force", ["free", "rough"])
 @pytest.mark.parametrize("is_reversed", [False, True])
 @pytest.mark.parametrize(

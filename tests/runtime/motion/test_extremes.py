@@ -92,6 +92,7 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
         assert state.lam == pytest.approx(found.lam, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.extended
 def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
     """At the rounded edge of a valley N agrees with its formula (sweeps returned a 300th of it, from a grid too
     coarse).
@@ -141,7 +142,7 @@ CUSP_FORCES = {
 }
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("force", CUSP_FORCES)
 @pytest.mark.parametrize(("lam0", "direction"), [(-1.5, 1), (1.25, -1)])
 def test_a_load_that_grows_without_bound(force: str, lam0: float, direction: int, tmp_path: Path) -> None:

@@ -134,7 +134,7 @@ def of_solved(quantity: str, motion: Any, target: float) -> float:
         return math.nan
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
 def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None:
@@ -162,6 +162,7 @@ def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None
                 assert (status == quantities.ANSWERED) == (not math.isnan(expected))
 
 
+@pytest.mark.extended
 def test_the_contact_force_of_a_damped_body_at_a_cusp(build: Build) -> None:
     """The contact force grows without bound towards a cusp; sweeps gave its value at the last node before it."""
     cycloid = gqm.Curve.parametric(x="u - sin(u)", z="1 - cos(u)", parameter="u", domain=(0, "2*pi"))

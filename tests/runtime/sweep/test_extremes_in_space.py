@@ -75,7 +75,7 @@ def test_at_a_joint_both_sides_count(build: Build) -> None:
     assert module.sweep("normal_force_max", 0.5, v0).values == pytest.approx(np.sqrt(square), rel=4e-15)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "curve", "force", "low", "high"),
     [

@@ -126,6 +126,7 @@ def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str,
             assert ulps(float(arrival), 2 / mpf(speed) * mp.ellipf(mpf(9) / 2, m)) <= MAX_PASSING_ULPS
 
 
+@pytest.mark.extended
 def test_bodies_that_pass_a_hilltop_closely_and_leave(tmp_path: Path) -> None:
     """The time until bodies leave is that of the integral, whether they turn before or not."""
     curve = gqm.Curve.graph("a*(x**4 - 2*x**2)", parameter="x", domain=(-2, "3/2"))
@@ -200,6 +201,7 @@ def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[st
     assert swept.values == pytest.approx(np.array(times), rel=TWO_ULPS, abs=0.0, nan_ok=True)
 
 
+@pytest.mark.extended
 def test_wells_with_cusps(tmp_path: Path) -> None:
     """A body that falls along an inverted arch of a cycloid ends at its cusp, after 2 arcosh(1/cos(u/2))/sqrt(g).
 

@@ -526,7 +526,7 @@ def test_small_swings_keep_contact(module_of: ModuleOf) -> None:
     assert swept.route_counts() == {"single": 9}
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("quantity", ["half_period", "period", "turning_points"])
 def test_motions_that_end_at_cusps_are_not_solved_one_by_one(quantity: str) -> None:
     """On the hump of a cycloid bodies slide down to the cusp at either end, and none of their motions repeats."""

@@ -115,12 +115,14 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
     behind = (energies[1:-1] - energies[0]) - share * (energies[-1] - energies[0])
     coupling = mass / length * behind
     if friction:
-        # The same holds for the friction on the cars behind, which is unknown for a train at rest.
+        # The same holds for the friction on the cars behind, which is unknown for a train that stays at rest. At a turn
+        # it is that of the motion afterwards.
         velocity, size = np.atleast_1d(state.v), np.abs(found[4])
+        resting = motion._resting(np.atleast_1d(state.t).ravel()).reshape(velocity.shape)
         if rate and formulas.path_in_space is None:  # the frame pushes the cars out of the plane too
             aside = 2.0 * rate * velocity * np.cos(chart.points(found[0].ravel())[2]).reshape(size.shape)
             size = vector_length(np.stack([size, mass / count * aside]))
-        rubbing = np.cumsum(friction * np.sign(velocity) * size, axis=0)
+        rubbing = np.cumsum(friction * np.where(resting, 0.0, np.copysign(1.0, velocity)) * size, axis=0)
         coupling += rubbing[:-1] - share * rubbing[-1]
     rows: list[Array] = [*found, coupling]
     kind: type[Cars] | type[CarsOfRiders] = Cars

@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.extremes import Quantity, phases, time_of, whole_trajectory
+from gqm_sym.runtime.motion.extremes import Quantity, phases, whole_trajectory
 from gqm_sym.runtime.motion.riding.loads import load_of
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
@@ -170,7 +170,7 @@ def _spans(motion: Any, quantity: Quantity, levels: Array, sign: int) -> list[tu
 
 
 def _time(timed: TimedSegment, trajectory: Trajectory, phi: float, end: float) -> float:
-    return min(time_of(timed, trajectory, phi), end)
+    return min(trajectory.time_of(timed, phi), end)
 
 
 def _parts(load: Callable[[Array], Array], edges: Array, low: float, high: float) -> _Parts:

@@ -50,11 +50,12 @@ def loads_on_rider(
 ) -> Array:
     """Return the rows of `FIELDS` at places and velocities.
 
-    Where the body is ``resting`` for good, its track carries all of its weight: the loads do not change, and the force
-    that holds the body is a load along the track.
+    At a turn and at a launch from rest the friction is that of the motion afterwards. Where the body is ``resting`` for
+    good, its track carries all of its weight: the loads do not change, and the force that holds the body is a load
+    along the track.
     """
     formulas, p = problem.formulas, problem.functions.p
-    rows = rider_loads(formulas, p, lam, v2, np.sign(v), force)
+    rows = rider_loads(formulas, p, lam, v2, np.copysign(1.0, v), force)
     if resting.any():
         potential, slope = Potential(formulas, problem.p).rows(lam[resting])[:2]
         inertia = 1.0 if formulas.inertia is None else float(formulas.inertia(FLOATS, problem.p.values.tolist()))

@@ -87,6 +87,7 @@ def test_helix(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.kappa, radius / square, rtol=1e-14)
 
 
+@pytest.mark.extended
 def test_loads_on_riders(tmp_path: Path) -> None:
     """On a helix by its rates the frame stays level; loads and their rates are those on the helix by its formulas."""
     rates = {"yaw": "R/(R**2 + c**2)", "roll": "-c/(R**2 + c**2)"}

@@ -1,7 +1,7 @@
 """Gradients in double precision agree with closed forms and with differences in mpmath, whatever their neighbours."""
 
+import gc
 from collections import Counter
-from gc import collect
 from types import ModuleType
 from typing import Any
 from weakref import ref
@@ -125,7 +125,7 @@ def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_array_equal(*found)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("quantity", ["turning_points", "v_min", "v_max", "normal_force_min", "normal_force_max"])
 def test_turning_points_and_extremes_in_any_company(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Derivatives of turning points and extremes have the same bits alone, anywhere among others, and by machine
@@ -161,10 +161,12 @@ def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> 
 def test_machine_code_that_is_not_used_any_more() -> None:
     """Machine code is removed from memory with its program, and is made again when it is needed."""
     source = source_of(generated("circle").MODEL)
+    gc.freeze()  # objects of other tests, which would take seconds
     program = coded(turning_point_program(source))
     code = ref(program.codes[0])
     del program
-    collect()
+    gc.collect()
+    gc.unfreeze()
     assert code() is None
     assert coded(turning_point_program(source)).codes[0].address
 

@@ -76,7 +76,7 @@ def test_a_constant_of_the_potential(tmp_path: Path) -> None:
     assert (found.gradient[:, 0] != 0.0).all()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("is_thrown", [False, True])
 @pytest.mark.parametrize("name", ["ellipse", "parabola", "catenary", "double_well", "circle_spring", "rolling_circle"])
 def test_random_launches(name: str, *, is_thrown: bool) -> None:

@@ -48,6 +48,7 @@ def test_short_last_legs_past_a_break(tmp_path: Path, lam0: float, v0: float, tr
     np.testing.assert_allclose(end, true, rtol=3e-14)
 
 
+@pytest.mark.extended
 def test_a_short_last_leg_past_a_joint(tmp_path: Path) -> None:
     """Half a unit in the last place of the slopes of the chart changes the time by 2.4e-14 of itself."""
     given = {"lam0": 0.8410518694745593, "v0": 0.877659026302221, "c": 0.05, "t_max": 200.0}

@@ -167,7 +167,7 @@ class SpaceDroplet(Droplet):
         return mp.sqrt(parts[0] ** 2 + parts[1] ** 2 + (parts[2] + self.g) ** 2)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("start", "b"), [(1.125, 0.0625), (-1.0, 0.000625)])
 def test_droplet_past_branch_points(start: float, b: float, generated_folder: Path) -> None:
     """Extremes and times on a space curve that is almost straight at one place agree, as long as a droplet swings."""

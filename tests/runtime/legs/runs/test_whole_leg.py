@@ -245,7 +245,7 @@ LAWS: dict[str, tuple[Any, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("height", "slope", "start", "force"),
     [

@@ -47,7 +47,7 @@ LAUNCHES = [
 ]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("arc", "radius", "v0", "times"), LAUNCHES)
 def test_states_on_a_circle(arc: float, radius: float, v0: float, times: tuple[float, ...], ring: ModuleType) -> None:
     """Sensitivities, ends and turning points are those of the circle as a formula, also over laps."""

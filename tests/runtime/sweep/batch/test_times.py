@@ -152,6 +152,7 @@ def half_period_on_hyperbolic_cosine(start: float) -> Any:
     return mp.pi * total / nodes
 
 
+@pytest.mark.extended
 def test_wide_swings_in_steep_wells(tmp_path: Path) -> None:
     """Terms that all nodes of an orbit have in common follow from one hyperbolic sine, of an argument without rounding.
 
@@ -180,6 +181,7 @@ def half_period_on_lissajous(start: float) -> Any:
     return mp.pi * total / nodes
 
 
+@pytest.mark.extended
 def test_waves_far_from_zero(tmp_path: Path) -> None:
     """The width of an orbit is rounded as the distance of its ends, and not as that of multiples of them, which are up
     to 18 here; with that rounding, which all nodes have in common, half of these times were off by over 2 ulp.

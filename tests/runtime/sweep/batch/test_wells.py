@@ -54,6 +54,7 @@ def test_a_launch_alone_has_the_same_bits() -> None:
         assert singly.values == pytest.approx(together.values, rel=5e-16, abs=0.0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("count", [1, 8, 131])
 def test_bodies_that_all_rest_have_the_same_bits(count: int) -> None:
     """Where all bodies are released at rest, in their well or beyond the ends of the curve, no zero is searched; one
@@ -101,7 +102,7 @@ def test_bits_do_not_depend_on_the_well_of_the_first_orbit(tmp_path: Path) -> No
 
 
 # With the size 11/400 nothing but a very flat bottom is left of the dents, and with 23/800 a very low hilltop at 0.
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("size", "tilt"), [("1/6", 0), ("1/6", "1/3"), ("11/400", 0), ("23/800", 0)])
 def test_orbits_stay_in_their_dents(size: str, tilt: int | str, tmp_path: Path) -> None:
     """In a bowl with dents, bodies released at rest turn at the next place of the same height, found by a search on a

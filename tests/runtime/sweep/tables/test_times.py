@@ -262,7 +262,7 @@ def test_parameters_of_every_launch(bend: ModuleType) -> None:
     assert np.flatnonzero(swept.status).tolist() == [5]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("kind", ["rail", "implicit", "sampled"])
 def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None:
     """Launches with their own g, Omega and m are answered as by `solve`, from one table, alone or with others."""
@@ -389,6 +389,7 @@ def test_small_swings_beside_an_edge_of_a_piece(tmp_path: Path) -> None:
             assert abs(mpf(float(ends[k])) - (bottom - amplitude)) <= 2.0**-52
 
 
+@pytest.mark.extended
 def test_the_largest_speed_of_small_swings(tmp_path: Path) -> None:
     """On the loop of a strophoid, r = -a*cos(2*t)/cos(t) in polar coordinates about its node, the largest speed is
     right.
