@@ -189,6 +189,25 @@ def solve_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def is_law_constant(march, panel, work):  # type: ignore[no-untyped-def]
+    """Return whether the changes of a sampled law on a panel alter V**2 by no more than rounding; if so, fill the rows
+    P, Q and Q_RATE with its mean.
+
+    Friction of the cars of a train has a kink wherever N vanishes on one of them.
+    """
+    low, high = inf, -inf
+    for j in range(COUNT):
+        here = work[P + j] - work[Q + j] * work[W + j]
+        low, high = min(low, here), max(high, here)
+    if not (high - low) * work[D + COUNT] <= CONSTANT * panel.v2:
+        return False
+    copy_row(work, P, 0.5 * (low + high))
+    copy_row(work, Q, 0.0)
+    copy_row(work, Q_RATE, 0.0)
+    return True
+
+
+@Inner
 def is_settled(change, last_change, size, is_contact_known):  # type: ignore[no-untyped-def]
     """Return whether V**2 has converged; ``last_change`` is that of the iteration before, or 0 in the first.
 
@@ -207,12 +226,13 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
     """
     # The first approximation is linear, with the slope of V**2 at the panel's start.
     linear_row(work, W, D, panel.v2, slope_at_start(forces, march, panel, work))
-    last_change = 0.0
+    last_change, is_constant = 0.0, False
     for _ in range(MAX_ITERATIONS):
         if forces.squared_contact != 0:
             rub(march, panel, work)
         else:
             sample(forces, march, panel, work)
+            is_constant = forces.friction and is_law_constant(march, panel, work)
         total = integrate(march, panel, SPEED, work)
         if not total < inf:
             return inf
@@ -221,7 +241,7 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
         copy_row(work, W, SPEED)
         if not change < inf:
             return inf
-        if is_settled(change, last_change, size, forces.squared_contact != 0):
+        if is_constant or is_settled(change, last_change, size, forces.squared_contact != 0):
             return total
         last_change = change
     return inf
