@@ -12,7 +12,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.errors import InputError
+from gqm_sym.errors import InputError, SolutionError
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -293,6 +293,18 @@ def test_the_end_of_the_domain_ends_a_motion(passage: Callable[..., Any]) -> Non
         assert motion.legs[-1].end == motion.events[-1].kind == "domain-end"
         assert motion.legs[-1].lam_end == motion.lam(motion.t_end) == stop
         assert off(motion.t_end, truth) <= TIME * motion.t_end
+
+
+def test_the_end_of_the_domain_is_a_place(generated_folder: Any) -> None:
+    """The body arrives at the end of the domain also where that is a number whose double is less than it is."""
+    plane = gqm.Curve.graph("-x", domain=(0, "pi"))
+    motion = gqm.build(gqm.derive(plane, gqm.Gravity()), name="inclined", folder=generated_folder).solve(0, g="9.81")
+    with mp.workdps(30):
+        truth = mp.sqrt(4 * mp.pi / G)
+    assert off(motion.time_at("pi"), truth) <= TIME * float(truth)
+    assert motion.time_at("pi") == motion.t_end
+    with pytest.raises(SolutionError, match="never at x = "):
+        motion.time_at("pi + 1e-9")
 
 
 @pytest.fixture(scope="module")
