@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 19, input b0d8ff0ac753, body 5306aed4fe24
+# interface 20, input b0d8ff0ac753, body 9cff980eda64
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=19)
+compiled = compiler(__file__, interface=20)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 19, input 702c9ef6b67b, body dc38d7ecff36
+# interface 20, input 702c9ef6b67b, body 526671433e6b
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=19)
+compiled = compiler(__file__, interface=20)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 19, input f60615287831, body 10795cf222b7
+# interface 20, input f60615287831, body 8c16096dd5bb
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=19)
+compiled = compiler(__file__, interface=20)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,

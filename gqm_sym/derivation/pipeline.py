@@ -43,7 +43,7 @@ from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.errors import ArgumentError, DeclarationError, DerivationError
 from gqm_sym.kernels.base import DIRECTION, KAPPA, MASS, Kernel, X, Y, Z
-from gqm_sym.parameters import Given, Value, check_measured, is_positive
+from gqm_sym.parameters import Given, Value, check_measured, is_positive, tried_values
 
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
@@ -176,7 +176,7 @@ def _closed_forms(
     dxds, dyds, dzds = shape.tangent
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
-    axes, orbits = (None, None) if loss or curve.charted else _symmetry(curve, kernel, law, shape)
+    axes, orbits = (None, None) if loss or curve.charted else _symmetry(curve, kernel, law, shape, tried_values(values))
     start = {lam: LAM0}
     model = Model(
         curve=curve,
@@ -264,11 +264,11 @@ def _refuse_of_train(kernel: Kernel) -> None:
 
 
 def _symmetry(
-    curve: Curve, kernel: Kernel, law: Forces, shape: Geometry
+    curve: Curve, kernel: Kernel, law: Forces, shape: Geometry, values: Mapping[sp.Symbol, sp.Expr]
 ) -> tuple[Symmetry | None, SymmetricOrbits | None]:
     """Return the axes of symmetry and the time of orbits about them."""
     lam, potential = curve.parameter, law.effective_potential
-    axes = symmetry(potential, law.effective_potential_slope, shape.ds, lam, curve.domain, shape.cusp)
+    axes = symmetry(potential, law.effective_potential_slope, shape.ds, lam, curve.domain, shape.cusp, values)
     orbits = symmetric_orbits(2 * potential, shape.ds, lam, axes)
     if axes and kernel.radius:  # for the path of a body's centre, the sign of σ is known only numerically
         axes = replace(axes, monotone=False)

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_HOME = {
+    "arithmetic.divided_differences.cotangents": "difference_of_sinc divdiff1_difference_of_sinc",
     "arithmetic.divided_differences.first": (
         "divdiff1_abs divdiff1_acos divdiff1_acosh divdiff1_asin divdiff1_asinh divdiff1_atan divdiff1_atanh "
         "divdiff1_cos divdiff1_cos_of_sum divdiff1_cosh divdiff1_exp divdiff1_ipow divdiff1_log divdiff1_rpow "

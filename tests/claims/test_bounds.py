@@ -76,7 +76,7 @@ def wells(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "lam0", "v0", "direction"), [*NAMED, *drawn(15)])
 def test_places_lie_within_their_bounds(
     name: str, lam0: str, v0: str, direction: int, wells: dict[str, ModuleType]

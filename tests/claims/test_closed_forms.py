@@ -216,7 +216,7 @@ def derived(row: Row) -> gqm.Model:
     return gqm.derive(row.curve(), row.force())
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("row", CLOSED.values(), ids=[name.replace(" ", "-") for name in CLOSED])
 def test_closed_form_is_the_integral(row: Row) -> None:
     """W(λ) - v0² is the integral of the textbook's dW/dλ, and W(lam0) is v0²."""
@@ -238,6 +238,7 @@ def test_closed_form_is_the_integral(row: Row) -> None:
             assert abs(form(end) - mpf("12.25") - total) < AGREED * (12 + abs(total))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("curve", "force"),
     [

@@ -243,7 +243,7 @@ def test_all_explicit_curves_are_here() -> None:
     assert {motion.expect["kind"] for motion in MOTIONS} == {"libration", "circulation", "transit"}
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("famous", **of_kind("libration"))
 def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
     """A libration goes between two turning points, which it meets in order, half a period apart."""
@@ -263,6 +263,7 @@ def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module:
     assert motion.period == 2 * motion.half_period
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("famous", **of_kind("circulation"))
 def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """A circulation passes its place again after each loop time."""
@@ -272,7 +273,7 @@ def test_circulation(famous: FamousMotion, famous_motion: MotionOf) -> None:
     assert ulps(motion.period, famous.expect["loop_time"]) <= PERIOD_ULPS
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("famous", **of_kind("libration", "circulation"))
 def test_derivatives_of_periods(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
     """Derivatives by each parameter and the launch are those of differences of 30 digits; the mass does not matter, and
@@ -297,6 +298,7 @@ def test_derivatives_of_periods(famous: FamousMotion, famous_motion: MotionOf, f
         assert abs(value - wanted[name]) <= PERIOD_ULPS * 2.0**-52 * max(abs(wanted[name]), share * means[rows[name]])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The first time at the given place is correct; beyond it the body may turn or leave."""
@@ -304,6 +306,7 @@ def test_transit(famous: FamousMotion, famous_motion: MotionOf) -> None:
     assert error(famous_motion(famous).time_at(famous.launch["to"]), expected) <= TIME * float(expected)
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_derivatives_of_transits(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The derivatives of the time at the given place are those of differences of 30 digits."""
@@ -323,7 +326,7 @@ def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> No
     assert error(swept.values.item(), expected) <= TIME * float(expected)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """ds, kappa, V**2 and N are correct at the sampled places, relative to the largest value among the samples."""
@@ -335,7 +338,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
             assert error(actual, row[name]) <= SAMPLE * largest
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """lam, x, z and v are correct at each time; a periodic motion's last time is more than 1000 periods late."""
@@ -351,7 +354,7 @@ def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
         assert error(states.v[k], row["v"]) <= POSITION * of.v
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """No position, early or late, has a larger error than ``error_bound`` says."""
@@ -360,7 +363,7 @@ def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_the_error_bound_is_useful(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The error bound is at most a hundred times the error. The worst ratio measured is 31."""
@@ -391,7 +394,7 @@ def test_a_curve_file_gives_the_same_module(
     assert spec.launch["direction"] == launch["direction"]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", SOLVED_FROM_YAML)
 def test_a_curve_file_gives_the_same_digits(name: str, tmp_path: Path) -> None:
     """The half period and a late position can be computed from the curve file alone."""

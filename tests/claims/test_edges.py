@@ -172,7 +172,7 @@ def test_a_body_that_falls_into_a_centre_of_force(built: Build) -> None:
             assert motion.half_period
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("loss", [None, gqm.QuadraticDrag(b="1/100")], ids=["free", "drag"])
 def test_a_vertical_end_of_a_graph(loss: Any, built: Build) -> None:
     """Motions to it are refused with a remedy (there was a ZeroDivisionError, or times were wrong by 1e-9); what
@@ -225,6 +225,7 @@ def test_a_fall_beside_a_vertical_line(height: str, domain: Any, lam0: float, t:
     assert motion.t_end == pytest.approx(float(time), rel=1e-13)
 
 
+@pytest.mark.extended
 def test_the_end_of_a_long_domain_is_not_vertical(built: Build) -> None:
     """On the last millionth of the domain a wave becomes steeper by a factor of 2, and is regular all the same."""
     wave = built("long_wave", gqm.Curve.graph("3*sin(x)", domain=(0, 1000000)), gqm.Gravity())

@@ -65,7 +65,7 @@ def test_gradients_of_periods(name: str, data: Any) -> None:
         assert abs(found - truth) <= 2.0 * ULP * abs(truth) + 1e-20, (by, values)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", LAUNCHES)
 @examples(2)
 @given(data=st.data())

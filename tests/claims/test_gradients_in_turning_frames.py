@@ -96,7 +96,7 @@ GIVEN = {"lam0": -2, "v0": 4, "Omega": 1.5, "g": 9.81, "m": 2}
 
 
 # With 1/10 the least force is passed so close to a turn that it is sought in time.
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("omega", [1.5, -1.5, 0.25, 0.1])
 @pytest.mark.parametrize("quantity", ["normal_force_max", "normal_force_min"])
 def test_extremes(quantity: str, omega: float, built: Build) -> None:
@@ -122,6 +122,7 @@ def test_sweeps_have_the_same(built: Build) -> None:
         assert swept.gradient[k] == pytest.approx(list(single.values()), rel=1e-13)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("way", [1, -1])
 def test_sensitivities(way: int, built: Build) -> None:
     """The change of the contact force at a given time is right to 12 digits in both directions of motion."""

@@ -158,6 +158,7 @@ def test_along_a_curve_with_formulas(way: int, built: Build) -> None:
     assert found["m"] == 0.0
 
 
+@pytest.mark.extended
 def test_extremes_on_both_ways(built: Build) -> None:
     """Where it is smallest on a way backwards, the contact force in a frame that turns changes as at a fixed place and
     as at a fixed time; at the launch it changes as there.

@@ -132,7 +132,7 @@ LOOKS = {
 ATTACKS = {**CODE, **GIANTS, **LOOKS}
 
 
-@pytest.mark.sample(48)
+@pytest.mark.sample(24)
 @pytest.mark.parametrize("key", ["z", "value", "lam0"])
 @pytest.mark.parametrize("attack", ATTACKS)
 def test_no_expression_does_harm(
@@ -232,6 +232,7 @@ TREES = {
 }
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("attack", TREES)
 def test_no_tree_does_harm(
     attack: str, yaml: Callable[[str | bytes], Path], witness: Path, capsys: pytest.CaptureFixture[str]
@@ -278,6 +279,7 @@ ESCAPES = (
 )
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("text", ESCAPES, ids=range(len(ESCAPES)))
 def test_text_for_people_stays_text(
     text: str, yaml: Callable[[str | bytes], Path], witness: Path, capsys: pytest.CaptureFixture[str]
@@ -312,7 +314,7 @@ def _body_under(title: str) -> list[str]:
     return [ast.dump(node) for node in tree.body[1:]]
 
 
-@examples(25)
+@examples(25, otherwise=2)
 @given(title=st.text(max_size=60))
 def test_any_title_is_text(title: str) -> None:
     """A module has the same syntax tree under any title."""

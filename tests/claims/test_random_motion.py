@@ -168,7 +168,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(tmp_path_factory.mktemp("random"))
 
 
-@examples(60)
+@examples(60, otherwise=5)
 @given(
     shape=st.sampled_from(sorted(SHAPES)),
     force=st.sampled_from(sorted(FORCES)),

@@ -52,6 +52,7 @@ def named(problems: list[Problem]) -> dict[str, Any]:
     return {"argvalues": problems, "ids": [problem.slug for problem in problems]}
 
 
+@pytest.mark.sample(25)
 def test_kind(problem: Problem, motion_of: MotionOf) -> None:
     """Every motion is of the kind that the exact inputs make it."""
     assert motion_of(problem).kind == problem.kind
@@ -87,7 +88,7 @@ def test_turning_points(problem: Problem, motion_of: MotionOf) -> None:
         assert ulps(lam, expected) <= TURNING_POINT_ULPS
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(9)
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_positions(problem: Problem, motion_of: MotionOf) -> None:
     """In the first ten periods lam, x, z and v are right to the rounding of their scales."""
@@ -105,6 +106,7 @@ def test_positions(problem: Problem, motion_of: MotionOf) -> None:
         assert error(state.v, row.v) <= POSITION * of.v
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_the_error_bound_is_honest(problem: Problem, motion_of: MotionOf) -> None:
     """No position, early or late, has a larger error than ``error_bound`` says."""
@@ -113,6 +115,7 @@ def test_the_error_bound_is_honest(problem: Problem, motion_of: MotionOf) -> Non
         assert error(motion.lam(row.t), row.lam) <= motion.error_bound(row.t)
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("problem", **named([p for p in where(positions=True) if p.kind != "rest"]))
 def test_the_error_bound_is_useful(problem: Problem, motion_of: MotionOf) -> None:
     """The bound is at most a hundred times the error. The worst ratio measured is 42."""
@@ -148,6 +151,7 @@ def test_quadrature_error_and_condition_number_are_told_apart(motion_of: MotionO
     assert (rest.quadrature_error, rest.condition_number) == (0.0, 1.0)
 
 
+@pytest.mark.sample(13)
 @pytest.mark.parametrize("problem", **named(where(samples=True)))
 def test_speed_field(problem: Problem, module_of: ModuleOf) -> None:
     """V**2, N, kappa and ds of ``pass1`` agree with the definitions for the given floats.

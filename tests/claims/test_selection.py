@@ -40,7 +40,7 @@ def test_what_is_left_out() -> None:
     sample, each = pytest.mark.sample(2).mark, pytest.mark.sample(each=("curve", "force")).mark
     family = [_Item("family", sample, case=case) for case in range(4)]
     crossed = [_Item("crossed", each, curve=curve, force=force) for curve in "ab" for force in "xy"]
-    other = [_Item("plain"), _Item("plain"), _Item("example1.ipynb", path="example1.ipynb")]
+    other = [_Item("plain"), _Item("plain"), _Item("quickstart.ipynb", path="quickstart.ipynb")]
     slow = [_Item("slow", pytest.mark.extended.mark), _Item("", path=f"{EXTENDED_NOTEBOOKS[0]}.ipynb")]
     kept = usual([*family, *slow, *crossed, *other])
     assert kept == [family[0], family[3], *(crossed[case] for case in (0, 1, 2)), *other]

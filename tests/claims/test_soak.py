@@ -170,6 +170,7 @@ def test_small_swings_where_large_forces_cancel(name: str, families: dict[str, M
     assert soak_bounds.faults(families[name], soak_bounds.FAMILIES[name], call) == ([], len(soak_bounds.SHARES))
 
 
+@pytest.mark.extended
 def test_the_rounding_of_an_end_near_a_hilltop_is_charged(families: dict[str, ModuleType]) -> None:
     """Bounds include the rounding of an end near a hilltop (the half period was off by 60 roundings, places by 4.2
     bounds).
@@ -218,7 +219,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     return soak_kinds.build(tmp_path_factory.mktemp("kinds"))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("near", [1e-1, 2.5e-3, 1e-6, 1e-10, -1e-10, -2.5e-3])
 @pytest.mark.parametrize("v0", [0.68, 1e-5, 60.0])
 def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dict[str, ModuleType]) -> None:

@@ -106,6 +106,7 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
     assert (data.y.item(), data.normal_y.item(), data.y.units) == (one.y, one.normal_y, "m")
 
 
+@pytest.mark.extended
 def test_states_of_laps_and_of_legs_in_space(built: Build) -> None:
     """After a thousand laps the body is still on the curve; along legs, states at one time are those at many."""
     model = derived(ROWS["saddle_lap"])

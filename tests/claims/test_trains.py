@@ -51,6 +51,7 @@ def weaker(length: Any, radius: Any) -> Any:
     return G * mp.sin(half) / half
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("radius", "length", "place"),
     [(1, 1, 1.2), (5, 9.5, 1.5), (2, 6, 5.0), (1, 0.1, 0.01), (3, 12, 4.0), (1, 1e-6, 1.2), (1, 2.0**-40, 2.0)],
@@ -148,6 +149,7 @@ def test_forces_on_cars(circle: ModuleType) -> None:
     assert one.t == 0.3
 
 
+@pytest.mark.extended
 def test_parabola(build: Build) -> None:
     """On an open track the half period is that of the mean height, whose integral has a closed form there."""
     length, reach = mpf(3) / 2, 2
@@ -312,6 +314,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
         planes.solve(1, length="1/2")
 
 
+@pytest.mark.extended
 def test_what_riders_feel_in_each_car(build: Build) -> None:
     """The loads are the acceleration of the places of the cars less gravity, along the rider's directions there."""
     track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))

@@ -51,6 +51,7 @@ def test_spring_on_a_circle(hoop: ModuleType, radius: float, length: float, plac
     assert sorted(motion.turning_points) == pytest.approx([-abs(place), abs(place)], rel=ROUNDING)
 
 
+@pytest.mark.extended
 def test_where_a_train_rests_on_a_rotating_hoop(hoop: ModuleType) -> None:
     """A bead rests where cos(angle) = g/(R*Omega**2); both sides of this have their own mean over a train."""
     radius, length, rate = 2.0, 1.5, 4.0

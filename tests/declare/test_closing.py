@@ -133,7 +133,7 @@ def test_rounds_of_a_ring_are_a_circulation(tmp_path):
     assert silent.solve(0, 2).kind == "libration"
 
 
-@examples(25)
+@examples(25, otherwise=2)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 5, max_denominator=6), min_size=2, max_size=3))
 def test_random_waves_are_derived_as_they_are(rates):
     """The line element of random waves agrees with mpmath (the common measure of 1, 3 and 7/6 is 1/6, and was taken for

@@ -118,7 +118,7 @@ def test_all_implicit_curves_are_here() -> None:
     assert len(MOTIONS) == 8
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @EVERY_MOTION
 @BOTH_LAUNCHES
 def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
@@ -148,7 +148,7 @@ def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
         assert error(states.v[k], row["v"]) <= POSITION * fastest
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @EVERY_MOTION
 def test_the_error_bound(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """The bound holds at every time, early and late, and is at most a hundred times the error. The worst ratio measured

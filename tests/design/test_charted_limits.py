@@ -41,7 +41,7 @@ def compare(found: Limited, place: int, values: list[Any], wanted: list[list[Any
             assert abs(got - slope) <= enough * max(scale, float(abs(slope))), (place, name)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("between", [None, (-0.5, 1.25)])
 @pytest.mark.parametrize("given", [{}, {"lam0": "-1/4"}])
 def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: Path) -> None:

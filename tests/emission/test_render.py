@@ -102,7 +102,7 @@ def test_the_interface_is_the_runtimes() -> None:
     assert INTERFACE == interface.INTERFACE
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("head", HEADS)
 def test_numbers_of_every_head(head: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Values, differences and bounds are those of the declared text; exact forms to 60 digits.
@@ -147,6 +147,7 @@ def test_exact_domain(folder: Path) -> None:
         assert max(abs(low + mpf(1) / 3), abs(high - mp.e), abs(period - 2 * mp.pi)) <= EXACT
 
 
+@pytest.mark.extended
 def test_taken_names_as_parameters(folder: Path) -> None:
     """Run-time parameters may have all names of emitted code at once, and keep their meaning."""
     terms = (f"{name}*{f}" for name, f in zip(TAKEN, ("sin(u)", "exp(u)", "u**3", "cosh(u/2)") * 5, strict=False))
@@ -157,6 +158,7 @@ def test_taken_names_as_parameters(folder: Path) -> None:
     check_numbers(gqm.build(model, name="taken", folder=folder), text, values)
 
 
+@pytest.mark.extended
 def test_the_exponential_of_the_height_of_a_rolling_body(folder: Path) -> None:
     """The size of an exponential is itself: SymPy's absolute value wrote the exponent's real part, by atan2."""
     force = gqm.Potential("4*x**2 + exp(z)") + gqm.Rolling(radius="0.05", beta="0.4")
@@ -260,6 +262,7 @@ def test_the_input_digest() -> None:
     assert len(set(digests)) == len(inputs)
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize(
     ("form", "name"),
     [

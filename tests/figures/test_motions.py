@@ -64,7 +64,7 @@ def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
     assert mark.get_xydata().tolist() == [[event.x, event.z]]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("kind", "launch", "arc"),
     [

@@ -233,6 +233,7 @@ def test_a_straight_line_stays_straight() -> None:
     assert report.degrees_of_freedom < 8.0
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", TRACKS)
 def test_exact_points_stay(name: str) -> None:
     """With very little scatter the track is the one through the points."""
@@ -249,6 +250,7 @@ def test_exact_points_stay(name: str) -> None:
     assert curve.smoothing.largest_shift < 1e-9
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_closed_track_closes(seed: int) -> None:
     """Place, angle, curvature and its first two derivatives are the same on both sides of the first point."""
@@ -265,7 +267,7 @@ def test_a_closed_track_closes(seed: int) -> None:
     assert np.ptp(bend) < 0.5 * np.abs(bend).max() + 1e-4
 
 
-@examples(15)
+@examples(15, otherwise=2)
 @given(
     angle=st.floats(-3.2, 3.2),
     scale=st.floats(1e-3, 1e3),
@@ -347,7 +349,7 @@ def test_what_is_reported() -> None:
     assert gqm.Curve.graph("x**2").smoothing is None
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", TRACKS)
 @pytest.mark.parametrize("count", [40, 160, 400])
 def test_the_warning(name: str, count: int) -> None:
@@ -412,7 +414,7 @@ def written(folder: Path, smoothing: str) -> Path:
     return folder / "track.yaml"
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("text", "smoothing"),
     [("0.02", 0.02), ("auto", "auto"), ("1/50", 0.02), ("{value: 20, unit: mm}", 0.02), ("{value: auto}", "auto")],

@@ -176,6 +176,7 @@ def test_si_needs_no_library() -> None:
     assert subprocess.run([sys.executable, "-c", code, str(pendulum)], timeout=60, check=False).returncode == 0
 
 
+@pytest.mark.extended
 def test_loading_the_library_is_not_reading(tmp_path: Path) -> None:
     """Importing the library at the first unit by name does not count as reading, because it may exceed a file's
     budget.

@@ -389,10 +389,10 @@ def test_the_bar() -> None:
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[Any]:
-    """Return two workers on this machine, each a process."""
+    """Return a cluster of one worker on this machine, which is a process."""
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as machines,
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as machines,
         distributed.Client(machines) as connected,
     ):
         yield connected

@@ -7,7 +7,7 @@ same code is marked ``sample``: at every change some of its cases run.
 ``sample(3)`` keeps three cases, spread evenly from the first to the last. ``sample(each=("curve", "force"))`` keeps the
 first case with each value of each of these arguments. Tables of cases therefore begin and end with what is hardest.
 Tests of Hypothesis say by `examples` how many examples they draw in the extended run, and draw a quarter of them
-otherwise.
+otherwise, or a number that they say.
 """
 
 from collections import defaultdict
@@ -28,6 +28,8 @@ EXTENDED_NOTEBOOKS = (
     "damping",
     "descent",
     "design",
+    "example1",
+    "example2",
     "families",
     "kepler",
     "kernels",
@@ -37,10 +39,13 @@ EXTENDED_NOTEBOOKS = (
 )
 
 
-def examples(count: int) -> settings:
-    """Return the settings of a test of Hypothesis that draws so many examples in the extended run."""
+def examples(count: int, otherwise: int | None = None) -> settings:
+    """Return the settings of a test of Hypothesis that draws so many examples in the extended run, and so many, or a
+    quarter, otherwise.
+    """
     share = settings().max_examples / EXTENDED_EXAMPLES
-    return settings(max_examples=max(2, round(count * share)))
+    drawn = otherwise if otherwise and share < 1 else round(count * share)
+    return settings(max_examples=max(2, drawn))
 
 
 def spread(length: int, count: int) -> set[int]:

@@ -13,6 +13,7 @@ import sympy
 from sympy import Expr, Function, Integer, Rational, S, Symbol
 
 from gqm_sym.budgets import check_budget
+from gqm_sym.derivation.algebra.cotangents import Cotangent, cotangent_of, with_cotangents
 from gqm_sym.derivation.algebra.quotients import Quotient, quotient_of
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import MEAN_HEIGHT, MEAN_PARTS, SPACE, chart_alpha, chart_x, chart_z
@@ -70,14 +71,14 @@ class Differences:
         key = (u, i, j)
         if key not in self._first:
             check_budget()
-            self._first[key] = self._build_first(u, i, j)
+            self._first[key] = self._build_first(with_cotangents(u, self.parameter), i, j)
         return self._first[key]
 
     def second(self, u: Expr) -> Expr:
         """Return ``u[a, lam, b]``."""
         if u not in self._second:
             check_budget()
-            self._second[u] = self._build_second(u)
+            self._second[u] = self._build_second(with_cotangents(u, self.parameter))
         return self._second[u]
 
     def gap(self, u: Expr, i: int, j: int) -> Expr:
@@ -180,11 +181,11 @@ class _Power:
         return Function(f"divdiff{order}_{'ipow' if isinstance(self.exponent, Integer) else 'rpow'}")
 
 
-def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power | Quotient, Expr] | None:
+def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power | Quotient | Cotangent, Expr] | None:
     """Return ``u`` as a function of a simpler expression; None if it is a product and no such function."""
-    quotient = quotient_of(u, parameter)
-    if quotient is not None or u.is_Mul:
-        return quotient
+    known = quotient_of(u, parameter) or cotangent_of(u, parameter)
+    if known is not None or u.is_Mul:
+        return known
     if type(u) in HELPERS:
         return _Named(HELPERS[type(u)]), u.args[0]
     if u.is_Pow:

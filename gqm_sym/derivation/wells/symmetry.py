@@ -1,6 +1,6 @@
 """Places about which a well and its curve are even, so that orbits around them are their own mirror images."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
@@ -9,6 +9,9 @@ import sympy as sp
 # Longer forms are not examined, and only forms with at most so many operations are expanded to find their symmetry.
 MAX_LENGTH, MAX_OPERATIONS = 1000, 200
 _WAVES = (sp.sin, sp.cos)
+
+# The distance from a place of symmetry at which is asked whether it lies in a well.
+NEXT_TO_AXIS = sp.Rational(1, 1024)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +42,16 @@ def symmetry(
     lam: sp.Symbol,
     domain: tuple[sp.Expr | None, sp.Expr | None] = (None, None),
     cusp: sp.Expr | None = None,
+    values: Mapping[sp.Symbol, sp.Expr] | None = None,
 ) -> Symmetry | None:
     """Return the places about which the effective potential and ds**2 are even; None if ds is even about none of them.
 
     The candidates are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines,
     0, and the centre that follows from the two highest powers of a polynomial. `Symmetry.place` is one about which ds
-    is even, inside the domain if possible. The others may be cusps, which no body passes: ds is odd about them, or the
-    factor ``cusp`` of ds vanishes there. A cusp elsewhere needs no attention: the slope of the potential vanishes at
-    every cusp, and it vanishes nowhere on the way from a place of symmetry to a turning point.
+    is even, inside the domain if possible, and there one at the bottom of a well if possible, because swings are about
+    it; that is decided for the ``values`` of the parameters. The others may be cusps, which no body passes: ds is odd
+    about them, or the factor ``cusp`` of ds vanishes there. A cusp elsewhere needs no attention: the slope of the
+    potential vanishes at every cusp, and it vanishes nowhere on the way from a place of symmetry to a turning point.
     """
     forms = (potential, ds)
     if any(_is_longer(form, MAX_LENGTH) for form in forms):
@@ -56,7 +61,9 @@ def symmetry(
     passable = [p for p in found if _is_even(ds, lam, p) and (cusp is None or cusp.xreplace({lam: p}) != 0)]
     if not passable:
         return None
-    known = min(passable, key=lambda place: not _is_inside(place, domain))
+    chosen = dict(values or {})
+    rises = {p: bool(slope.xreplace({lam: p + NEXT_TO_AXIS}).xreplace(chosen).evalf().is_positive) for p in passable}
+    known = min(passable, key=lambda place: (not _is_inside(place, domain), not rises[place]))
     step = min((abs(place - known) for place in found if place != known), key=_size, default=None)
     monotone = len(passable) == len(found) and _vanishes_only_at(slope, lam, known, step)
     return Symmetry(known, step, monotone)

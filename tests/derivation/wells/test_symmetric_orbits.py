@@ -178,6 +178,7 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
         assert 0 <= square(offset, left) < 1
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     "z", ["x**3", "exp(x)", "cos(x) + x**2", "cos(x) + cosh(x)", "cos(x) + cos(9*x)", "exp(-x**2)"]
 )

@@ -26,6 +26,12 @@ CASES = {
         False,
     ),
     "semicubical parabola": (gqm.Curve.parametric(x="u**3", z="u**2", parameter="u"), None, None, False),
+    "conchoid, whose loop hangs": (
+        gqm.Curve.polar("b/sin(theta) - a", parameter="theta", parameters={"a": 2, "b": 1}),
+        sp.pi / 2,
+        sp.pi,
+        True,
+    ),
     "spiral": (gqm.Curve.polar("exp(theta/5)", parameter="theta"), None, None, False),
 }
 
@@ -44,7 +50,7 @@ def test_symmetry(name: str) -> None:
     assert (found.place, found.step, found.monotone) == (place, step, monotone)
     values = {
         sp.Symbol(key, real=True): value
-        for key, value in (("L", sp.Rational(7, 5)), ("R", sp.S.One), ("g", sp.Rational(981, 100)))
+        for key, value in (("L", sp.Rational(7, 5)), ("R", sp.S.One), ("g", sp.Rational(981, 100)), ("a", 2), ("b", 1))
     }
     with mp.workdps(30):
         potential, ds, slope = (

@@ -92,6 +92,7 @@ def test_a_spline_through_few_points(count: int) -> None:
     assert np.abs(z - valley(x)).max() <= 4.0 * (4.0 / (count - 1)) ** 4
 
 
+@pytest.mark.extended
 def test_a_motion_on_a_spline_converges(tmp_path: Path) -> None:
     """Half period and contact force converge to those of the curve at the spline's orders."""
     curve = gqm.Curve.parametric(x=f"{A}*cos(u)", z=f"{B}*sin(u)", parameter="u", period="2*pi")

@@ -25,6 +25,7 @@ def planes(request: pytest.FixtureRequest, generated_folder: Path) -> tuple[Modu
     return gqm.build(model, name=f"{request.param}_planes", folder=generated_folder), points
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("height", [0.5, 1.2])
 @pytest.mark.parametrize("v0", [0.0, 0.9])
 def test_gradients_at_corners(planes: tuple[ModuleType, list[tuple[float, float]]], height: float, v0: float) -> None:

@@ -371,6 +371,7 @@ def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> 
             assert off(state.lam, 2 * mp.acos(sigma / 2)) <= state.error <= POSITION
 
 
+@pytest.mark.extended
 def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
     """A spiral winds for ever over a finite length; the motion ends, and says when (``make soak`` found that it took
     for ever).
@@ -525,7 +526,7 @@ def test_rest_with_friction_on_the_wrong_side() -> None:
     assert (motion.t_end, motion.events[0].kind) == (0.0, "liftoff")
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lam0", ["-1", "1", -1.0])
 def test_a_ridge_as_high_as_the_launch(lam0: Any, generated_folder: Any) -> None:
     """A ridge as high as the launch is never reached, from either side; one unit away the potential is that of the

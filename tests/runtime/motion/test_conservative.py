@@ -53,6 +53,7 @@ def test_from_rest_at_the_top_cusp(hanging: ModuleType, lam0: object, end: float
     assert np.abs(np.abs(state.v) - 4 * R * W * np.sin(W * t)).max() <= 1e-14
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("v0", [1e-4, 1e-2, 0.3, 1.0, 20.0])
 def test_thrown_from_a_cusp(hanging: ModuleType, v0: float) -> None:
     """A body thrown from one cusp moves through to the other."""

@@ -201,6 +201,7 @@ def test_times_beside_a_hilltop_are_those_of_solving(name: str, modules: dict[st
     assert swept.values == pytest.approx(np.array(times), rel=TWO_ULPS, abs=0.0, nan_ok=True)
 
 
+@pytest.mark.extended
 def test_wells_with_cusps(tmp_path: Path) -> None:
     """A body that falls along an inverted arch of a cycloid ends at its cusp, after 2 arcosh(1/cos(u/2))/sqrt(g).
 

@@ -80,9 +80,10 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 
-# The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many. No
-# pieces stand for the proofs that all orbits of a well share.
-SHARED, FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 0, 3, 2, 12
+# The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many, which
+# are halved or doubled in width, with so many trials altogether. No pieces stand for the proofs that all orbits of a
+# well share.
+SHARED, FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES, MAX_PIECES = 0, 3, 2, 12, 32
 
 
 class OrbitKind(NamedTuple):
@@ -187,7 +188,8 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
                 prove_in_well(fns, wells, n, rows, scratch.work)
             else:
                 p = orbits.params[: count * n].reshape(count, n)
-                prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
+                cuts = pieces, MAX_PIECES if pieces == MANY_PIECES else pieces
+                prove(fns, kind.kind, kind.mirrored, cuts, n, rows, p, scratch.work)
             proved, unproved = partition(rows[STATE, :n], scratch.chosen, scratch.others)
         waiting = gather(orbits, count, scratch.others, unproved, spare, ROWS)
         orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if careful else TIME_ROWS)

@@ -50,6 +50,9 @@ MAX_TRIALS, LAST_STEP = 40, 1e-9
 # of the distance in a step that follows.
 SAMPLES, SAMPLE_RATIO, SMALL_GROWTH = 16, 1.25, 1.5
 
+# The share of an orbit from which on a proof by pieces takes the rest of it as one piece.
+ALMOST_WHOLE = 1.0 - 2.0**-30
+
 # The largest distance of the middle of an orbit from the axis about which it is even, relative to the places.
 EVEN_TOLERANCE = 8.0 * 2.0**-52
 
@@ -320,44 +323,65 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-untyped-def]
+def any_below_one(row):  # type: ignore[no-untyped-def]
+    """Return whether a number in a row is below 1."""
+    found = False
+    for v in row:
+        found |= v < 1.0
+    return found
+
+
+@Inner
+def prove(fns, kind, mirrored, cuts, n, rows, p, work):  # type: ignore[no-untyped-def]
     """Set STATE to FOUND if V**2 > 0 and ds > 0 is certain between both ends, else to NOWHERE.
 
     V**2 is zero at both ends of a libration, and has its launch value at both ends of a lap. On the piece next to a
     zero the slope must have one sign throughout, so that the zero is simple and the only one there. For an orbit that
     is ``mirrored`` the half up to the axis is enough. Where ds is a small share of its largest value on a piece it may
     vanish at a place that rounding has moved out of the piece.
+
+    ``cuts`` are the number of equal pieces, the first of which is tried first, and the number of trials. If there may
+    be more trials than pieces, one that is not proved is tried again with half its width, and the next after a proved
+    one is twice as wide, because bounds are too wide only next to a pole of the slope or where V**2 is small.
     """
-    places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
+    pieces, trials = cuts
+    places, behind, ends, steps = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
     out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, offset_low, state = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[STATE, :n]
+    start, w0, offset_low, shares = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[STATE, :n]
     offset_high = rows[AXIS_DISTANCE if mirrored else OFFSET_HIGH, :n]
+    librates, wider = kind != CIRCULATION, 2.0 if trials > pieces else 1.0
     for j in range(n):
-        behind[j], speeds[j], state[j] = start[j] + offset_low[j], w0[j], FOUND
-    for k in range(1, pieces + 1):
-        first, end = kind != CIRCULATION and k == 1, k == pieces
-        last, half = kind != CIRCULATION and end and not mirrored, end and mirrored
-        share = k / pieces
+        behind[j], speeds[j], shares[j], steps[j] = start[j] + offset_low[j], w0[j], 0.0, 1.0 / pieces
+    for _ in range(trials):
         for j in range(n):
-            offsets[j] = offset_high[j] if end else offset_low[j] + share * (offset_high[j] - offset_low[j])
+            share = shares[j] + steps[j]
+            ends[j] = choose(share < ALMOST_WHOLE, share, 1.0)
+            inside = offset_low[j] + share * (offset_high[j] - offset_low[j])
+            offsets[j] = choose(ends[j] < 1.0, inside, offset_high[j])
             places[j] = start[j] + offsets[j]
-            lo[j], hi[j] = behind[j], places[j]
-        call_bounds_batch(fns.bounds, n, lo, hi, p, box)
-        if end:
-            out[0] = 0.0
-        else:
+        call_bounds_batch(fns.bounds, n, behind, places, p, box)
+        if any_below_one(ends):
             call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
+        else:
+            out[0] = 0.0
         for j in range(n):
-            lost = 2.0 * offsets[j] * out[0, j]
+            end, width = ends[j] == 1.0, places[j] - behind[j]
+            first, last, half = librates & (shares[j] == 0.0), librates & end & (not mirrored), end & mirrored
+            lost = choose(end, 0.0, 2.0 * offsets[j] * out[0, j])
             w, clear = w0[j] - lost, CONSTANT_SHARE * (w0[j] + fabs(lost))
             # Bounds on the rates at which V**2 may decrease and increase, and the smallest value that they allow.
             fall, growth, from_w = 2.0 * box[1, j], -2.0 * box[0, j], speeds[j]
-            valley = (fall * w + growth * from_w - fall * growth * (hi[j] - lo[j])) / (fall + growth)
+            valley = (fall * w + growth * from_w - fall * growth * width) / (fall + growth)
             lowest = choose((fall > 0.0) & (growth > 0.0), valley, choose(w < from_w, w, from_w))
             # Towards the axis V**2 increases, except for rounding.
-            grown = 0.5 * from_w - choose(fall > 0.0, fall, 0.0) * (hi[j] - lo[j])
+            grown = 0.5 * from_w - choose(fall > 0.0, fall, 0.0) * width
             good = choose(first, -fall, choose(last, -growth, choose(half, grown, lowest - clear))) > 0.0
-            good = good & (last | half | (w > clear)) & (box[2, j] > CUSP_SHARE * box[3, j])
-            state[j] = choose(good, state[j], NOWHERE)
-            behind[j], speeds[j] = places[j], w
+            good = good & (last | half | (w > clear)) & (box[2, j] > CUSP_SHARE * box[3, j]) & (shares[j] < 1.0)
+            behind[j], speeds[j] = choose(good, places[j], behind[j]), choose(good, w, from_w)
+            shares[j] = choose(good, ends[j], shares[j])
+            steps[j] *= choose(good, wider, 0.5)
+        if not any_below_one(shares):
+            break
+    for j in range(n):
+        shares[j] = choose(shares[j] == 1.0, FOUND, NOWHERE)

@@ -270,6 +270,7 @@ def second_error(row: Row, points: Points) -> float:
     return ulps(row.helper(2)(*points), true, max(abs(true), scale) + moves)
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 def test_first_difference_keeps_its_digits(row: Row) -> None:
     """f[x,y] is right to a few ulps at any gap, even if only the gap itself, and not x and y, has its digits."""
@@ -297,6 +298,7 @@ def test_coincident_points_give_derivatives(row: Row) -> None:
             assert second_error(row, points) <= row.second_ulps, points
 
 
+@pytest.mark.sample(40)
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.slug)
 @pytest.mark.parametrize("spread", [1e-9, 0.2, 5.0])
 def test_order_of_points_does_not_matter(row: Row, spread: float) -> None:

@@ -50,7 +50,7 @@ def slide_from(lam0: float) -> tuple[mpf, mpf]:
     return end, mp.quad(rate, [0, mp.pi], method="gauss-legendre")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("distance", [1e-13, 1e-11, 1e-9, 3e-8, 1e-7, 6e-7, 1e-6, 1e-5])
 def test_a_short_slide_has_all_digits(distance: float, circle: ModuleType) -> None:
     """The place of rest is that of truth to a few roundings of places, and the time has twelve digits and more, all of

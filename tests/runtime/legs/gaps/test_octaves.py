@@ -40,6 +40,7 @@ def block(direction: int) -> tuple[np.ndarray, int]:
     return gaps, first
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("v2", [4.0, 7.9375, 40.0, 1000.0])
 def test_a_block(direction: int, v2: float) -> None:

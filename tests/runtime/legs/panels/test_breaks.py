@@ -96,6 +96,7 @@ def test_friction_on_planes(track: tuple[ModuleType, Any]) -> None:
         assert np.abs(motion.state(t).lam - (place + ways * spent * (v + rate * spent / 2))).max() <= PLACES * high
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("mu", [0.05, 0.2])
 def test_sweeps_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
     """Sweeps find turns by data kept of the planes, also where the turn is close to a corner (bodies passed through

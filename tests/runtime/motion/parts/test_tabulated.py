@@ -33,6 +33,7 @@ MOTIONS: dict[str, tuple[str, dict[str, Any], float]] = {
 }
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", MOTIONS)
 def test_the_digits_are_those_of_the_segments(name: str, module_of: ModuleOf) -> None:
     """All columns of the state agree with those of the segments, the bounds are no smaller, and one time or many give

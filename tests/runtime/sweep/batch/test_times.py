@@ -152,6 +152,7 @@ def half_period_on_hyperbolic_cosine(start: float) -> Any:
     return mp.pi * total / nodes
 
 
+@pytest.mark.extended
 def test_wide_swings_in_steep_wells(tmp_path: Path) -> None:
     """Terms that all nodes of an orbit have in common follow from one hyperbolic sine, of an argument without rounding.
 

@@ -389,6 +389,7 @@ def test_small_swings_beside_an_edge_of_a_piece(tmp_path: Path) -> None:
             assert abs(mpf(float(ends[k])) - (bottom - amplitude)) <= 2.0**-52
 
 
+@pytest.mark.extended
 def test_the_largest_speed_of_small_swings(tmp_path: Path) -> None:
     """On the loop of a strophoid, r = -a*cos(2*t)/cos(t) in polar coordinates about its node, the largest speed is
     right.
