@@ -37,7 +37,15 @@ LONGEST = (
         "charts.double_double.passage",
         "double_double.orbit_time",
     ),
-    "launch.speed",
+    *(
+        "gradients.sensitivity",
+        "legs.variations.formula_changes",
+        "legs.variations.chain",
+        "inversion.records",
+        "sweep.tables.tabulate",
+        "gradients.lanes.arrivals.times",
+        "gradients.lanes.arrivals.beside_hilltops",
+    ),
 )
 
 

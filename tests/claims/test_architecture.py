@@ -175,7 +175,6 @@ TESTED_THROUGH = {
     "legs/leg_record.py": "claims/test_dissipative.py",
     "legs/leg_segments.py": "runtime/legs/panels/test_polynomials.py",
     "legs/panels/equation.py": "claims/test_closed_forms.py",
-    "legs/panels/solving.py": "claims/test_space_curves.py",
     "legs/panels/point.py": "claims/test_dissipative.py",
     "legs/panels/resolution.py": "runtime/legs/panels/test_polynomials.py",
     "legs/panels/widest.py": "claims/test_dissipative.py",

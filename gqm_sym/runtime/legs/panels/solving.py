@@ -4,7 +4,7 @@ Friction of the contact force in space makes the law ``P - Q W - f |N|/m``, wher
 coefficients that depend on the place alone, as P, Q and f do. So the curve is looked at once for all iterations.
 """
 
-from math import inf, sqrt
+from math import fabs, inf, sqrt
 
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner
@@ -51,7 +51,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     sample,
     slope_at,
 )
-from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of_block
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, size_of_block
 
 # The largest number of iterations for forces that are not linear in V**2.
 MAX_ITERATIONS = 40
@@ -59,6 +59,16 @@ MAX_ITERATIONS = 40
 # The change of V**2 in an iteration as a share of its largest value that is rounding only; and a share below which it
 # is, if changes do not decrease any more.
 ROUNDED, NEARLY_ROUNDED = 4e-16, 1e-13
+
+# If (N/m)**2 is a smaller share than this of its parts somewhere on a panel, the derivative of N with respect to V**2
+# is mostly rounding there.
+CANCELLED = 1e-6
+
+# The largest change of V**2 by friction for a change of V**2 at which it is found by fixed-point iteration.
+MAX_CONTRACTION = 1e-3
+
+# The largest change of V**2 by the changes of friction on a panel, as a share, that is rounding only.
+CONSTANT = 1e-15
 
 length_slope_row = over_rows(lambda b, c, w, length: (0.5 * b + w * c) / length, WIDE)
 rubbed_p_row = over_rows(lambda p, rubbing, length, slope, w: p - rubbing * (length - slope * w), WIDE)
@@ -121,6 +131,64 @@ def slope_at_start(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def is_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
+    """Return whether N almost vanishes somewhere on a panel, which is so narrow that V**2 follows from friction for the
+    approximation before.
+    """
+    contraction = fabs(work[RUBBING]) * sqrt(max(work[TURNING], work[TURNING + COUNT - 1])) * work[D + COUNT]
+    if not contraction <= MAX_CONTRACTION:
+        return False
+    slope = march.direction * (work[PLAIN_P] - work[PLAIN_Q] * panel.v2)
+    for j in range(COUNT):
+        w = panel.v2 + slope * work[D + j]
+        turned = w * w * work[TURNING + j]
+        if work[AT_REST + j] + w * work[MIXED + j] + turned <= CANCELLED * (work[AT_REST + j] + turned):
+            return True
+    return False
+
+
+@Inner
+def rub_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
+    """Fill the rows P, Q and Q_RATE with the law for friction by the values of V**2 in the row W, or for its mean if
+    its changes alter V**2 by no more than rounding.
+    """
+    low, high = inf, -inf
+    for j in range(WIDE):
+        w = work[W + j]
+        rubbed = work[RUBBING + j] * sqrt(max(work[AT_REST + j] + w * (work[MIXED + j] + w * work[TURNING + j]), 0.0))
+        work[LENGTH + j], low, high = rubbed, min(low, rubbed), max(high, rubbed)
+    if (high - low) * work[D + COUNT] <= CONSTANT * panel.v2:
+        copy_row(work, LENGTH, 0.5 * (low + high))
+    difference_row(work, P, PLAIN_P, LENGTH)
+    copy_row(work, Q, PLAIN_Q)
+    q_rate_row(work, Q_RATE, Q, OFFSET, slope_at(panel.left, march), march.g, float(march.direction))
+
+
+@Inner
+def solve_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
+    """Do the work of `integrate` for friction in space where N almost vanishes; return inf if it does not converge.
+
+    N has a kink there, as on a hill in a vertical plane that the body would leave if the track did not hold it. No
+    polynomial resolves a kink, but a panel may be so narrow that it does not matter. Beside it ``N**2`` is the small
+    difference of its parts. By fixed-point iteration no derivative of N is needed, which would have no digits.
+    """
+    linear_row(work, W, D, panel.v2, march.direction * (work[PLAIN_P] - work[PLAIN_Q] * panel.v2))
+    last_change = 0.0
+    for _ in range(MAX_ITERATIONS):
+        rub_beside_zero(march, panel, work)
+        total = integrate(march, panel, SPEED, work)
+        if not total < inf:
+            return inf
+        difference_row(work, W, SPEED, W)
+        change, size = size_of_block(work, W), size_of_block(work, SPEED)
+        copy_row(work, W, SPEED)
+        if change <= ROUNDED * size or change * change <= ROUNDED * size * last_change:
+            return total
+        last_change = change
+    return inf
+
+
+@Inner
 def is_settled(change, last_change, size, is_contact_known):  # type: ignore[no-untyped-def]
     """Return whether V**2 has converged; ``last_change`` is that of the iteration before, or 0 in the first.
 
@@ -165,7 +233,12 @@ def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
     Return q over the panel, or inf if the panel is too wide to be solved.
     """
-    total = integrate(march, panel, W, work) if forces.linear else solve_nonlinear(forces, march, panel, work)
+    if forces.linear:
+        total = integrate(march, panel, W, work)
+    elif forces.squared_contact != 0 and is_beside_zero(march, panel, work):
+        total = solve_beside_zero(march, panel, work)
+    else:
+        total = solve_nonlinear(forces, march, panel, work)
     if not total < inf:
         return inf
     if panel.v2 == 0.0:
