@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 20, input a74aedd594f9, body 71a36f14c4da
+# interface 20, input a74aedd594f9, body 9e5a867f61ee
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -284,11 +284,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
-        L, Omega, g, a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        L, Omega, g, a, d = p[0, i], p[1, i], p[2, i], starts[i], offsets[i]
         _t0 = Omega**2
         out[0, i] = L**2*_t0*divdiff1_cos_of_sum(0, 2, a, d)/2 - L*g*divdiff1_cos_of_sum(0, 1, a, d)
         out[1, i] = L
-        out[2, i] = L*(-L*_t0*cos(theta) + g)*sin(theta)
+        out[2, i] = L*(-L*_t0*cos_of_sum(0, 1, a, 0, d) + g)*sin_of_sum(0, 1, a, 0, d)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 20, input bcc7b1afa151, body 50a96cee07ee
+# interface 20, input bcc7b1afa151, body fba0b63f4009
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -305,11 +305,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (5, n)), carray(out, (3, n))
     for i in range(n):
-        L, w, h, g, a, theta, d = p[0, i], p[1, i], p[2, i], p[3, i], starts[i], places[i], offsets[i]
+        L, w, h, g, a, d = p[0, i], p[1, i], p[2, i], p[3, i], starts[i], offsets[i]
         _t0 = L*divdiff1_cos_of_sum(0, 1, a, d)
         _t1 = w**2
-        _t2 = sin(theta)
-        _t3 = L*cos(theta)
+        _t2 = sin_of_sum(0, 1, a, 0, d)
+        _t3 = L*cos_of_sum(0, 1, a, 0, d)
         out[0, i] = -_t0*g + _t1*(L**2*(_t2 + sin(a))*divdiff1_sin_of_sum(0, 1, a, d) + _t0*(L*cos(a) + _t3 + 2*h))/2
         out[1, i] = L
         out[2, i] = L*_t2*(_t1*_t3 - _t1*(_t3 + h) + g)
@@ -318,39 +318,38 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (13, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (11, n)), carray(out, (2, n))
     for i in range(n):
         L, w, h, g, _c0, _c1, _c2, _c3 = p[0, i], p[1, i], p[2, i], p[3, i], p[5, i], p[6, i], p[7, i], p[8, i]
-        _c4, _c5, _c6, _c7, da, db = p[9, i], p[10, i], p[11, i], p[12, i], left[i], right[i]
+        _c4, _c5, da, db = p[9, i], p[10, i], left[i], right[i]
         _t0 = divdiff1_cos_in_square(da, db)
         _t1 = da/2 - db/2
         _t2 = _t1*divdiff1_sinc_in_square(da, db)
-        _t3 = -_c5*_t2 + _c7*_t0
+        _t3 = -_c3*_t2 + _c5*_t0
         _t4 = L*_t3
         _t5 = L**2
-        _t6 = da*db
-        _t7 = _c6 - _t0*_t6
-        _t8 = _c4*_t1 - _t2*_t6
-        _t9 = _c5*_t0 + _c7*_t2
-        out[0, i] = -_t4*g + w**2*(_c2*_t5*(-_c4*_c5 - _t3*db) + _t4*(L*_c1 + L*(-_c5*_t8 + _c7*_t7) + 2*h) + _t5*(_c3*(_c4*_c7 - _t9*db) + _t9*(_c0 + _c5*_t7 + _c7*_t8)))/2
+        _t6 = _c2*_c3
+        _t7 = da*db
+        _t8 = _c4 - _t0*_t7
+        _t9 = _c2*_t1 - _t2*_t7
+        _t10 = _c2*_c5
+        _t11 = _c3*_t0 + _c5*_t2
+        out[0, i] = -_t4*g + w**2*(_t4*(L*_c1 + L*(-_c3*_t9 + _c5*_t8) + 2*h) - _t5*_t6*(-_t3*db - _t6) + _t5*(_t10*(_t10 - _t11*db) + _t11*(_c0 + _c3*_t8 + _c5*_t9)))/2
         out[1, i] = L
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (5, n)), carray(out, (8, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (5, n)), carray(out, (6, n))
     for i in range(n):
-        middle, rest, half, a, b = middles[i], rests[i], halves[i], lows[i], highs[i]
-        _t0 = 2*half
-        out[0, i] = sin(b)
-        out[1, i] = cos(b)
-        out[2, i] = divdiff1_cos(a, b, _t0)
-        out[3, i] = divdiff1_sin(a, b, _t0)
-        out[4, i] = sinc_near(half)
-        out[5, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[6, i] = cos(half)
-        out[7, i] = cos_of_sum(0, 1, middle, rest, 0)
+        middle, rest, half = middles[i], rests[i], halves[i]
+        out[0, i] = sin_of_sum(0, 1, middle, rest, half)
+        out[1, i] = cos_of_sum(0, 1, middle, rest, half)
+        out[2, i] = sinc_near(half)
+        out[3, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[4, i] = cos(half)
+        out[5, i] = cos_of_sum(0, 1, middle, rest, 0)
 
 
 @compiled(AGM_ARGUMENTS_BATCH)
@@ -407,7 +406,7 @@ MODEL = CompiledModel(
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
-        turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=8,
+        turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=6,
     ),
     domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 20, input 350ae6cf923a, body ffb1b38b3201
+# interface 20, input 350ae6cf923a, body 47ac82c9e6b2
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -277,13 +277,12 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
     for i in range(n):
-        R, g, a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        R, g, a, d = p[0, i], p[1, i], starts[i], offsets[i]
         _t0 = R*g
-        _t1 = theta/2
-        _t2 = 2*sin(_t1)
+        _t1 = 2*sin_of_sum(0, 1/2, a, 0, d)
         out[0, i] = -_t0*divdiff1_cos_of_sum(0, 1, a, d)
-        out[1, i] = R*_t2
-        out[2, i] = _t0*_t2*cos(_t1)
+        out[1, i] = R*_t1
+        out[2, i] = _t0*_t1*cos_of_sum(0, 1/2, a, 0, d)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)

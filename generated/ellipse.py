@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 20, input 81dc4ee20e82, body 76f3db03b760
+# interface 20, input 81dc4ee20e82, body 40b40d24ecd8
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -282,11 +282,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
-        a, b, g, _a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        a, b, g, _a, d = p[0, i], p[1, i], p[2, i], starts[i], offsets[i]
         _t0 = b*g
-        _t1 = cos(theta)
+        _t1 = cos_of_sum(0, 1, _a, 0, d)
         out[0, i] = _t0*divdiff1_sin_of_sum(0, 1, _a, d)
-        out[1, i] = sqrt(_t1**2*b**2 + a**2*sin(theta)**2)
+        out[1, i] = sqrt(_t1**2*b**2 + a**2*sin_of_sum(0, 1, _a, 0, d)**2)
         out[2, i] = _t0*_t1
 
 

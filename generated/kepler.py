@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 20, input a0162e77d64e, body 571ece542024
+# interface 20, input a0162e77d64e, body 57b5bb4915a6
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -356,94 +356,85 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, E], ds/dE and dU/dE."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
-        a, ecc, k, _a, E, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        a, ecc, k, _a, d = p[0, i], p[1, i], p[2, i], starts[i], offsets[i]
         _t0 = fabs(a)
-        _t1 = cos(E)
-        _t2 = -_t1 + ecc
-        _t3 = sin(E)
-        _t4 = _t3**2
-        _t5 = 1 - ecc**2
-        _t6 = _t2**2 + _t4*_t5
-        _t7 = sqrt(_t6)
-        _t8 = cos(_a)
-        _t9 = sin(_a)
-        _t10 = sqrt(_t5*_t9**2 + (_t8 - ecc)**2)
-        out[0, i] = k*(_t5*(_t3 + _t9)*divdiff1_sin_of_sum(0, 1, _a, d) + (_t1 + _t8 - 2*ecc)*divdiff1_cos_of_sum(0, 1, _a, d))/(_t0*_t10*_t7*(_t10 + _t7))
-        out[1, i] = a*sqrt(_t1**2*_t5 + _t4)
-        out[2, i] = _t0*_t3*k*(_t1*_t5 + _t2)/(a**2*sqrt(_t6)**3)
+        _t1 = cos(_a)
+        _t2 = sin(_a)
+        _t3 = 1 - ecc**2
+        _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
+        _t5 = cos_of_sum(0, 1, _a, 0, d)
+        _t6 = -_t5 + ecc
+        _t7 = sin_of_sum(0, 1, _a, 0, d)
+        _t8 = _t7**2
+        _t9 = _t3*_t8 + _t6**2
+        _t10 = sqrt(_t9)
+        out[0, i] = k*(_t3*(_t2 + _t7)*divdiff1_sin_of_sum(0, 1, _a, d) + (_t1 + _t5 - 2*ecc)*divdiff1_cos_of_sum(0, 1, _a, d))/(_t0*_t10*_t4*(_t10 + _t4))
+        out[1, i] = a*sqrt(_t3*_t5**2 + _t8)
+        out[2, i] = _t0*_t7*k*(_t3*_t5 + _t6)/(a**2*sqrt(_t9)**3)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, E, b] and ds/dE; NaN where the points lie too far apart for the closed form."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (19, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (17, n)), carray(out, (2, n))
     for i in range(n):
         a, ecc, k, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
         _c5, _c6, _c7, _c8, _c9, _c10, _c11 = p[9, i], p[10, i], p[11, i], p[12, i], p[13, i], p[14, i], p[15, i]
-        _c12, _c13, _c14, da, db = p[16, i], p[17, i], p[18, i], left[i], right[i]
+        _c12, da, db = p[16, i], left[i], right[i]
         _t0 = divdiff1_cos_in_square(da, db)
         _t1 = da*db
-        _t2 = _c5 - _t0*_t1
+        _t2 = _c3 - _t0*_t1
         _t3 = da/2 - db/2
         _t4 = _t3*divdiff1_sinc_in_square(da, db)
-        _t5 = _c3*_t3 - _t1*_t4
-        _t6 = _c4*_t5
-        _t7 = -_c6*_t2 + _t6
+        _t5 = _c1*_t3 - _t1*_t4
+        _t6 = _c2*_t5
+        _t7 = -_c4*_t2 + _t6
         _t8 = 1 - ecc**2
-        _t9 = _c4*_t2 + _c6*_t5
+        _t9 = _c2*_t2 + _c4*_t5
         _t10 = _t9**2
         _t11 = sqrt(_t10*_t8 + (-_t7 - ecc)**2)
-        _t12 = _c9/_t11
-        _t13 = -2*ecc
-        _t14 = _c14 + _t13
-        _t15 = -_c4*_t4 + _c6*_t0
-        _t16 = -_c3*_c4 - _t15*db
-        _t17 = _c6*_t2 - _t6
-        _t18 = _c4*_t0 + _c6*_t4
-        _t19 = _c3*_c6 - _t18*db
-        _t20 = (_c1*(_c13 + _t14) + _c2*_t8*(_c11 + _c12))*(_t16*(_c13 + _t13 + _t17) + _t19*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
-        _t21 = 1/(_c10 + _t11)
-        out[0, i] = -k*(_c7*_t12*_t20 - _t12*(-_t20*_t21 + _t21*(_c1*_t16 + _t15*(_t14 + _t17) + _t8*(_c2*_t19 + _t18*(_c12 + _t9)))))/_c0
+        _t12 = _c7/_t11
+        _t13 = _c1*_c2
+        _t14 = -_c2*_t4 + _c4*_t0
+        _t15 = -_t13 - _t14*db
+        _t16 = -2*ecc
+        _t17 = _c4*_t2 - _t6
+        _t18 = _c1*_c4
+        _t19 = _c2*_t0 + _c4*_t4
+        _t20 = _t18 - _t19*db
+        _t21 = _c12 + _t16
+        _t22 = (_t15*(_c11 + _t16 + _t17) + _t20*_t8*(_c9 + _t9))*(_c1*_c4*_t8*(_c10 + _c9) - _t13*(_c11 + _t21))/((_c6 + _c8)*(_c6 + _t11))
+        _t23 = 1/(_c8 + _t11)
+        out[0, i] = -k*(_c5*_t12*_t22 - _t12*(-_t22*_t23 + _t23*(-_t13*_t15 + _t14*(_t17 + _t21) + _t8*(_t18*_t20 + _t19*(_c10 + _t9)))))/_c0
         out[1, i] = a*sqrt(_t10 + _t7**2*_t8)
 
 
 @compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
-    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (15, n))
+    lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (13, n))
     for i in range(n):
         a, ecc, middle, rest, half, _a, b = p[0, i], p[1, i], middles[i], rests[i], halves[i], lows[i], highs[i]
-        _t0 = 2*half
-        _t1 = cos(_a)
-        _t2 = sin(_a)
-        _t3 = 1 - ecc**2
-        _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
-        _t5 = cos(b)
-        _t6 = sin(b)
-        _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
+        _t0 = 1 - ecc**2
+        _t1 = sqrt(_t0*sin(_a)**2 + (-ecc + cos(_a))**2)
+        _t2 = sqrt(_t0*sin(b)**2 + (-ecc + cos(b))**2)
+        _t3 = -half
         out[0, i] = fabs(a)
-        out[1, i] = divdiff1_cos(_a, b, _t0)
-        out[2, i] = divdiff1_sin(_a, b, _t0)
-        out[3, i] = sinc_near(half)
-        out[4, i] = sin_of_sum(0, 1, middle, rest, 0)
-        out[5, i] = cos(half)
-        out[6, i] = cos_of_sum(0, 1, middle, rest, 0)
-        out[7, i] = 1/_t4
-        out[8, i] = _t4
-        out[9, i] = 1/_t7
+        out[1, i] = sinc_near(half)
+        out[2, i] = sin_of_sum(0, 1, middle, rest, 0)
+        out[3, i] = cos(half)
+        out[4, i] = cos_of_sum(0, 1, middle, rest, 0)
+        out[5, i] = 1/_t1
+        out[6, i] = _t1
+        out[7, i] = 1/_t2
+        out[8, i] = _t2
+        out[9, i] = sin_of_sum(0, 1, middle, rest, _t3)
     for i in range(n):
-        ecc, _a, b = p[1, i], lows[i], highs[i]
-        _t1 = cos(_a)
-        _t2 = sin(_a)
-        _t3 = 1 - ecc**2
-        _t5 = cos(b)
-        _t6 = sin(b)
-        _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
-        out[10, i] = _t7
-        out[11, i] = _t2
-        out[12, i] = _t6
-        out[13, i] = _t1
-        out[14, i] = _t5
+        middle, rest, half = middles[i], rests[i], halves[i]
+        _t3 = -half
+        out[10, i] = sin_of_sum(0, 1, middle, rest, half)
+        out[11, i] = cos_of_sum(0, 1, middle, rest, _t3)
+        out[12, i] = cos_of_sum(0, 1, middle, rest, half)
 
 
 @compiled(TIME_INTEGRAND_BATCH)
@@ -545,7 +536,7 @@ MODEL = CompiledModel(
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
-        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=15, integrand_rows=7,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=13, integrand_rows=7,
     ),
     domain_of=exact_domain, load_map=load_map, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 20, input 8cb1e254c2ba, body 8fac91c5d2b2
+# interface 20, input 8cb1e254c2ba, body aa05b145a455
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -301,7 +301,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         _t2 = g*r0
         out[0, i] = _t2*(_t1*divdiff1_sin_of_sum(0, 1, a, d) + b*divdiff1_exp(a*b, _t0, b*d)*sin(a))
         out[1, i] = _t1*r0*sqrt(b**2 + 1)
-        out[2, i] = _t1*_t2*(b*sin(theta) + cos(theta))
+        out[2, i] = _t1*_t2*(b*sin_of_sum(0, 1, a, 0, d) + cos_of_sum(0, 1, a, 0, d))
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)
@@ -327,9 +327,9 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
     """Terms that are constant along an orbit; ``potential_divdiff2_batch`` reads them after the parameters."""
     lows, highs, middles, rests, halves, p, out = carray(lows, n), carray(highs, n), carray(middles, n), carray(rests, n), carray(halves, n), carray(p, (4, n)), carray(out, (7, n))
     for i in range(n):
-        b, middle, rest, half, a, _b = p[1, i], middles[i], rests[i], halves[i], lows[i], highs[i]
+        b, middle, rest, half, _b = p[1, i], middles[i], rests[i], halves[i], highs[i]
         _t0 = exp(b*middle)
-        out[0, i] = sin(a)
+        out[0, i] = sin_of_sum(0, 1, middle, rest, -half)
         out[1, i] = exp(_b*b)
         out[2, i] = sqrt(b**2 + 1)
         out[3, i] = sinc_near(half)

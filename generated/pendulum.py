@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 20, input f60615287831, body 8c16096dd5bb
+# interface 20, input f60615287831, body d2ab008c9097
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -273,11 +273,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
     for i in range(n):
-        L, g, a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        L, g, a, d = p[0, i], p[1, i], starts[i], offsets[i]
         _t0 = L*g
         out[0, i] = _t0*divdiff1_sin_of_sum(0, 1, a, d)
         out[1, i] = L
-        out[2, i] = _t0*cos(theta)
+        out[2, i] = _t0*cos_of_sum(0, 1, a, 0, d)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)

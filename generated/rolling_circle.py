@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 20, input 2a76ceb4277a, body 71512e52a5c1
+# interface 20, input 2a76ceb4277a, body 97305196e6bf
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -280,11 +280,11 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
     for i in range(n):
-        L, beta, g, a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        L, beta, g, a, d = p[0, i], p[1, i], p[2, i], starts[i], offsets[i]
         _t0 = L*g/(beta + 1)
         out[0, i] = -_t0*divdiff1_cos_of_sum(0, 1, a, d)
         out[1, i] = L
-        out[2, i] = _t0*sin(theta)
+        out[2, i] = _t0*sin_of_sum(0, 1, a, 0, d)
 
 
 @compiled(POTENTIAL_DIVDIFF2_BATCH)

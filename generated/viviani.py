@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 20, input c93b8a64a5a5, body a9ce6442dbec
+# interface 20, input c93b8a64a5a5, body 8f8c5c6488e5
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -358,9 +358,9 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
     for i in range(n):
-        a, g, _a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        a, g, _a, d = p[0, i], p[1, i], starts[i], offsets[i]
         _t0 = a*g
-        _t1 = cos(theta/2)
+        _t1 = cos_of_sum(0, 1/2, _a, 0, d)
         out[0, i] = _t0*divdiff1_sin_of_sum(0, 1/2, _a, d)
         out[1, i] = a*sqrt(_t1**2 + 1)
         out[2, i] = _t0*_t1

@@ -62,8 +62,11 @@ class _Middle:
         """Return the first difference of sin or cos over the place and one end, by that over both ends and the second
         one: f[x,y] = f[x,w] - (w - y)*f[x,y,w].
         """
-        whole = (cos(self.m) if name == "sin" else -sin(self.m)) * Function("sinc_near")((self.w - self.x) / 2)
-        return whole + (-self.gaps[1] if from_low else self.gaps[0]) * self.second(f"divdiff2_{name}")
+        return self.over_ends(name) + (-self.gaps[1] if from_low else self.gaps[0]) * self.second(f"divdiff2_{name}")
+
+    def over_ends(self, name: str) -> Expr:
+        """Return the first difference of sin or cos over both ends."""
+        return (cos(self.m) if name == "sin" else -sin(self.m)) * Function("sinc_near")((self.w - self.x) / 2)
 
     def hyperbolic_second(self, name: str, y: Expr) -> Expr:
         """Return the second difference of sinh, cosh, exp or tanh.
@@ -104,17 +107,23 @@ def _with_constant_factors(
     known, narrow = set[tuple[Expr, Expr]](), set[Expr]()
     # The orbits of the second differences, by the arguments of the first differences over the place and one end.
     with_end: dict[tuple[Expr, ...], tuple[_Middle, bool]] = {}
+    whole: dict[tuple[Expr, Expr], _Middle] = {}  # by those over both ends
 
     def second(t: Expr) -> Expr:
         x, y, w, *both = t.args
         known.add((both[0], both[1]))
         middle = _Middle(x, w, (both[0], both[1]))
         with_end[x, y, both[0]], with_end[y, w, both[1]] = (middle, True), (middle, False)
+        whole[x, w] = middle
         return middle.second(t.func.__name__)
 
     def first(t: Expr) -> Expr:
-        middle, from_low = with_end[t.args]
-        return middle.first(t.func.__name__.removeprefix("divdiff1_"), from_low=from_low)
+        name = t.func.__name__.removeprefix("divdiff1_")
+        if t.args in with_end:
+            middle, from_low = with_end[t.args]
+            return middle.first(name, from_low=from_low)
+        x, w, gap = t.args
+        return whole[x, w].over_ends(name) if (x, w) in whole and expand(gap - (w - x)) == 0 else t
 
     def hyperbolic_second(t: Expr) -> Expr:
         x, y, w, *both = t.args
@@ -137,10 +146,7 @@ def _with_constant_factors(
 
     forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR, second) for f in forms]
     forms = [
-        f.replace(
-            lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR_FIRST and t.args in with_end, first
-        )
-        for f in forms
+        f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR_FIRST, first) for f in forms
     ]
     forms = [
         f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _HYPERBOLIC, hyperbolic_second)
@@ -156,12 +162,17 @@ def _with_constant_factors(
     return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
-def _from_start(form: Expr, start: Symbol, gap: Symbol) -> Expr:
-    """Write first differences of sines and cosines by a place and the gap to another one, whose sum is not rounded."""
+def _from_start(form: Expr, start: Symbol, place: Symbol, gap: Symbol) -> Expr:
+    """Write sines and cosines of a place, and their first differences over it and a start, by the start and the gap,
+    whose sum is not rounded.
+    """
     names = {"divdiff1_sin", "divdiff1_cos"}
-    return form.replace(
+    form = form.replace(
         lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in names,
         lambda t: of_sum(t, (start,), (start, gap)),
+    )
+    return form.replace(
+        lambda t: isinstance(t, sin | cos) and t.has(place), lambda t: of_sum(t, (place,), (start, S.Zero, gap))
     )
 
 
@@ -184,6 +195,20 @@ def _term_by_term(form: Expr) -> Expr:
     if not any(root.base in divisors and root.exp.q == 2 for root in roots):
         return form
     return Add(*(term * others for term in total.args))
+
+
+def _from_middle(value: Expr, ends: tuple[Symbol, Symbol], sums: tuple[Symbol, Symbol, Symbol]) -> Expr:
+    """Write the sine or cosine of a multiple of one end, or of the mean of both, by that mean as two numbers and half
+    the distance, because all nodes of an orbit have the rounding of an end in common.
+    """
+    if not isinstance(value, sin | cos):
+        return value
+    (a, b), (middle, rest, half) = ends, sums
+    if not value.has(b):
+        return of_sum(value, (a,), (middle, rest, -half))
+    return (
+        of_sum(value, (b,), (middle, rest, half)) if not value.has(a) else of_sum(value, ends, (middle, rest, S.Zero))
+    )
 
 
 def _at_middle(value: Expr, ends: tuple[Symbol, Symbol], middle: Symbol, rest: Symbol) -> Expr:
@@ -234,10 +259,13 @@ def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
         (starts, places, offsets),
         f"U[a, {place}], ds/d{place} and dU/d{place}{lowering.meaning}.",
         inside=[(a, at(starts) - model.origin), *([offset, (place, a + d)] if model.origin else [here, offset])],
-        outputs=(
-            _without_tangents(_from_start(differences.first(potential, 0, 1), a, d)),
-            _term_by_term(lowering.from_origin(model.ds)),
-            lowering.from_origin(model.effective_potential_slope),
+        outputs=tuple(
+            _from_start(_without_tangents(form), a, place, d)
+            for form in (
+                differences.first(potential, 0, 1),
+                _term_by_term(lowering.from_origin(model.ds)),
+                lowering.from_origin(model.effective_potential_slope),
+            )
         ),
         batch=True,
     )
@@ -269,10 +297,7 @@ def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
         )
         for form in _of_one_gap(outputs, db, da, from_middle, in_halves)
     ]
-    held = [
-        (symbol, of_sum(value, (a, b), (middle, rest, S.Zero)) if isinstance(value, (sin, cos)) else value)
-        for symbol, value in held
-    ]
+    held = [(symbol, _from_middle(value, (a, b), (middle, rest, half))) for symbol, value in held]
     held = [(symbol, _at_middle(value, (a, b), middle, rest)) for symbol, value in held]
     held = list(zip((s for s, _ in held), _of_one_gap((v for _, v in held), a, b, half), strict=True))
     held += [(symbol, symbol) for symbol in (middle, rest) if any(form.has(symbol) for form in outputs)]

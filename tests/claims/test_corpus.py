@@ -243,7 +243,7 @@ def test_all_explicit_curves_are_here() -> None:
     assert {motion.expect["kind"] for motion in MOTIONS} == {"libration", "circulation", "transit"}
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("famous", **of_kind("libration"))
 def test_libration(famous: FamousMotion, famous_motion: MotionOf, famous_module: ModuleOf) -> None:
     """A libration goes between two turning points, which it meets in order, half a period apart."""
@@ -326,7 +326,7 @@ def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> No
     assert error(swept.values.item(), expected) <= TIME * float(expected)
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """ds, kappa, V**2 and N are correct at the sampled places, relative to the largest value among the samples."""
@@ -338,7 +338,7 @@ def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
             assert error(actual, row[name]) <= SAMPLE * largest
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """lam, x, z and v are correct at each time; a periodic motion's last time is more than 1000 periods late."""
@@ -354,7 +354,7 @@ def test_positions(famous: FamousMotion, famous_motion: MotionOf) -> None:
         assert error(states.v[k], row["v"]) <= POSITION * of.v
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """No position, early or late, has a larger error than ``error_bound`` says."""
@@ -363,7 +363,7 @@ def test_the_error_bound_is_honest(famous: FamousMotion, famous_motion: MotionOf
         assert error(motion.lam(row["t"]), row["lam"]) <= motion.error_bound(row["t"])
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(5)
 @EVERY_MOTION
 def test_the_error_bound_is_useful(famous: FamousMotion, famous_motion: MotionOf) -> None:
     """The error bound is at most a hundred times the error. The worst ratio measured is 31."""

@@ -109,7 +109,7 @@ def test_the_table_has_what_is_hard() -> None:
     assert {edge.expected["kind"] for edge in EDGES} == {"libration", "circulation", "transit"}
 
 
-@pytest.mark.sample(14)
+@pytest.mark.sample(9)
 @EVERY_EDGE
 def test_kind_and_turning_points(edge: Edge, edge_motion: MotionOf) -> None:
     """The motion has the kind of the exact launch, and its turning points are the doubles nearest to the exact ones."""
@@ -135,7 +135,7 @@ def test_periods(edge_motion: MotionOf) -> None:
     assert sum(u <= MOST_ULPS for u in lost) >= MOST_SHARE * len(lost)
 
 
-@pytest.mark.sample(9)
+@pytest.mark.sample(6)
 @EVERY_EDGE
 def test_positions(edge: Edge, edge_motion: MotionOf) -> None:
     """lam, x, z and v are right at any time: early, late, and at times of fast motion."""

@@ -91,6 +91,7 @@ def test_derivatives_of_reference_cases(name: str, build: Build) -> None:
             assert value == pytest.approx(float(wanted), rel=ASKED, abs=ASKED), by
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", LOSING)
 def test_reference_cases_through_all_their_legs(name: str, build: Build) -> None:
     """Events, positions and passages agree with two independent methods on every leg, and the bound of lam holds."""

@@ -225,6 +225,7 @@ def test_a_fall_beside_a_vertical_line(height: str, domain: Any, lam0: float, t:
     assert motion.t_end == pytest.approx(float(time), rel=1e-13)
 
 
+@pytest.mark.extended
 def test_the_end_of_a_long_domain_is_not_vertical(built: Build) -> None:
     """On the last millionth of the domain a wave becomes steeper by a factor of 2, and is regular all the same."""
     wave = built("long_wave", gqm.Curve.graph("3*sin(x)", domain=(0, 1000000)), gqm.Gravity())

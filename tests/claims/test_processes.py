@@ -93,6 +93,7 @@ def test_generated_modules_need_no_generator() -> None:
     assert abs(float.fromhex(late) - -0.5504098326471206) <= 2e-13 * 2.8
 
 
+@pytest.mark.extended
 def test_importing_a_generated_module_is_light() -> None:
     """A generated module loads numpy, numba and the runtime, and nothing of the generator.
 
@@ -109,6 +110,7 @@ def test_a_second_process_compiles_nothing() -> None:
     assert json.loads(run(COUNT_COMPILATIONS)) == []
 
 
+@pytest.mark.extended
 def test_a_second_process_imports_no_more_than_it_needs() -> None:
     """Machine code is loaded without what compiled it, and a motion without what sweeps and charts need."""
     run(COMES_WITH_CODE)

@@ -65,16 +65,16 @@ def test_it_is_the_declared_path_of_the_centre(built: Build) -> None:
 
 TRACKS: tuple[tuple[dict[str, str], Callable[[Any], Any], Callable[[Any], Any]], ...] = (
     (
-        {"x": "10*u", "y": "4*sin(u/2)", "z": "2*u**2", "roll": "u/3"},
-        lambda u: mp.matrix([10 * u, 4 * mp.sin(u / 2), 2 * u**2]),
-        lambda u: u / 3,
-    ),
-    (
         {"x": "u", "y": "2*u", "z": "u**2", "roll": "pi/4"},
         lambda u: mp.matrix([u, 2 * u, u**2]),
         lambda _: mp.pi / 4,
     ),
     ({"x": "u", "y": "0", "z": "u**2", "roll": "u/4"}, lambda u: mp.matrix([u, 0, u**2]), lambda u: u / 4),
+    (
+        {"x": "10*u", "y": "4*sin(u/2)", "z": "2*u**2", "roll": "u/3"},
+        lambda u: mp.matrix([10 * u, 4 * mp.sin(u / 2), 2 * u**2]),
+        lambda u: u / 3,
+    ),
 )
 
 
@@ -93,13 +93,18 @@ def derivative(of: Callable[[Any], Any], u: Any, order: int = 1) -> Any:
     return mp.matrix([mp.diff(lambda w, k=k: of(w)[k], u, order) for k in range(3)])
 
 
-@pytest.mark.extended
+def on_a_track(written: dict[str, str], built: Build) -> ModuleType:
+    """Return the module of a ball on one of these tracks."""
+    return built("ball_" + written["roll"].replace("/", "_over_"), gqm.Curve.space(**written, parameter="u"), BALL)
+
+
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("written", "track", "roll"), TRACKS)
 def test_forces_by_the_definition(
     written: dict[str, str], track: Callable[[Any], Any], roll: Callable[[Any], Any], built: Build
 ) -> None:
     """Place, energy, contact force and the loads along the direction to the centre are right to 13 digits."""
-    module = built("ball_" + written["roll"].replace("/", "_over_"), gqm.Curve.space(**written, parameter="u"), BALL)
+    module = on_a_track(written, built)
     rho, lam0 = mp.mpf("0.1"), mp.mpf("0.3")
 
     def upwards(u: Any) -> Any:
@@ -131,12 +136,11 @@ def test_forces_by_the_definition(
             assert on_track == pytest.approx([*map(float, track(u))], rel=1e-13, abs=1e-13)
 
 
-@pytest.mark.extended
-def test_rates_of_loads(built: Build) -> None:
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("written", [row[0] for row in TRACKS], ids=[row[0]["roll"] for row in TRACKS])
+def test_rates_of_loads(written: dict[str, str], built: Build) -> None:
     """The rates of the loads are the differences of the loads."""
-    written = TRACKS[0][0]
-    module = built("ball_u_over_3", gqm.Curve.space(**written, parameter="u"), BALL)
-    motion = module.solve(0.3, 1, rho="0.1")
+    motion = on_a_track(written, built).solve(0.3, 1, rho="0.1")
     before, here, after = (motion.state(0.5 + step) for step in (-1e-5, 0.0, 1e-5))
     for name in ("vertical", "lateral", "longitudinal"):
         rate = (getattr(after, f"n_{name}") - getattr(before, f"n_{name}")) / 2e-5

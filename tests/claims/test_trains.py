@@ -314,6 +314,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
         planes.solve(1, length="1/2")
 
 
+@pytest.mark.extended
 def test_what_riders_feel_in_each_car(build: Build) -> None:
     """The loads are the acceleration of the places of the cars less gravity, along the rider's directions there."""
     track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))

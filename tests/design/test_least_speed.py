@@ -65,6 +65,7 @@ def test_the_motion_agrees() -> None:
     assert generated.circle.solve(0, speed * (1 - 1e-9), contact="above").events[-1].kind == "liftoff"
 
 
+@pytest.mark.extended
 def test_a_hump_asks_for_less_and_not_for_more() -> None:
     """On an arch of a cycloid no speed keeps a body on all of it, and any small speed does so near its top."""
     with pytest.raises(SolutionError, match=r"no speed.*at most|no speed.*low enough"):

@@ -27,6 +27,7 @@ def test_constant_load(tmp_path: Path) -> None:
     assert [motion.time_at(place) for place in psi] == pytest.approx(times, rel=1e-15)
 
 
+@pytest.mark.extended
 def test_constant_load_with_parameters(tmp_path: Path) -> None:
     """Load, speed and gravity may be run-time parameters."""
     track = gqm.design.constant_load("n", "V", g="g", parameters={"n": 3, "V": 12})

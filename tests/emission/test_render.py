@@ -147,6 +147,7 @@ def test_exact_domain(folder: Path) -> None:
         assert max(abs(low + mpf(1) / 3), abs(high - mp.e), abs(period - 2 * mp.pi)) <= EXACT
 
 
+@pytest.mark.extended
 def test_taken_names_as_parameters(folder: Path) -> None:
     """Run-time parameters may have all names of emitted code at once, and keep their meaning."""
     terms = (f"{name}*{f}" for name, f in zip(TAKEN, ("sin(u)", "exp(u)", "u**3", "cosh(u/2)") * 5, strict=False))

@@ -218,7 +218,10 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
     for timed in segments:
         segment = timed.segment
         lam_in_lap = lam - timed.laps * trajectory.lap
-        inside, outside = segment.offsets(lam_in_lap, low)
+        stop = segment.b if timed.sense > 0 else segment.a
+        # The end of a domain is known to the segment as a double, which may lie before the exact end.
+        is_end = timed.end == "domain-end" and lam_in_lap == stop
+        inside, outside = segment.offsets(lam_in_lap, 0.0 if is_end else low)
         if inside * segment.direction < 0.0 or outside * segment.direction < 0.0:
             continue
         phi = np.array([segment.phase_angle_of(inside, outside)])

@@ -89,6 +89,7 @@ def test_what_does_not_swing(ring: ModuleType) -> None:
     assert ring.solve(lam0=0, v0="2*sqrt(9.81)").kind == "asymptotic"
 
 
+@pytest.mark.extended
 def test_a_hundred_digits(ring: ModuleType) -> None:
     """A period is computed to as many digits as are asked for."""
     with mp.workdps(130):
@@ -224,6 +225,7 @@ def swing_time(rate: Callable[[mpf], mpf], low: mpf, high: mpf, cuts: list[mpf])
     return half(low, 1) + half(high, -1)
 
 
+@pytest.mark.extended
 @pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 def test_spline(generated_folder: Path) -> None:
     """The period is that of the spline with exactly the coefficients that interpolate in doubles."""

@@ -201,6 +201,7 @@ def test_a_table_with_a_column_y(tmp_path: Path) -> None:
         built.solve(point=(0.0, 0.0))
 
 
+@pytest.mark.extended
 def test_half_periods_in_a_vertical_plane() -> None:
     """Points over the line y = 3x/4 are a planar track: the same half periods, but for the rounding of knots."""
     steps = [k / 4 for k in range(-8, 9)]

@@ -77,6 +77,7 @@ def test_equal_functions_of_modules_are_compiled_once(
     assert _compilations(text.replace("sin(", "2.0*sin("), tmp_path / "b" / "changed.py", cache) == 1
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("term", "before", "after"), [("FACTOR", "FACTOR = 2.0", "FACTOR = 4.0"), ("plain(1.0)", "3.0*x", "5.0*x")]
 )

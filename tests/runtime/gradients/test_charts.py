@@ -296,6 +296,7 @@ def test_an_exponent_with_losses(generated_folder: Path) -> None:
     assert swept[2] == pytest.approx(wanted, rel=1e-12)
 
 
+@pytest.mark.extended
 def test_an_exponent_of_positive_numbers(generated_folder: Path) -> None:
     """A curve has a derivative by an exponent of numbers that are positive on it, whether it is an integer or not."""
     curve = gqm.Curve.implicit("(-z)**n + x**2 - 1", start=(0, -1), domain=(-1, 1), parameters={"n": "5/2"})
@@ -394,7 +395,7 @@ def test_a_slide_in_space(generated_folder: Path) -> None:
     assert held.gradient("t_end", ("g", "v0")) == pytest.approx(motion.gradient("t_end", ("g", "v0")), rel=1e-13)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("lam0", "v0"), [("0.3", "1"), ("0.05", "0")])
 def test_a_body_that_leaves_an_ellipse(lam0: str, v0: str, generated_folder: Path) -> None:
     """A body on top of an ellipse slides down until it lifts off; this time and that of a place before have the

@@ -54,7 +54,7 @@ def test_the_contact_force_along_each_axis(v0: float) -> None:
     assert path.normal_force == pytest.approx(size, abs=OF_LENGTH * size.max(), rel=0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("v0", [0.0, 9.0])
 def test_the_contact_force_in_a_frame_that_turns(v0: float, tmp_path: Path) -> None:
     """The Coriolis part has the sign of the direction of launch, and from rest that of the side of the launch."""

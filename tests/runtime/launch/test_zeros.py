@@ -235,7 +235,7 @@ def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -
     assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("scale", [1e3, 1.0, 1e-3, 1e-6, 1e-12])
 def test_an_exponential_wall_of_any_width(generated_folder: Any, scale: float, direction: int) -> None:

@@ -389,7 +389,7 @@ def test_each_change_of_contact_is_an_event(lam0: float, v0: float, direction: i
     assert np.all(force[:-1] * force[1:] < 0.0)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("lam0", "v0", "b", "end"),
     [

@@ -142,7 +142,7 @@ CUSP_FORCES = {
 }
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("force", CUSP_FORCES)
 @pytest.mark.parametrize(("lam0", "direction"), [(-1.5, 1), (1.25, -1)])
 def test_a_load_that_grows_without_bound(force: str, lam0: float, direction: int, tmp_path: Path) -> None:

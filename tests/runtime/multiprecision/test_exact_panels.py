@@ -23,7 +23,7 @@ def planes() -> ModuleType:
     return load(ROOT / "generated" / "planes.py", "planes")
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("lam0", "v0", "direction"), LAUNCHES)
 def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, planes: ModuleType) -> None:
     """V**2 along the motion is that of the height lost, and the bound on places is useful."""

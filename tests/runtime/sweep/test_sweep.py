@@ -399,7 +399,7 @@ def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
             assert value == pytest.approx(float(time_of_flight(mpf(v0))), rel=1e-13)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("omega", [0.7, 2.0, 3.0, 4.0])
 def test_a_hoop_that_turns(omega: float) -> None:
     """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above it."""
@@ -430,7 +430,7 @@ WIDE = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", WIDE)
 def test_wide_orbits_stay_in_batches(name: str, generated_folder: Path) -> None:
     """Half periods of orbits as wide as possible have all digits."""

@@ -76,8 +76,9 @@ MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15,
 # The same for all librations whose turning points are known to more digits than a double has.
 MIN_EXACT_RATIO = 0.03
 
-# The distance of an end from zero, in widths of the orbit, from which on its rounding counts.
-FAR = 2.0
+# The distance of an end from zero, in widths of the orbit, from which on its rounding counts, because it is more than
+# that of the width.
+FAR = 1.0
 
 # The share of an orbit over which the slope of the potential changes in proportion to the distance from an end.
 NEAR = 2.0**-20
@@ -101,7 +102,7 @@ def contains_nan(row):  # type: ignore[no-untyped-def]
 def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-untyped-def]
     """Fill the roundings of one end of each orbit, and dU/dlam there if any of them counts; return whether any does.
 
-    They count as 0 where the end is nearer to zero than some widths of the orbit.
+    They count as 0 where the end is nearer to zero than the width of the orbit.
     """
     ends = rows[END_LOW if from_below else END_HIGH, :n]
     offset_low, offset_high, start = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[LAUNCH_PLACE, :n]

@@ -145,6 +145,7 @@ def test_planar_rail_is_the_case_without_y(tmp_path: Path) -> None:
     assert times[0] == pytest.approx(times[1], rel=1e-15)
 
 
+@pytest.mark.extended
 def test_curves_with_formulas(tmp_path: Path) -> None:
     """A helix by its formulas and its continuation by rates are one helix; if they do not meet, the message says
     where.

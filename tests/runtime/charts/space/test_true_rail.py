@@ -21,6 +21,7 @@ COILED = {"start": (0, 0, "-R"), "heading": ("atan(R/c)", 0), "parameters": {"R"
 WAVES = {"x": "c*(u - 4)", "y": "R*sin(u - 4)", "z": "-R*cos(u - 4)", "parameter": "u", "domain": (0, 4)}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "pieces",
     [

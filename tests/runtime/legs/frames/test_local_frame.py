@@ -63,7 +63,7 @@ def pairs(tmp_path_factory: pytest.TempPathFactory) -> Pairs:
     return make
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("shape", ["pendulum", "parabola"])
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/2", "-1e-3", "1e-5", "-1e-9", "1e-13"])
@@ -273,6 +273,7 @@ def test_small_swings_where_a_chart_begins(seed: int, ring: ModuleType) -> None:
             assert motion.error_bound(t) <= max(2e-14, 1e-10 * abs(lam0))
 
 
+@pytest.mark.extended
 def test_many_nodes_in_one_call(tmp_path: Path) -> None:
     """The force next to an equilibrium is the same for the 72 nodes of a whole leg as for one place after another.
 

@@ -38,6 +38,7 @@ def test_many_swings_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             assert abs(abs(mpf(leg.lam_end) - 1) / truth - 1) <= ENDS_OF_SWINGS
 
 
+@pytest.mark.extended
 def test_swings_that_are_too_wide_for_a_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Through points of a cycloid, swings wider than the pieces next to the bottom are followed by places, without an
     attempt to fit the force there after each of them; they turn as on the cycloid, but for the error of the spline.

@@ -158,6 +158,7 @@ def test_barriers_are_not_jumped(tmp_path: Path) -> None:
         assert (left > 0).all()
 
 
+@pytest.mark.extended
 def test_wells_within_wells(module_of: ModuleOf) -> None:
     """In a double well the outer orbits are their own mirror images, and the inner ones are not; both may be in one
     batch.
