@@ -40,6 +40,7 @@ from gqm_sym.runtime.gradients.programs import (
     turning_point_program,
 )
 from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
+from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
@@ -110,10 +111,17 @@ class PassageChanges:
 
     @cached_property
     def launch(self) -> Place:
-        """The launch place."""
+        """The launch place. From a cusp times do not change with it: places as far apart in time from it as before are
+        as far from the cusp.
+        """
         moves, lam0 = np.zeros((3, self.source.variables)), self._problem.launch.lam0
-        moves[0, self.source.parameters] = 1.0
+        moves[0, self.source.parameters] = 0.0 if self._starts_at_cusp else 1.0
         return Place(lam0.value, lam0.low, moves)
+
+    @cached_property
+    def _starts_at_cusp(self) -> bool:
+        """Whether the body is released at rest from a cusp."""
+        return self._problem.w0 == 0.0 and is_cusp(self._problem, self._problem.lam0)
 
     @cached_property
     def turn(self) -> Place:
@@ -241,7 +249,8 @@ class PassageChanges:
         # With a speed the body passes the launch later than its turning point, or comes back to it.
         at = np.array([self.launch.high])
         half_slope, ds = self._local(at)[1, 0, 0], self._path(at)[DS, 0, 0]
-        slopes[self.source.parameters + 1] -= problem.launch.direction * self._heading * ds / abs(half_slope)
+        delay = np.nan if self._starts_at_cusp else ds / abs(half_slope)
+        slopes[self.source.parameters + 1] -= problem.launch.direction * self._heading * delay
         return slopes
 
     def _local(self, lam: Array) -> Array:

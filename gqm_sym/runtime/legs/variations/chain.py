@@ -10,7 +10,7 @@ A change of an origin has ORIGIN_ROWS rows with a number for each variable, whic
 v0: sigma, y, ``delay``, and ``arc``, the change of the arc length from launch, less ds/dlam times that of the place.
 """
 
-from math import fabs, inf, sqrt
+from math import fabs, inf, nan, sqrt
 
 import numpy as np
 from numba import types
@@ -46,6 +46,9 @@ from gqm_sym.runtime.legs.variations.equation import (
 from gqm_sym.runtime.legs.variations.solving import jump, solve_panels
 
 SIGMA, Y, DELAY, ARC, ORIGIN_ROWS = range(5)
+
+# At a cusp ds/dlam is no larger than this share of its value in the middle of the first panel.
+CUSP_SHARE = 1e-10
 
 # The launch speed, the chosen direction, and the force dW/dlam on a body at rest that moves the other way.
 THROWN = types.UniTuple(REAL, 3)
@@ -106,17 +109,21 @@ def go_back(origin, solutions, parameters, force, step, rate):  # type: ignore[n
 
 
 @Inner
-def launched(moves, thrown, heading, ds, force, origin):  # type: ignore[no-untyped-def]
-    """Fill the change of the launch, given ds/dlam and dW/dlam there; ``moves`` is that of the launch place.
+def launched(moves, thrown, heading, ds, ds_ahead, force, origin):  # type: ignore[no-untyped-def]
+    """Fill the change of the launch, given ds/dlam there and ahead, and dW/dlam; ``moves`` is that of the launch place.
 
-    A body at rest that is thrown the other way comes back with little less speed.
+    A body at rest that is thrown the other way comes back with little less speed. At a cusp, where ds/dlam and dW/dlam
+    vanish, times after a release at rest do not change with the place; the change with the speed does not follow from
+    the former, and is NaN.
     """
     (v0, direction, other_force), last = thrown, moves.size - 1
     origin[:, :] = 0.0
     for i in range(moves.size):
         origin[SIGMA, i], origin[ARC, i] = moves[i], -(ds * moves[i])
     origin[Y, last] = 2.0 * v0
-    if v0 == 0.0:
+    if v0 == 0.0 and ds <= CUSP_SHARE * ds_ahead:
+        origin[SIGMA, last - 1], origin[DELAY, last] = 0.0, nan
+    elif v0 == 0.0:
         origin[DELAY, last] = -2.0 * ds / fabs(force) if direction == heading else 2.0 * ds / fabs(other_force)
 
 
@@ -155,7 +162,8 @@ def follow(laid, law, moves, thrown, lap, breaks, timed):  # type: ignore[no-unt
     origins, ends = np.empty((2 * runs, ORIGIN_ROWS, n + 2)), np.empty((runs, ORIGIN_ROWS, n + 2))
     rows = solutions.shape[1] * WIDE
     solve_panels(panels, first, law, n, breaks, solutions, timed)
-    launched(moves, thrown, records[begins[0] + HEADING], law[0, 0], law[n + 2, 0], origin)
+    ahead = law[0, MARKS * runs + COUNT // 2]
+    launched(moves, thrown, records[begins[0] + HEADING], law[0, 0], ahead, law[n + 2, 0], origin)
     forces, laps = law[n + 2, MARKS * runs :], 0.0
     for k in range(runs):
         record, ds = records[begins[k] :], law[0, k]

@@ -13,6 +13,7 @@ from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
+from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.parts.positions import Positions
@@ -83,20 +84,26 @@ class Derivatives(Positions):
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
     def _check_known(self, what: str, names: Iterable[str], values: Iterable[Any]) -> None:
-        """Refuse derivatives along a charted curve with respect to parameters near which there is no such curve.
+        """Refuse derivatives along a charted curve with respect to parameters near which there is no such curve, and
+        with respect to the launch of a body that is released at rest from a cusp.
 
         Raises
         ------
         SolutionError
             If there are such parameters.
         """
-        if self.problem.formulas.chart is None:
+        problem, charted = self.problem, self.problem.formulas.chart is not None
+        if not charted and problem.w0 != 0.0:
             return
         unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
-        if unknown:
+        if unknown and (charted or is_cusp(problem, problem.lam0)):
+            why = (
+                "the curve does not exist for neighbouring values (an exponent of a negative number must be an integer)"
+                if charted
+                else "the body is released at rest from a cusp, about which ds and the slope of the potential vanish"
+            )
             raise SolutionError(
-                f"{what}: there is no derivative with respect to {', '.join(unknown)}, because the curve does not "
-                "exist for neighbouring values (an exponent of a negative number must be an integer); name the others "
+                f"{what}: there is no derivative with respect to {', '.join(unknown)}, because {why}; name the others "
                 "in wrt"
             )
 

@@ -15,6 +15,7 @@ from gqm_sym.errors import SolutionError
 
 STEP = mpf(10) ** -15
 FIELDS = ("lam", "s", "x", "z", "v", "normal_force")
+RUBBING = gqm.Gravity() + gqm.CoulombFriction(mu=0)
 
 
 @pytest.fixture(scope="module")
@@ -191,3 +192,28 @@ def test_lifted_off_at_once(generated_folder: Path) -> None:
             np.testing.assert_allclose(list(motion.gradient(quantity, names).values()), wanted, rtol=1e-13)
         for quantity in ("v_min", "v_max"):
             np.testing.assert_allclose(list(motion.gradient(quantity, names).values()), [0, 1, 0], atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "force", [gqm.Gravity(), pytest.param(RUBBING, marks=pytest.mark.extended)], ids=["free", "rubbing"]
+)
+def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None:
+    """Along a cycloid released from its cusp, the angle of the wheel is sqrt(g/R) times the time, and does not
+    change with the launch place in first order. The derivative by the launch speed is refused, because the slopes that
+    it follows from vanish; it was NaN, and that by the launch place wrong.
+    """
+    wheel = {"x": "R*(u - sin(u))", "z": "R*(cos(u) - 1)", "parameter": "u", "domain": (0, 3)}
+    curve = gqm.Curve.parametric(**wheel, parameters={"R": "1/2"})
+    name = f"released_from_a_cusp_{force is RUBBING}"
+    module = gqm.build(gqm.derive(curve, force), name=name, folder=generated_folder)
+    motion, given = module.solve(0), (0.5, 9.81)
+    time = 2.0 * np.sqrt(given[0] / given[1])
+    assert motion.time_at(2) == pytest.approx(time, rel=1e-15)
+    names, wanted = ("R", "g", "lam0"), [0.5 * time / given[0], -0.5 * time / given[1], 0.0]
+    assert list(motion.gradient("time_at", names, lam=2).values()) == pytest.approx(wanted, rel=1e-14, abs=1e-15)
+    for ask in (lambda: motion.gradient("time_at", lam=2), lambda: motion.sensitivity([0.1, 0.2])):
+        with pytest.raises(SolutionError, match="respect to v0, because the body is released at rest from a cusp"):
+            ask()
+    swept = module.sweep("time_at", lam0=[0.0, 0.0], lam=2.0, gradient=(*names, "v0")).gradient
+    np.testing.assert_allclose(swept[:, :3], [wanted, wanted], rtol=1e-14, atol=1e-15)
+    assert np.isnan(swept[:, 3]).all()
