@@ -227,7 +227,7 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
     # The first approximation is linear, with the slope of V**2 at the panel's start.
     linear_row(work, W, D, panel.v2, slope_at_start(forces, march, panel, work))
     last_change, is_constant = 0.0, False
-    for _ in range(MAX_ITERATIONS):
+    for k in range(MAX_ITERATIONS):
         if forces.squared_contact != 0:
             rub(march, panel, work)
         else:
@@ -241,7 +241,8 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
         copy_row(work, W, SPEED)
         if not change < inf:
             return inf
-        if is_constant or is_settled(change, last_change, size, forces.squared_contact != 0):
+        # The first approximation may be constant where V**2 is not, and so then is a law that depends on it.
+        if (is_constant and k > 0) or is_settled(change, last_change, size, forces.squared_contact != 0):
             return total
         last_change = change
     return inf

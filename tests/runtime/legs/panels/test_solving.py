@@ -73,3 +73,19 @@ def test_friction_past_places_where_the_contact_force_vanishes(build: Build, car
     assert abs(module.pass1(np.array([end]), lam0=begin, v0="13.2", mu="0.05").v2[0] - w) <= ERROR * w
     swept = module.sweep("time_at", begin, 13.2, lam=end, mu=0.05)
     assert abs(float(swept.values) - time) <= ERROR * time
+
+
+def test_a_law_that_depends_on_speed_alone(build: Build) -> None:
+    """Up a straight track with friction and a resistance c v, the deceleration is a + c v, so that the body rests after
+    the time log(1 + c v0/a)/c. The force does not depend on the place, but is not constant.
+    """
+    force = gqm.CoulombFriction() + gqm.Kernel.law("-c*direction*sqrt(W)")
+    module = build("rubbing_up_a_line", gqm.Curve.graph("3*x/4"), force)
+    motion = module.solve(0, "1.1", mu="4/5", c="0.3", g="9.81")
+    rate = mpf("9.81") * (mpf(3) / 5 + mpf(4) / 5 * mpf(4) / 5)
+    with mp.workdps(30):
+        time = mp.log(1 + mpf("0.3") * mpf("1.1") / rate) / mpf("0.3")
+        place = (mpf("1.1") - rate * time) / mpf("0.3") * mpf(4) / 5
+    assert (len(motion.legs), motion.legs[0].end) == (1, "rest")
+    assert abs(motion.t_end - float(time)) <= ERROR * float(time)
+    assert abs(motion.legs[0].lam_end - float(place)) <= ERROR * float(place)
