@@ -188,6 +188,15 @@ def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def is_constant(work):  # type: ignore[no-untyped-def]
+    """Return whether the force on a panel is constant."""
+    same = True
+    for j in range(COUNT):
+        same = same and work[P + j] == work[P] and work[Q_RATE + j] == 0.0
+    return same
+
+
+@Inner
 def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore[no-untyped-def]
     """Return whether the rows from W_FACTOR to ``last`` are resolved, and the contact force as far as that is required;
     and the largest ratio of their middle coefficients to their sizes.
@@ -195,6 +204,9 @@ def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore
     fine, worst = are_resolved(work, W_FACTOR, last)
     if request.resolve_load:
         load_fine, ratio = is_load_resolved(work)
+        # Beside a zero of N the panel is so narrow that friction is constant, and a kink of |N| needs no resolution.
+        if not load_fine and forces.friction and not forces.linear and is_constant(work):
+            load_fine, ratio = True, 0.0
         fine, worst = fine and load_fine, max(worst, ratio)
     if request.resolve_length:
         fill_length(forces, march, panel, work)

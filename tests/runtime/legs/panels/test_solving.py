@@ -75,6 +75,19 @@ def test_friction_past_places_where_the_contact_force_vanishes(build: Build, car
     assert abs(float(swept.values) - time) <= ERROR * time
 
 
+def test_a_train_of_one_car_past_a_place_without_contact_force(build: Build) -> None:
+    """On a hill in the plane, the contact force of the only car has nothing else that it is small against."""
+    hill = gqm.Curve.piecewise([gqm.arc(radius="20", angle="-2.6")], start=(0, 0), heading="1.3")
+    module = build("hill_for_one_car", hill, gqm.CoulombFriction() + gqm.Train(length=6, cars=1))
+    with mp.workdps(30):
+        w, time, found = over_the_hill("13.2", "0.05", 6.0, 1)
+    assert found == 2
+    begin, end = RADIUS * (STEEPEST - START), RADIUS * (STEEPEST - STOP)
+    motion = module.solve(begin, "13.2", mu="0.05")
+    assert abs(motion.time_at(end) - time) <= ERROR * time
+    assert abs(motion.state(float(time)).v2 - w) <= 1e-12 * w
+
+
 def test_a_law_that_depends_on_speed_alone(build: Build) -> None:
     """Up a straight track with friction and a resistance c v, the deceleration is a + c v, so that the body rests after
     the time log(1 + c v0/a)/c. The force does not depend on the place, but is not constant.
