@@ -111,8 +111,8 @@ class PassageChanges:
 
     @cached_property
     def launch(self) -> Place:
-        """The launch place. From a cusp times do not change with it: places as far apart in time from it as before are
-        as far from the cusp.
+        """The launch place. At a cusp it counts as fixed: times after a release at rest there do not depend on it to
+        first order.
         """
         moves, lam0 = np.zeros((3, self.source.variables)), self._problem.launch.lam0
         moves[0, self.source.parameters] = 0.0 if self._starts_at_cusp else 1.0

@@ -131,6 +131,18 @@ def slope_at_start(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def improve(march, panel, work):  # type: ignore[no-untyped-def]
+    """Set V**2 in the row W to that by the law in the rows P, Q and Q_RATE; return q over the panel, the change and the
+    size of V**2. If the panel is too wide, q is inf.
+    """
+    total = integrate(march, panel, SPEED, work)
+    difference_row(work, W, SPEED, W)
+    change, size = size_of_block(work, W), size_of_block(work, SPEED)
+    copy_row(work, W, SPEED)
+    return total if change < inf else inf, change, size
+
+
+@Inner
 def is_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
     """Return whether N almost vanishes somewhere on a panel, which is so narrow that V**2 follows from friction for the
     approximation before.
@@ -176,12 +188,9 @@ def solve_beside_zero(march, panel, work):  # type: ignore[no-untyped-def]
     last_change = 0.0
     for _ in range(MAX_ITERATIONS):
         rub_beside_zero(march, panel, work)
-        total = integrate(march, panel, SPEED, work)
+        total, change, size = improve(march, panel, work)
         if not total < inf:
             return inf
-        difference_row(work, W, SPEED, W)
-        change, size = size_of_block(work, W), size_of_block(work, SPEED)
-        copy_row(work, W, SPEED)
         if change <= ROUNDED * size or change * change <= ROUNDED * size * last_change:
             return total
         last_change = change
@@ -233,13 +242,8 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
         else:
             sample(forces, march, panel, work)
             is_constant = forces.friction and is_law_constant(march, panel, work)
-        total = integrate(march, panel, SPEED, work)
+        total, change, size = improve(march, panel, work)
         if not total < inf:
-            return inf
-        difference_row(work, W, SPEED, W)
-        change, size = size_of_block(work, W), size_of_block(work, SPEED)
-        copy_row(work, W, SPEED)
-        if not change < inf:
             return inf
         # The first approximation may be constant where V**2 is not, and so then is a law that depends on it.
         if (is_constant and k > 0) or is_settled(change, last_change, size, forces.squared_contact != 0):

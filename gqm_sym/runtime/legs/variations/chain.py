@@ -162,7 +162,8 @@ def follow(laid, law, moves, thrown, lap, breaks, timed):  # type: ignore[no-unt
     origins, ends = np.empty((2 * runs, ORIGIN_ROWS, n + 2)), np.empty((runs, ORIGIN_ROWS, n + 2))
     rows = solutions.shape[1] * WIDE
     solve_panels(panels, first, law, n, breaks, solutions, timed)
-    ahead = law[0, MARKS * runs + COUNT // 2]
+    # Where no times are needed, ds/dlam is not known.
+    ahead = law[0, MARKS * runs + COUNT // 2] if timed else -inf
     launched(moves, thrown, records[begins[0] + HEADING], law[0, 0], ahead, law[n + 2, 0], origin)
     forces, laps = law[n + 2, MARKS * runs :], 0.0
     for k in range(runs):
