@@ -13,6 +13,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     LOAD,
     MEAN,
     N0,
+    NODES,
     OFFSET,
     Q_RATE,
     SERIES,
@@ -21,6 +22,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     W_FACTOR,
     D,
     P,
+    Q,
     W,
     load_size_row,
     product,
@@ -61,6 +63,10 @@ LINEAR_LOGARITHM = ONE + ONE // DEGREES
 
 # The distance of a singularity from the panel's middle, in half widths, if coefficients decrease by that factor.
 SINGULARITY_DISTANCE = 0.5 * (DECREASE + 1.0 / DECREASE)
+
+# A change of Q from node to node is a jump if it is more than this share of all its changes on a panel, and alters the
+# logarithm of V**2 by more than rounding.
+JUMP_SHARE, ROUNDED_CHANGE = 0.25, 1e-14
 
 # A safety factor on the width of panels, and the largest factor by which they grow.
 SAFETY_FACTOR, MAX_GROWTH = 0.9, 4.0
@@ -208,6 +214,24 @@ def kink(work):  # type: ignore[no-untyped-def]
     if not examine(work, LOAD, size)[2]:
         return -1.0
     return first_change_of(work, LOAD, 0, CANCELLATION_NOISE * size)[0]
+
+
+@Inner
+def first_jump(at_start, work):  # type: ignore[no-untyped-def]
+    """Return the shares of a panel at the node that is one before the first jump of Q, and at the node behind it; or 1
+    and 2 if there is none. At the start Q is ``at_start``, and both ends count as nodes.
+
+    Where friction has a kink, its derivative with respect to V**2 jumps. Between the first node returned and the jump
+    there is some room, so that a panel that begins there has nodes on both sides of it.
+    """
+    low, high = extent(work, Q)
+    least = max(JUMP_SHARE * (high - low), ROUNDED_CHANGE / work[D + COUNT])
+    earlier, before, value = 0.0, 0.0, at_start
+    for j in range(WIDE):
+        if fabs(work[Q + j] - value) > least:
+            return earlier, work[NODES + j]
+        earlier, before, value = before, work[NODES + j], work[Q + j]
+    return 1.0, 2.0
 
 
 @Inner

@@ -52,9 +52,14 @@ from gqm_sym.runtime.legs.panels.equation import (
     slope_at,
 )
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of, size_of_block
+from gqm_sym.runtime.legs.panels.resolution import first_jump
 
 # The largest number of iterations for forces that are not linear in V**2.
 MAX_ITERATIONS = 40
+
+# After this iteration V**2 is known so well that a kink of friction shows on panels that contain one, where no
+# polynomial resolves V**2.
+ROUGH_ITERATIONS = 2
 
 # The change of V**2 in an iteration as a share of its largest value that is rounding only; and a share below which it
 # is, if changes do not decrease any more.
@@ -232,6 +237,15 @@ def is_settled(change, last_change, size, is_contact_known):  # type: ignore[no-
 
 
 @Inner
+def may_jump(forces, march):  # type: ignore[no-untyped-def]
+    """Return whether the derivative of friction with respect to V**2 may jump on a panel, as at kinks of the law.
+
+    On panels from a turn other laws than that of trains have a pole of it.
+    """
+    return forces.friction and not forces.linear and forces.squared_contact == 0 and march.g == 0.0
+
+
+@Inner
 def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
     """Do the work of `integrate` for forces that are not linear in V**2, by Newton's method; return inf if it does not
     converge.
@@ -251,6 +265,8 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
         # The first approximation may be constant where V**2 is not, and so then is a law that depends on it.
         if (is_constant and k > 0) or is_settled(change, last_change, size, forces.squared_contact != 0):
             return total
+        if k >= ROUGH_ITERATIONS and may_jump(forces, march) and first_jump(work[Q], work)[0] < 1.0:
+            return inf
         last_change = change
     return inf
 

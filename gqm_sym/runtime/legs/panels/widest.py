@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
     are_resolved,
     examine,
+    first_jump,
     growth,
     growth_towards,
     is_curve_resolved,
@@ -39,7 +40,11 @@ from gqm_sym.runtime.legs.panels.resolution import (
     set_sizes,
     size_at,
 )
-from gqm_sym.runtime.legs.panels.solving import begin_panel, solve_panel
+from gqm_sym.runtime.legs.panels.solving import begin_panel, may_jump, solve_panel
+
+# A panel that begins before a kink is by this factor wider than the part in which the kink is known to lie; and by how
+# much the panel behind one on which friction is constant may be wider.
+ROOM_BEHIND, GROWTH_BEHIND_KINK = 1.25, 1e6
 
 # A width of a few units in the last place of the curve's parameter.
 MIN_RELATIVE_WIDTH = 1e-15
@@ -218,6 +223,32 @@ def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore
 
 
 @Inner
+def jump_on(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Return `first_jump` of the law on a panel; 1 and 2 where it has no kinks, or is constant but for rounding."""
+    if not may_jump(forces, march) or is_constant(work):
+        return 1.0, 2.0
+    point = point_buffer()
+    place = within(march.origin[0] + (march.direction * distance(panel.left, march) + march.origin[1]), panel.span)
+    slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+    return first_jump(point[4], work)
+
+
+@Inner
+def before_jump(jump, factor, width):  # type: ignore[no-untyped-def]
+    """Return the width to try next where a panel is not resolved, and that to try on the panel behind it; the latter is
+    0 if nothing is known of it.
+
+    Up to a kink of friction the law is smooth, so that a panel may end next to it, and the next one begin with the
+    small part of the panel that contains the kink. Other panels become narrower by a factor.
+    """
+    before, behind = jump
+    if before == 1.0:
+        return factor * width, 0.0
+    reach = ROOM_BEHIND * (behind - before) * width
+    return (before * width, reach) if before > 0.0 else (min(reach, factor * width), 0.0)
+
+
+@Inner
 def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
     """Find the widest panel from a given start that can be resolved.
 
@@ -230,7 +261,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
     timed : bool
         Whether time is resolved.
     """
-    step, ends_at_kink, widest = request.step, False, 0.0
+    step, ends_at_kink, widest, next_width = request.step, False, 0.0, 0.0
     start, slope = distance(panel.left, march), slope_at(panel.left, march)
     unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
     # The rest of a leg may be hardly wider than the narrowest possible panel.
@@ -262,20 +293,26 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
                 continue
             load_row(work, LOAD, DS, N0, KAPPA, W)
         if not q < inf:
-            width, ends_at_kink = 0.5 * width, False
+            ends_at_kink = False
+            width, next_width = before_jump(jump_on(forces, march, panel, work), 0.5, width)
             continue
         largest_v2 = set_sizes(panel.v2, as_factor(panel.v2, march, panel.left), work)
         fine, worst = are_all_resolved(forces, march, panel, request, last, work)
         worst = max(worst, ratio)
-        factor = growth(worst)
-        if fine and not hides_cusp(forces, march, panel, work):
+        factor, jump = growth(worst), jump_on(forces, march, panel, work)
+        if fine and jump[0] == 1.0 and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
             is_tiny_part = width <= NOISE_WIDTH_RATIO * widest
             done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work)
             if is_at_cusp(length, unit, work):
                 return 0.0, step, False
+            if done and next_width > 0.0:
+                return width, next_width, timed
+            if done and may_jump(forces, march) and is_constant(work):
+                factor = GROWTH_BEHIND_KINK
             if done:
                 grown = width * factor
                 return width, max(step, grown) if ends_at_kink or width == request.max_width else grown, timed
-        width, ends_at_kink = narrower(width, factor), False
+        ends_at_kink = False
+        width, next_width = before_jump(jump, narrower(1.0, factor), width)
     return 0.0, step, False
