@@ -1,6 +1,6 @@
 """Names of run-time parameters and their exact default values."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from decimal import Decimal, Inexact, localcontext
 from fractions import Fraction
 from math import isfinite
@@ -211,12 +211,15 @@ def exact_value(value: Value) -> sp.Expr:
     return read_expression(value, where="default")
 
 
-def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Expr]:
-    """Return values of parameters with which to try a form: their defaults, or numbers near 1."""
-    return {
-        sp.Symbol(name, real=True): sp.Rational(17 + 2 * place, 16 + place) if value is None else exact_value(value)
-        for place, (name, value) in enumerate(defaults.items())
-    }
+def tried_values(defaults: Mapping[str, Value | None], small: Container[sp.Basic] = ()) -> dict[sp.Symbol, sp.Expr]:
+    """Return values of parameters with which to try a form: their defaults, or numbers near 1, or near 1/1000 for those
+    that are small beside the others.
+    """
+    tried = {}
+    for place, (name, value) in enumerate(defaults.items()):
+        symbol, number = sp.Symbol(name, real=True), sp.Rational(17 + 2 * place, 16 + place)
+        tried[symbol] = exact_value(value) if value is not None else number / 1000 if symbol in small else number
+    return tried
 
 
 def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> str:

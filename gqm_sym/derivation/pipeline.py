@@ -176,7 +176,9 @@ def _closed_forms(
     dxds, dyds, dzds = shape.tangent
     acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
-    axes, orbits = (None, None) if loss or curve.charted else _symmetry(curve, kernel, law, shape, tried_values(values))
+    # A rolling body is small beside its track; with a greater radius than the track's, hills and wells change places.
+    tried = tried_values(values, small=kernel.radius.free_symbols)
+    axes, orbits = (None, None) if loss or curve.charted else _symmetry(curve, kernel, law, shape, tried)
     start = {lam: LAM0}
     model = Model(
         curve=curve,

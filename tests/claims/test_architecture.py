@@ -189,6 +189,7 @@ TESTED_THROUGH = {
     "legs/runs/whole_rows.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/runs/whole_tables.py": "runtime/legs/runs/test_whole_leg.py",
     "legs/variations/chain.py": "runtime/legs/variations/test_changes.py",
+    "legs/variations/divided.py": "runtime/legs/panels/test_solving.py",
     "legs/variations/equation.py": "runtime/legs/variations/test_answers.py",
     "legs/variations/force_errors.py": "runtime/legs/test_leg_errors.py",
     "legs/variations/formula_changes.py": "runtime/legs/variations/test_answers.py",

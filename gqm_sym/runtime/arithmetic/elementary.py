@@ -156,6 +156,16 @@ def cos(x):  # type: ignore[no-untyped-def]
 
 
 @Inlined
+def square_beside_quarter_turns(x):  # type: ignore[no-untyped-def]
+    """Return whether an angle from 0 to pi/2 is nearer to pi/2, and the square of the sine of its distance from the
+    nearer of both: sin(x)**2 or cos(x)**2, the smaller one.
+    """
+    turns, r, over = reduced(x)
+    root = sine_kernel(r, over)
+    return turns & 1 == 1, root * root
+
+
+@Inlined
 def reduced_sum(phase, rate, middle, middle_low, offset):  # type: ignore[no-untyped-def]
     """Return what `reduced` would for ``phase + rate*(middle + middle_low + offset)`` if that were computed exactly.
 

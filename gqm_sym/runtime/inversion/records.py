@@ -42,7 +42,7 @@ from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.inversion.fourier import sum_wave
 from gqm_sym.runtime.inversion.table import TERMS, Table, look_up
 from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
-from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at
+from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at, place_on_libration
 from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block, sum_block
 
 # The number of times for which states are found together.
@@ -181,9 +181,13 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
         phase_angles_at(timing, kind, table, t[start:], n, phases)
-        for i in range(n):
-            place = place_at(kind, a, b, phi[i]) + laps[i] * lap
-            out[start + i] = launch if t[start + i] == 0.0 else place
+        if kind == TURN_TURN:
+            for i in range(n):
+                out[start + i] = choose(t[start + i] == 0.0, launch, place_on_libration(a, b, phi[i]))
+        else:
+            for i in range(n):
+                place = place_at(kind, a, b, phi[i]) + laps[i] * lap
+                out[start + i] = choose(t[start + i] == 0.0, launch, place)
 
 
 @Inlined

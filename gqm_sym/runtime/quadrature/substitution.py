@@ -20,7 +20,7 @@ from math import atan2, inf, log, pi, sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.elementary import cos, sin
+from gqm_sym.runtime.arithmetic.elementary import square_beside_quarter_turns
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.types import Array
@@ -101,10 +101,17 @@ def places_at(
 
 
 @Inlined
+def place_on_libration(a, b, phi):  # type: ignore[no-untyped-def]
+    """Return the curve parameter at one phase angle of a TURN_TURN segment, from the nearer end."""
+    width = b - a
+    beyond, share = square_beside_quarter_turns(0.5 * phi)
+    return choose(beyond, b - width * share, a + width * share)
+
+
+@Inlined
 def place_at(kind, a, b, phi):  # type: ignore[no-untyped-def]
     """Return the curve parameter at one phase angle of a TURN_TURN or REGULAR segment, from the nearer end."""
-    width = b - a
     if kind == TURN_TURN:
-        s, c = sin(0.5 * phi), cos(0.5 * phi)
-        return choose(phi < 0.5 * pi, a + width * (s * s), b - width * (c * c))
+        return place_on_libration(a, b, phi)
+    width = b - a
     return choose(phi <= 0.5, a + width * phi, b - width * (1.0 - phi))

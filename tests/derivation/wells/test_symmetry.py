@@ -65,3 +65,10 @@ def test_symmetry(name: str) -> None:
                 assert abs(ds(axes[0] + away) - ds(axes[0] - away)) <= mpf("1e-25") * (1 + abs(ds(axes[0] + away)))
         signs = {mp.sign(slope(axes[0] + (axes[1] - axes[0] or 9) * mpf(k) / 10)) for k in range(1, 10)}
     assert not monotone or len(signs) == 1
+
+
+def test_a_rolling_body_of_unknown_radius_swings_about_the_bottom_of_its_track() -> None:
+    """The radius of a body is less than that of a circle in which it rolls, so the well of its centre is at 0, too."""
+    model = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.Rolling(radius="rho"))
+    assert model.symmetry is not None
+    assert model.symmetry.place == 0

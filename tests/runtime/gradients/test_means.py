@@ -123,6 +123,16 @@ def test_periods(hoop: ModuleType, time: Callable[..., Any], quantity: str, v0: 
     assert swept.gradient[0] == pytest.approx(truth, rel=ROUNDING, abs=ROUNDING)
 
 
+def test_a_train_at_rest_with_an_end_on_a_joint(hoop: ModuleType) -> None:
+    """The turning point lies where two polynomials meet, which differ by their rounding."""
+    constants = {**CONSTANTS, "length": 2 * PLACE, "k": mpf(0), "Omega": mpf(0)}
+    motion = hoop.solve("6/5", 0, **{name: str(value) for name, value in constants.items()})
+    found = motion.gradient("half_period")
+    with mp.workdps(30):
+        truth = {name: derivative(half_period, name, 0, constants) for name in ("lam0", "length", "g", "L")}
+    assert {name: found[name] for name in truth} == pytest.approx(truth, rel=ROUNDING)
+
+
 @pytest.mark.extended
 def test_a_fixed_shape_needs_no_neighbours(hoop: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """The changes along the track, which are dear, are made only for what shapes the means, and once for the same

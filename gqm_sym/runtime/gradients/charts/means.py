@@ -46,6 +46,9 @@ MAX_SLOPE = 0.5
 # A curve in space has one coordinate without a force and two with one.
 MOST_MEANS = 2
 
+# The largest difference of functions on both sides of an edge, as a share of their values, that is rounding.
+MAX_ROUNDING = 1e-13
+
 
 def on_curve_of_means(problem: Problem) -> Problem:
     """Return the launch of a body whose times are those of a train. Its curve is kept with the run-time parameters.
@@ -68,7 +71,7 @@ def _with_curve_of_means(formulas: Formulas, given: ParameterValues) -> tuple[Fo
     assert isinstance(train, TrackOfTrain)
     means = _means_of(train, len(values))
     chart = chart_with(train, values)
-    records = _coordinates_of(train, chart, values, means, formulas.inertia)
+    records, _ = _coordinates_of(train, chart, values, means, formulas.inertia)
     steepest = (float(np.abs(record[:, 6 + 2 * TERMS : 6 + 3 * TERMS]).sum(axis=1).max()) for record in records)
     scales = tuple(2.0 ** (frexp(slope / MAX_SLOPE)[1]) if slope else 1.0 for slope in steepest)
     shape = shape_of(train, values, 1.0) if means else values
@@ -110,13 +113,16 @@ def _coordinates_of(
     values: tuple[float, ...],
     means: tuple[int, ...],
     inertia: Callable[..., Any] | None,
-) -> list[Array]:
-    """Return the means that are coordinates, or the whole effective potential, as records of charts."""
+) -> tuple[list[Array], Array]:
+    """Return the means that are coordinates, or the whole effective potential, as records of charts, and the edges of
+    their pieces.
+    """
     size = int(chart.block[0])
     start = size * (3 + chart.banked if isinstance(chart, SpaceChart) else 1)
     step, factors = int(chart.block[start]), _factors(train, inertia, FLOATS, values)
     found = [records_in(chart.block[start + mean * step :]) for mean in (means or range(len(factors)))]
-    return found if means else [sum_of_records(list(zip(factors, found, strict=True)))]
+    edges = chart.block[start + EDGES : start + EDGES + len(found[0]) + 1]
+    return (found if means else [sum_of_records(list(zip(factors, found, strict=True)))]), edges
 
 
 def _factors(train: TrackOfTrain, inertia: Callable[..., Any] | None, op: Any, p: Any) -> list[Any]:
@@ -141,6 +147,38 @@ def sum_of_records(parts: Sequence[tuple[float, Array]]) -> Array:
     total[:, 4] = wide
     total[:, 5] = wide - total[:, 4]
     return total
+
+
+def matched(records: Array, edges: Array, *, is_closed: bool) -> Array:
+    """Return the records of functions with two more numbers each, by which functions on both sides of an edge agree.
+
+    Where two polynomials meet they differ by their rounding. A body that turns there has V**2 = 0 on one of them only,
+    and the integrals over its motion would have half the digits. The numbers are a constant and a slope, with respect
+    to the variable of the piece, that are added to its polynomial. Larger differences are left as they are.
+
+    Parameters
+    ----------
+    records : (k, pieces, RECORD) array
+        The records.
+    edges : (pieces + 1,) array
+        The edges of the pieces.
+    is_closed : bool
+        Whether the first piece follows the last one.
+    """
+    count = edges.size - 1
+    before = np.arange(count if is_closed else count - 1)
+    after = (before + 1) % count
+    found = np.concatenate([records, np.zeros((*records.shape[:2], 2))], axis=2)
+    sides = np.empty((2, records.shape[0], 2, before.size))
+    for side, pieces, places in zip(sides, (before, after), (edges[before + 1], edges[after]), strict=True):
+        fill_functions(found, pieces, np.stack([places, np.zeros_like(places)]), side)
+    jumps = (sides[0] - sides[1]).sum(axis=1)
+    is_rounding = np.abs(jumps) <= MAX_ROUNDING * np.abs(sides[0, :, 0]).max(axis=1, initial=0.0, keepdims=True)
+    ends = np.zeros((2, *records.shape[:2]))
+    ends[0][:, after] = np.where(is_rounding, 0.5 * jumps, 0.0)
+    ends[1][:, before] = -ends[0][:, after]
+    found[:, :, RECORD:] = np.stack([0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])], axis=2)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +252,8 @@ class CurveOfMeans:
         values = tuple(number.value for number in p)
         if shape_of(self, values, 1.0) != shape_of(self, self.given, 1.0):
             return None
-        records = _coordinates_of(self.train, chart, values, self.means, self.inertia)
+        found, edges = _coordinates_of(self.train, chart, values, self.means, self.inertia)
+        records = matched(np.stack(found), edges, is_closed=chart.period > 0.0)
         return _Pieces(chart, _sampler(chart, records, self.scales), in_space=len(self.means) > 1)
 
 
@@ -229,7 +268,7 @@ class _Pieces(TruePieces):
 
 @Inner
 def value_on(record, s, s_low):  # type: ignore[no-untyped-def]
-    """Return a function and its slope at a place, two doubles each, from the record of a piece of its chart."""
+    """Return a function and its slope at a place, two doubles each, from the record of a piece (`matched`)."""
     u, u_low = add(s, s_low, -record[0], 0.0)
     u, u_low = multiply(u, u_low, record[1], 0.0)
     value, value_low, slope, slope_low = 0.0, 0.0, 0.0, 0.0
@@ -240,8 +279,18 @@ def value_on(record, s, s_low):  # type: ignore[no-untyped-def]
         value, value_low = add(value, value_low, record[6 + TERMS + j], 0.0)
     whole, whole_low = two_sum(record[4], record[5])
     value, value_low = add(value, value_low, whole, whole_low)
+    value, value_low = add(value, value_low, record[RECORD] + record[RECORD + 1] * u, 0.0)
+    slope, slope_low = add(slope, slope_low, record[RECORD + 1], 0.0)
     slope, slope_low = multiply(slope, slope_low, record[1], 0.0)
     return value, value_low, slope, slope_low
+
+
+@entry(types.void(types.float64[:, :, ::1], types.int64[::1], MATRIX, types.float64[:, :, ::1]))
+def fill_functions(records, pieces, s, found):  # type: ignore[no-untyped-def]
+    """Fill functions at places of two doubles each, as two doubles each, from their records on all pieces."""
+    for k in range(records.shape[0]):
+        for i in range(pieces.size):
+            found[k, 0, i], found[k, 1, i], _, _ = value_on(records[k, pieces[i]], s[0, i], s[1, i])
 
 
 @entry(types.void(MATRIX, VECTOR, REAL, REAL, MATRIX, types.float64[:, :, ::1], types.float64[:, :, ::1]))
@@ -250,8 +299,8 @@ def fill_samples(records, scales, low, high, nodes, integrals, samples):  # type
 
     Parameters
     ----------
-    records : (d, RECORD) array
-        The pieces of the charts of all means there.
+    records : (d, RECORD + 2) array
+        The pieces of the charts of all means there (`matched`).
     scales : (d,) array
         The means over the coordinates.
     low, high : float
@@ -287,7 +336,7 @@ def fill_samples(records, scales, low, high, nodes, integrals, samples):  # type
         samples[0, 0, i], samples[0, 1, i] = multiply(total, total_low, half, half_low)
 
 
-def _sampler(chart: Chart, records: list[Array], scales: tuple[float, ...]) -> Callable[[int], Samples]:
+def _sampler(chart: Chart, records: Array, scales: tuple[float, ...]) -> Callable[[int], Samples]:
     """Return the function that samples a piece (`charts.double_double.pieces`)."""
     edges, sizes = chart.edges.tolist(), np.array(scales)
 

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numba import types
 
 from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, Chart, SpaceChart
-from gqm_sym.runtime.charts.evaluate import TERMS
+from gqm_sym.runtime.charts.evaluate import RECORD, TERMS
 from gqm_sym.runtime.charts.train import (
     Charted,
     blocks_of_functions,
@@ -25,14 +24,14 @@ from gqm_sym.runtime.charts.train import (
     slopes_by_length,
     up_to_last,
 )
-from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import MATRIX, Array
+from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.charts.means import (
     CurveOfMeans,
+    fill_functions,
+    matched,
     path_not_asked_for,
     records_in,
     sum_of_records,
-    value_on,
 )
 from gqm_sym.runtime.gradients.charts.orbit import path_along, source_along
 from gqm_sym.runtime.gradients.charts.shaped_pieces import shaped_pieces
@@ -117,8 +116,8 @@ class ChangesOfTrain:
         The derivatives of the relative change of arc lengths by the run-time parameters.
     ranges : (2, n) array
         Those of the labels at both ends of the range of the train's middle.
-    records : (1 + n, pieces, RECORD) array
-        The potential and its derivatives as functions of the label, as records of charts (`charts.evaluate`).
+    records : (1 + n, pieces, RECORD + 2) array
+        The potential and its derivatives as functions of the label, as records of charts (`means.matched`).
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -138,7 +137,7 @@ class ChangesOfTrain:
         for k in range(self.count):
             share = float(k == train.length) - self.strains[k] * self._length
             found[1 + k] = sum_of_records([(1.0, found[1 + k]), (share, by_length)])
-        self.records = np.stack(found)
+        self.records = matched(np.stack(found), edges, is_closed=track.period > 0.0)
         self._edges = edges
 
     def _along_track(self, track: Chart) -> list[Charted]:
@@ -200,7 +199,7 @@ class ChangesOfTrain:
         s = self.reduced(s)
         rows = self.records[:, self._pieces(s)]
         powers = np.vander((s - rows[0, :, 0]) * rows[0, :, 1], TERMS, increasing=True)
-        terms = rows[:, :, 6 + TERMS :].reshape(*rows.shape[:2], -1, TERMS)
+        terms = rows[:, :, 6 + TERMS : RECORD].reshape(*rows.shape[:2], -1, TERMS)
         found: Array = np.einsum("knrj,nj->rkn", terms, powers)
         found[0] += rows[:, :, 4]
         return found
@@ -230,11 +229,3 @@ def changes_of(problem: Problem) -> ChangesOfTrain:
         kept["changes"] = ChangesOfTrain(problem)
     changes: ChangesOfTrain = kept["changes"]
     return changes
-
-
-@entry(types.void(types.float64[:, :, ::1], types.int64[::1], MATRIX, types.float64[:, :, ::1]))
-def fill_functions(records, pieces, s, found):  # type: ignore[no-untyped-def]
-    """Fill functions at places of two doubles each, as two doubles each, from their records on all pieces."""
-    for k in range(records.shape[0]):
-        for i in range(pieces.size):
-            found[k, 0, i], found[k, 1, i], _, _ = value_on(records[k, pieces[i]], s[0, i], s[1, i])

@@ -51,7 +51,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     sample,
     slope_at,
 )
-from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, size_of_block
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, extent, size_of, size_of_block
 
 # The largest number of iterations for forces that are not linear in V**2.
 MAX_ITERATIONS = 40
@@ -90,6 +90,9 @@ def split_law(forces, march, panel, work):  # type: ignore[no-untyped-def]
     sum_row(work, PLAIN_P, P, PLAIN_P)
     product(work, PLAIN_Q, RUBBING, LENGTH_SLOPE)
     difference_row(work, PLAIN_Q, Q, PLAIN_Q)
+    if size_of_block(work, KAPPA) == 0.0 and extent(work, N0)[0] >= 0.0:
+        # A length has no sign to be followed, but a kink where the curve is vertical.
+        copy_row(work, N0, size_of(work, N0))
 
 
 @Inner

@@ -20,6 +20,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.gradients.path import path_changes
 from gqm_sym.runtime.legs.leg_record import AHEAD, BACK, HALF_C, HEADING, LAPS_BEFORE, START_V2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE
+from gqm_sym.runtime.legs.variations.divided import divided, joined_law, states_of_parts
 from gqm_sym.runtime.legs.variations.equation import (
     CONTACT_SIGN,
     CUBE,
@@ -206,6 +207,19 @@ def lay(records, begins):  # type: ignore[no-untyped-def]
     """Return the panels of runs (`equation.lay_panels`), and the states in which the law is needed."""
     first, panels = lay_panels(records, begins)
     return first, panels, lay_states(records, begins, first, panels)
+
+
+@entry(types.Tuple((WHOLE, MATRIX, WHOLE, MATRIX))(WHOLE, MATRIX, VECTOR), checked=False)
+def divide(first, panels, slopes):  # type: ignore[no-untyped-def]
+    """Return what `divided.divided` does, and the states at the nodes of the parts."""
+    first, panels, before = divided(first, panels, slopes)
+    return first, panels, before, states_of_parts(panels, before)
+
+
+@entry(MATRIX(MATRIX, INTEGER, MATRIX, WHOLE), checked=False)
+def join_law(law, marks, of_parts, before):  # type: ignore[no-untyped-def]
+    """Return what `divided.joined_law` does."""
+    return joined_law(law, marks, of_parts, before)
 
 
 @entry(FOLLOWED(PANELS_OF_RUNS, MATRIX, VECTOR, THROWN, VECTOR, VECTOR), checked=False)

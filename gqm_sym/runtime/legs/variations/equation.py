@@ -208,6 +208,19 @@ def lay_panels(records, begins):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def lay_nodes(panels, states, first):  # type: ignore[no-untyped-def]
+    """Fill the states at the nodes of panels, from an index on."""
+    for k in range(panels.shape[0]):
+        panel = panels[k]
+        for j in range(WIDE):
+            at, node = first + k * WIDE + j, min(j, COUNT - 1)
+            w = panel[PANEL_BEGIN] + panel[PANEL_WIDTH] * SHARES[node]
+            states[PLACE, at], states[PLACE_LOW, at] = place_on(panel, w)
+            states[W, at] = (panel[SPEEDS + node] * distance_at(panel, w)[1]) ** 2
+            states[STATE_HEADING, at], states[STATE_SIGN, at] = panel[PANEL_HEADING], panel[CONTACT_SIGN]
+
+
+@Inner
 def lay_states(records, begins, first, panels):  # type: ignore[no-untyped-def]
     """Return the states (`law.states_of`) in which the law is needed.
 
@@ -223,12 +236,5 @@ def lay_states(records, begins, first, panels):  # type: ignore[no-untyped-def]
         mark_state(states, runs + k, record, END, 0.0, at_end)
         middle_v2 = end_speed(panels[other - 1]) ** 2 if record[AHEAD] > 0.0 else v2
         mark_state(states, 2 * runs + k, record, MIDDLE, middle_v2, first_panel)
-    for k in range(count):
-        panel = panels[k]
-        for j in range(WIDE):
-            at, node = MARKS * runs + k * WIDE + j, min(j, COUNT - 1)
-            w = panel[PANEL_BEGIN] + panel[PANEL_WIDTH] * SHARES[node]
-            states[PLACE, at], states[PLACE_LOW, at] = place_on(panel, w)
-            states[W, at] = (panel[SPEEDS + node] * distance_at(panel, w)[1]) ** 2
-            states[STATE_HEADING, at], states[STATE_SIGN, at] = panel[PANEL_HEADING], panel[CONTACT_SIGN]
+    lay_nodes(panels, states, MARKS * runs)
     return states

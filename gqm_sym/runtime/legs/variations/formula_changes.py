@@ -11,7 +11,7 @@ from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
-from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_signed_values_of
 from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
@@ -20,6 +20,7 @@ from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.whole_panels import with_panels
 from gqm_sym.runtime.legs.variations.chain import FOLLOWED, SIGMA, follow
+from gqm_sym.runtime.legs.variations.divided import MAX_DIVISIONS, divided, joined_law, states_of_parts
 from gqm_sym.runtime.legs.variations.equation import (
     MARKS,
     PLACE,
@@ -99,18 +100,19 @@ def is_far(states, marks):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def law_on_panels(programs, inputs, states, marks):  # type: ignore[no-untyped-def]
+def law_on_panels(programs, inputs, states, marks, far):  # type: ignore[no-untyped-def]
     """Return the law in states, as far as the programs have it; in the first ``marks`` of them, of which nothing else
-    is needed, ds/dlam and dW/dlam have all digits.
+    is needed, ds/dlam and dW/dlam have all digits, and in all states if they are ``far`` from zero.
     """
     doubles, doubles_work, exact, exact_work, rates, rates_work = programs
-    if is_far(states, marks):
+    if far:
         return exact_values(exact, exact_work, inputs, states)
     parameters = inputs.shape[1] - 2
     found = np.empty((2 * parameters + 5, states.shape[1]))
     fill_in_doubles(doubles, doubles_work, inputs[:, :parameters], states, marks, found)
-    both = exact_values(rates, rates_work, inputs, states[:, :marks].copy())
-    found[0, :marks], found[parameters + 2, :marks] = both[0], both[1]
+    if marks > 0:
+        both = exact_values(rates, rates_work, inputs, states[:, :marks].copy())
+        found[0, :marks], found[parameters + 2, :marks] = both[0], both[1]
     return found
 
 
@@ -140,8 +142,17 @@ def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed)
     """Return the panels of runs, and the changes on them, as `chain.follow` does."""
     records, begins = panelled(records, begins)
     first, panels = lay_panels(records, begins)
-    states, (v0, direction), heading = lay_states(records, begins, first, panels), launch, records[begins[0] + HEADING]
-    law, other_force = law_on_panels(programs, inputs, states, MARKS * begins.size), 0.0
+    states, (v0, direction, is_rough) = lay_states(records, begins, first, panels), launch
+    marks, heading, other_force = MARKS * begins.size, records[begins[0] + HEADING], 0.0
+    far = is_far(states, marks)
+    law = law_on_panels(programs, inputs, states, marks, far)
+    for _ in range(MAX_DIVISIONS if is_rough else 0):
+        # The row of F_W is the last but that of the parameters.
+        first, panels, before = divided(first, panels, law[law.shape[0] - inputs.shape[1] + 1, marks:])
+        of_parts = states_of_parts(panels, before)
+        if of_parts.size == 0:
+            break
+        law = joined_law(law, marks, law_on_panels(programs, inputs, of_parts, 0, far), before)
     if v0 == 0.0 and direction != heading:
         turned = states[:, :1].copy()
         turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
@@ -152,7 +163,7 @@ def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed)
 
 
 # The arguments of the functions below.
-RUNS = VECTOR, WHOLE, PROGRAMS, MATRIX, types.UniTuple(types.float64, 2), VECTOR, VECTOR
+RUNS = VECTOR, WHOLE, PROGRAMS, MATRIX, types.Tuple((REAL, REAL, types.boolean)), VECTOR, VECTOR
 
 
 @entry(types.Tuple((WHOLE, MATRIX, FOLLOWED))(*RUNS), checked=False)
@@ -167,8 +178,8 @@ def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap
         `programs.law_in_doubles`, `programs.law_program` and `programs.rates_program`.
     inputs : (3, n + 2) array
         The inputs of the latter two; the last two are set here.
-    launch : (float, float)
-        The launch speed and the chosen direction.
+    launch : (float, float, bool)
+        The launch speed, the chosen direction, and whether the law may have kinks within panels.
     moves, lap
         As for `chain.follow`.
     """

@@ -19,7 +19,9 @@ from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
-from gqm_sym.runtime.legs.variations.chain import follow_changes, lay
+from gqm_sym.runtime.legs.variations.chain import divide, follow_changes, join_law, lay
+from gqm_sym.runtime.legs.variations.divided import MAX_DIVISIONS
+from gqm_sym.runtime.legs.variations.equation import MARKS
 from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
 from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas, turns_along_formulas
 from gqm_sym.runtime.legs.variations.programs import (
@@ -108,6 +110,8 @@ class Law(ABC):
         Their values as inputs of programs.
     by_arc_length : bool
         Whether places are arc lengths, which then are not fixed to the points of the curve.
+    is_rough : bool
+        Whether the law may have kinks within panels, as friction in space has.
     """
 
     by_arc_length: bool
@@ -115,6 +119,8 @@ class Law(ABC):
     def __init__(self, problem: Problem) -> None:
         self.count, self.mass = len(problem.p), list(problem.formulas.parameters).index("m")
         self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
+        losses = problem.formulas.dissipation
+        self.is_rough = losses is not None and not losses.linear
 
     @property
     @abstractmethod
@@ -147,7 +153,8 @@ class Law(ABC):
             The places at which the force may jump.
         """
         first, panels, states = lay(records, begins)
-        law, v0, heading = self.matrix(states), launch.v0.value, float(records[begins[0] + HEADING])
+        first, panels, law = self._resolved(first, panels, self.matrix(states), MARKS * begins.size)
+        v0, heading = launch.v0.value, float(records[begins[0] + HEADING])
         other_force = 0.0
         if v0 == 0.0 and launch.direction != heading:
             start = states[:, :1]
@@ -155,6 +162,17 @@ class Law(ABC):
             other_force = float(LawRows(self.matrix(turned)).force[0, 0])
         laid, thrown = (records, begins, first, panels), (v0, float(launch.direction), other_force)
         return Followed(laid, *follow_changes(laid, law, self.launch_changes, thrown, lap, breaks))
+
+    def _resolved(
+        self, first: NDArray[np.int64], panels: Array, law: Array, marks: int
+    ) -> tuple[NDArray[np.int64], Array, Array]:
+        """Return panels on which the law is resolved, with the law in their states (`divided`)."""
+        for _ in range(MAX_DIVISIONS if self.is_rough else 0):
+            first, panels, before, states = divide(first, panels, law[self.count + 4, marks:])
+            if not states.size:
+                break
+            law = join_law(law, marks, self.matrix(states), before)
+        return first, panels, law
 
     @abstractmethod
     def loads(self, states: Array) -> Array:
@@ -243,7 +261,7 @@ class FormulaLaw(Law):
         self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array, breaks: Array
     ) -> Followed:
         """See `Law`. Along formulas this is one call of compiled code."""
-        thrown = launch.v0.value, float(launch.direction)
+        thrown = launch.v0.value, float(launch.direction), self.is_rough
         first, panels, found = changes_along_formulas(
             records, begins, self._programs, self._inputs, thrown, self.launch_changes, lap
         )
@@ -254,7 +272,7 @@ class FormulaLaw(Law):
 
         The arguments are those of `followed`. Changes of times are not needed for this, so that it takes less.
         """
-        thrown = launch.v0.value, float(launch.direction)
+        thrown = launch.v0.value, float(launch.direction), self.is_rough
         found: Array = turns_along_formulas(
             records, begins, self._untimed, self._inputs, thrown, self.launch_changes, lap
         )

@@ -22,7 +22,7 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # The number of equal parts of the time for each interval; they serve to find the interval of a time.
-SLOTS_PER_INTERVAL = 4
+SLOTS_PER_INTERVAL = 32
 
 # The nodes of the Gauss-Legendre rule on [-1, 1], and the matrix from values at them to Legendre coefficients.
 NODES = np.polynomial.legendre.leggauss(WIDE)[0]

@@ -14,9 +14,11 @@ Build = Callable[..., ModuleType]
 G, RADIUS, STEEPEST, START, STOP = 9.81, 20.0, 1.3, 0.6, -0.7
 # The largest error of V**2 and of the time, as a share. Worst measured: 2e-15.
 ERROR = 8e-15
+# The same of derivatives of the time.
+DERIVATIVE_ERROR = 5e-14
 
 
-def over_the_hill(speed: str, mu: str, length: float, cars: int) -> tuple[mpf, mpf, int]:
+def over_the_hill(speed: str | mpf, mu: str | mpf, length: float, cars: int) -> tuple[mpf, mpf, int]:
     """Return V**2 of a train at the end of the hill, the time to there, and how often N changes its sign on a car.
 
     Against the angle of climb, which decreases, V**2 is an exponential and a harmonic function as long as N has one
@@ -73,6 +75,52 @@ def test_friction_past_places_where_the_contact_force_vanishes(build: Build, car
     assert abs(module.pass1(np.array([end]), lam0=begin, v0="13.2", mu="0.05").v2[0] - w) <= ERROR * w
     swept = module.sweep("time_at", begin, 13.2, lam=end, mu=0.05)
     assert abs(float(swept.values) - time) <= ERROR * time
+
+
+@pytest.mark.parametrize("by_formulas", [False, True])
+def test_derivatives_behind_places_where_the_contact_force_vanishes(build: Build, *, by_formulas: bool) -> None:
+    """The derivative of friction with respect to V**2 jumps there; that of the time of arrival behind them has all
+    digits nevertheless, along a chart and along formulas that leave the plane by next to nothing.
+    """
+    begin, end = RADIUS * (STEEPEST - START), RADIUS * (STEEPEST - STOP)
+    if by_formulas:
+        track = gqm.Curve.space(x="20*sin(u)", y="1e-15*sin(3*u)", z="20*cos(u)", parameter="u", domain=("-1.3", "1.3"))
+        module, begin, end = build("hill_by_formulas", track, gqm.CoulombFriction()), -START, -STOP
+    else:
+        hill = gqm.arc(radius="20", angle="-2.6")
+        track = gqm.Curve.piecewise([hill, gqm.transition(length=5, yaw="0.01")], start=(0, 0, 0), heading=(0, "1.3"))
+        module = build("hill_in_space_1", track, gqm.CoulombFriction())
+    found = module.solve(begin, "13.2", mu="0.05").gradient("time_at", lam=end)
+    step = mpf(10) ** -10
+    with mp.workdps(30):
+        for name, change in (("v0", (step, 0)), ("mu", (0, step))):
+            after, before = (
+                over_the_hill(mpf("13.2") + sign * change[0], mpf("0.05") + sign * change[1], 0.0, 1)[1]
+                for sign in (1, -1)
+            )
+            truth = (after - before) / (2 * step)
+            assert abs(found[name] - truth) <= DERIVATIVE_ERROR * abs(truth)
+
+
+def test_friction_in_a_vertical_loop_in_space(build: Build) -> None:
+    """Where the track is vertical a body at rest needs no contact force, so that |N| at rest has a kink there; moving
+    bodies pass such places as any others.
+    """
+    loop = gqm.arc(radius="2", angle="6.25")
+    track = gqm.Curve.piecewise([loop, gqm.transition(length=1, yaw="0.1")], start=(0, 0, 0))
+    motion = build("loop_in_space", track, gqm.CoulombFriction()).solve(0, 14, mu="0.1", g="9.81")
+    with mp.workdps(30):
+        g, radius, mu, angle = mpf("9.81"), mpf(2), mpf("0.1"), mpf("6.25")
+        a = -6 * mu * g * radius / (1 + 4 * mu * mu)
+        b = 2 * g * radius + 2 * mu * a
+
+        def v2(at: mpf) -> mpf:
+            return a * mp.sin(at) + b * mp.cos(at) + (196 - b) * mp.exp(-2 * mu * at)
+
+        time = mp.quad(lambda at: radius / mp.sqrt(v2(at)), [0, angle / 2, angle])
+        w = v2(angle)
+    assert abs(motion.time_at(12.5) - time) <= ERROR * time
+    assert abs(motion.state(float(time)).v2 - w) <= ERROR * w
 
 
 def test_a_train_of_one_car_past_a_place_without_contact_force(build: Build) -> None:
