@@ -178,10 +178,14 @@ class Differenced:
 
     def _linear(self, other: Any, sign: int) -> "Differenced":
         v = self.places.spread(other)
-        ours, theirs = (self.mean, self.slope, self.second), (v.mean, v.slope, v.second)
-        parts = [a + sign * b for a, b in zip(ours, theirs, strict=True)]
-        are_chords = self.is_linear and v.is_linear
-        return Differenced(self.places, *parts, None if are_chords else self.at + sign * v.at)
+        is_chord = self.is_linear and v.is_linear
+        return Differenced(
+            self.places,
+            self.mean + sign * v.mean,
+            self.slope + sign * v.slope,
+            self.second + sign * v.second,
+            None if is_chord else self.at + sign * v.at,
+        )
 
     def __add__(self, other: Any) -> "Differenced":
         return self._linear(other, 1)
