@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 20, input 2558bd3a8d44, body 1b592fc221f5
+# interface 21, input 2558bd3a8d44, body d1734211705e
 """Bead on a hanging chain
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -333,17 +333,18 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (3, n)), carray(out, (4, n))
     for i in range(n):
-        c, half = p[0, i], halves[i]
-        _t0 = sinh_of_ratio(1, half, 4*c)**2
-        _t1 = _t0 + 1
-        _t2 = 1/_t1
-        _t3 = _t1**2
-        out[0, i] = _t0*_t2
-        out[1, i] = _t2
-        out[2, i] = (2*_t0 + 1)/_t3
-        out[3, i] = _t3
+        c, half, rest = p[0, i], halves[0, i], halves[1, i]
+        _t0 = 1/(4*c)
+        _t1 = (_t0*rest*cosh(_t0*half) + sinh_of_ratio(1, half, 4*c))**2
+        _t2 = _t1 + 1
+        _t3 = 1/_t2
+        _t4 = _t2**2
+        out[0, i] = _t1*_t3
+        out[1, i] = _t3
+        out[2, i] = (2*_t1 + 1)/_t4
+        out[3, i] = _t4
 
 
 @compiled(TURNING_POINT_BATCH)

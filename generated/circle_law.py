@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 20, input 2718db879066, body 1d320336139b
+# interface 21, input 2718db879066, body f3af60a6a8f6
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 20, input bcc7b1afa151, body fba0b63f4009
+# interface 21, input bcc7b1afa151, body 5ac9b91fa659
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -355,10 +355,10 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
 @compiled(AGM_ARGUMENTS_BATCH)
 def agm_arguments_batch(n, halves, p, out):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (2, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
-        L, w, h, g, half = p[0, i], p[1, i], p[2, i], p[3, i], halves[i]
-        _t0 = cos(half/2)
+        L, w, h, g, half, rest = p[0, i], p[1, i], p[2, i], p[3, i], halves[0, i], halves[1, i]
+        _t0 = cos_of_sum(0, 1/2, half, rest, 0)
         _t1 = (g - h*w**2)/L
         out[0, i] = _t1*(_t0 + 1)**2/4
         out[1, i] = _t0*_t1

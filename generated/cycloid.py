@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 20, input 350ae6cf923a, body 47ac82c9e6b2
+# interface 21, input 350ae6cf923a, body fea35896ece5
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -311,7 +311,7 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
 @compiled(AGM_ARGUMENTS_BATCH)
 def agm_arguments_batch(n, halves, p, out):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
         R, g = p[0, i], p[1, i]
         _t0 = -g/(4*R)

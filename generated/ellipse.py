@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 20, input 81dc4ee20e82, body 40b40d24ecd8
+# interface 21, input 81dc4ee20e82, body 0608e1ca6da0
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -336,18 +336,17 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (4, n)), carray(out, (4, n))
     for i in range(n):
-        half = halves[i]
-        _t0 = half/2
-        _t1 = cos(_t0)
-        _t2 = _t1 + 1
-        _t3 = _t2**2
-        _t4 = 1/_t3
-        out[0, i] = _t4*sin(_t0)**2
-        out[1, i] = 2*_t1/_t2
-        out[2, i] = 4*_t1*_t4
-        out[3, i] = _t3/4
+        half, rest = halves[0, i], halves[1, i]
+        _t0 = cos_of_sum(0, 1/2, half, rest, 0)
+        _t1 = _t0 + 1
+        _t2 = _t1**2
+        _t3 = 1/_t2
+        out[0, i] = _t3*sin_of_sum(0, 1/2, half, rest, 0)**2
+        out[1, i] = 2*_t0/_t1
+        out[2, i] = 4*_t0*_t3
+        out[3, i] = _t2/4
 
 
 @compiled(TURNING_POINT_BATCH)

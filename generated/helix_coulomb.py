@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 20, input 3f2dfaf376e9, body a1c5ffa6c78b
+# interface 21, input 3f2dfaf376e9, body 772527bd25ad
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, SPEED_EQUATION, SQUARED_CONTACT, STATIC_BALANCE,

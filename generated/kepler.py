@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 20, input a0162e77d64e, body 57b5bb4915a6
+# interface 21, input a0162e77d64e, body bf4da3814f1a
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -465,22 +465,21 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (7, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (4, n)), carray(out, (7, n))
     for i in range(n):
-        a, ecc, half = p[0, i], p[1, i], halves[i]
-        _t0 = half/2
-        _t1 = sin(_t0)**2
-        _t2 = cos(_t0)
-        _t3 = _t2 + 1
-        _t4 = _t3**2
-        _t5 = 1/_t4
-        out[0, i] = _t1*_t5
-        out[1, i] = 2*_t2/_t3
-        out[2, i] = 4*_t2*_t5
-        out[3, i] = _t1
-        out[4, i] = _t4/4
+        a, ecc, half, rest = p[0, i], p[1, i], halves[0, i], halves[1, i]
+        _t0 = sin_of_sum(0, 1/2, half, rest, 0)**2
+        _t1 = cos_of_sum(0, 1/2, half, rest, 0)
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        out[0, i] = _t0*_t4
+        out[1, i] = 2*_t1/_t2
+        out[2, i] = 4*_t1*_t4
+        out[3, i] = _t0
+        out[4, i] = _t3/4
         out[5, i] = fabs(a)
-        out[6, i] = sqrt(4*_t1*(1 - _t1)*(1 - ecc**2) + (-2*_t1 - ecc + 1)**2)
+        out[6, i] = sqrt(4*_t0*(1 - _t0)*(1 - ecc**2) + (-2*_t0 - ecc + 1)**2)
 
 
 @compiled(BOUNDS_BATCH)

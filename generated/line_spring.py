@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 20, input 702c9ef6b67b, body 526671433e6b
+# interface 21, input 702c9ef6b67b, body 0a0be5b5034f
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -281,7 +281,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 @compiled(AGM_ARGUMENTS_BATCH)
 def agm_arguments_batch(n, halves, p, out):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (2, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (2, n)), carray(out, (2, n))
     for i in range(n):
         w = p[0, i]
         _t0 = w**2

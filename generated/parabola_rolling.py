@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 20, input 6fc25406b912, body c9d8c171973e
+# interface 21, input 6fc25406b912, body 33bfbed71f55
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -391,10 +391,10 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (3, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (5, n)), carray(out, (3, n))
     for i in range(n):
-        a, half = p[0, i], halves[i]
-        _t0 = half**2
+        a, half, rest = p[0, i], halves[0, i], halves[1, i]
+        _t0 = half*(half + 2*rest)
         _t1 = sqrt(4*_t0*a**2 + 1)
         out[0, i] = _t0
         out[1, i] = 1/_t1

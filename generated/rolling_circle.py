@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 20, input 2a76ceb4277a, body 97305196e6bf
+# interface 21, input 2a76ceb4277a, body d2e5fea7c037
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -310,10 +310,10 @@ def orbit_invariants_batch(n, lows, highs, middles, rests, halves, p, out):
 @compiled(AGM_ARGUMENTS_BATCH)
 def agm_arguments_batch(n, halves, p, out):
     """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (2, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (4, n)), carray(out, (2, n))
     for i in range(n):
-        L, beta, g, half = p[0, i], p[1, i], p[2, i], halves[i]
-        _t0 = cos(half/2)
+        L, beta, g, half, rest = p[0, i], p[1, i], p[2, i], halves[0, i], halves[1, i]
+        _t0 = cos_of_sum(0, 1/2, half, rest, 0)
         _t1 = g/(L*(beta + 1))
         out[0, i] = _t1*(_t0 + 1)**2/4
         out[1, i] = _t0*_t1

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 20, input 33421e752297, body a28586b07aac
+# interface 21, input 33421e752297, body 0f3531a261a8
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=20)
+compiled = compiler(__file__, interface=21)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -312,10 +312,10 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
 @compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (1, n))
+    halves, p, out = carray(halves, (2, n)), carray(p, (4, n)), carray(out, (1, n))
     for i in range(n):
-        half = halves[i]
-        out[0, i] = half**2
+        half, rest = halves[0, i], halves[1, i]
+        out[0, i] = half*(half + 2*rest)
 
 
 @compiled(TURNING_POINT_BATCH)

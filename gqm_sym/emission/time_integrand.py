@@ -1,11 +1,12 @@
 """The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
-from sympy import Expr, Function, S, Symbol, cos, sin, sinh
+from sympy import Expr, Function, S, Symbol, cos, cosh, sin, sinh
 
 from gqm_sym.derivation.algebra.angles import is_power_of_two, of_sum
-from gqm_sym.derivation.wells.symmetric_orbits import COSINE_AT_TURN, HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
+from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ExactIR, FunctionIR
 from gqm_sym.emission.sharing import hoist
@@ -73,16 +74,23 @@ def _turning_point(lowering: Lowering, forms: tuple[Expr, ...]) -> FunctionIR:
 
 
 def _agm_arguments(lowering: Lowering, squares: tuple[Expr, Expr]) -> FunctionIR:
-    names = lowering.names
-    half, halves = names.symbol("half"), names("halves")
-    return lowering.function(
-        "agm_arguments_batch",
+    half = lowering.names.symbol("half")
+    return _of_widths(lowering, "agm_arguments_batch", AGM_DOC, [square.xreplace({HALF: half}) for square in squares])
+
+
+def _of_widths(lowering: Lowering, name: str, doc: str, values: Iterable[Expr]) -> FunctionIR:
+    """Return a function for terms that follow from half the width of an orbit, given as the sum of two numbers."""
+    half, rest, halves = lowering.names.symbol("half"), lowering.names.symbol("rest"), lowering.names("halves")
+    found = lowering.function(
+        name,
         (halves,),
-        AGM_DOC,
-        inside=[(half, at(halves))],
-        outputs=tuple(square.xreplace({HALF: half}) for square in squares),
+        doc,
+        inside=[(half, at(halves, 0)), (rest, at(halves, 1))],
+        outputs=tuple(_with_rest(value, half, rest) for value in values),
         batch=True,
     )
+    (_, n), *views = found.views
+    return replace(found, views=((halves, f"(2, {n})"), *views))
 
 
 def _without_constant_divisors(form: Expr, moving: set[Symbol]) -> Expr:
@@ -95,26 +103,22 @@ def _without_constant_divisors(form: Expr, moving: set[Symbol]) -> Expr:
     return above * below * rest
 
 
-def _with_exact_arguments(value: Expr, half: Symbol) -> Expr:
-    """Let hyperbolic sines of a multiple of half the orbit's width be those of the exact multiple.
+def _with_rest(value: Expr, half: Symbol, rest: Symbol) -> Expr:
+    """Write a term that is constant along an orbit by half the orbit's width as a sum of two numbers.
 
-    On a wide orbit the rounding of the argument is several roundings of the sine, and all nodes have it in common.
+    All nodes of an orbit have the rounding of its width in common: near a hilltop or a pole of the curve, and on walls
+    that are much steeper than those of a parabola, it is several roundings of the time. Multiples of the width inside
+    of hyperbolic sines are exact for the same reason.
     """
 
-    def exact(call: Expr) -> Expr:
+    def moved(call: Expr) -> Expr:
         rate = call.args[0] / half
         above, below = rate.as_numer_denom()
-        return call if rate.has(half) or is_power_of_two(rate) else Function("sinh_of_ratio")(above, half, below)
+        exact = call if rate.has(half) or is_power_of_two(rate) else Function("sinh_of_ratio")(above, half, below)
+        return exact + rest * call.args[0].diff(half) * cosh(call.args[0])
 
-    return value.replace(lambda t: isinstance(t, sinh), exact)
-
-
-def _with_rest(value: Expr, half: Symbol, rest: Symbol) -> Expr:
-    """Let sines and cosines of multiples of half the orbit's width be those of a sum of two numbers.
-
-    Next to a pole of the curve the rounding of the width is many roundings of the cosine.
-    """
-    return value.replace(lambda t: isinstance(t, sin | cos), lambda t: of_sum(t, (half,), (half, rest, S.Zero)))
+    value = value.replace(lambda t: isinstance(t, sin | cos), lambda t: of_sum(t, (half,), (half, rest, S.Zero)))
+    return value.replace(lambda t: isinstance(t, sinh), moved).xreplace({half**2: half * (half + 2 * rest)})
 
 
 def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr) -> tuple[FunctionIR, ...]:
@@ -140,22 +144,5 @@ def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits, integrand: Expr
     )
     if not held:
         return (emitted,)
-    halves = names("halves")
-    values, inside = [_with_exact_arguments(value, own[HALF]) for _, value in held], [(own[HALF], at(halves))]
-    next_to_pole = own.get(COSINE_AT_TURN) in used
-    if next_to_pole:
-        rest = names.symbol("rest")
-        values = [_with_rest(value, own[HALF], rest) for value in values]
-        inside = [(own[HALF], at(halves, 0)), (rest, at(halves, 1))]
-    invariants = lowering.function(
-        "integrand_invariants_batch",
-        (halves,),
-        "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters.",
-        inside=inside,
-        outputs=tuple(values),
-        batch=True,
-    )
-    if next_to_pole:
-        (_, n), *views = invariants.views
-        invariants = replace(invariants, views=((halves, f"(2, {n})"), *views))
-    return emitted, invariants
+    doc = "Terms that are constant along an orbit; ``time_integrand_batch`` reads them after the parameters."
+    return emitted, _of_widths(lowering, "integrand_invariants_batch", doc, [value for _, value in held])

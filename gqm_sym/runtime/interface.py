@@ -85,10 +85,11 @@ turning_point_batch        n, offset, v2, p, out    half the orbit's width [[lam
 ``time_integrand_batch`` may exist for orbits about an axis of symmetry. Their half period is an integral over the angle
 u, where ``sine2`` = sin(u)**2 is the square of a coordinate divided by its largest value, and ``cosine2`` = cos(u)**2.
 ``half`` is half of an orbit's width, and ``middle + rest`` is the middle of both ends in two doubles.
-``integrand_invariants_batch`` is given two rows: what rounding took from half the width follows it. If that integral
-is a complete elliptic integral of the first kind, a module has ``agm_arguments_batch`` instead: pi over the half period
-is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side, the turning point may have a
-closed form, ``turning_point_batch``, in terms of the launch's offset from the axis and its V**2.
+If that integral is a complete elliptic integral of the first kind, a module has ``agm_arguments_batch`` instead: pi
+over the half period is the arithmetic-geometric mean of two numbers. This function and ``integrand_invariants_batch``
+are given two rows: what rounding took from half the width follows it. In a well that is monotone on either side, the
+turning point may have a closed form, ``turning_point_batch``, in terms of the launch's offset from the axis and its
+V**2.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -98,7 +99,7 @@ from numba import types
 
 # This number is raised with every change of a signature here, of the rows that an argument or a result has, or of a
 # number that runtime code puts into generated modules.
-INTERFACE = 20
+INTERFACE = 21
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

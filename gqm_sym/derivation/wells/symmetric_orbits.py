@@ -43,7 +43,6 @@ COSINE_TERM = _symbol("cosine_term")
 # of the sine there, the fourth power of the cosine of half its argument, and the cosine of twice its argument.
 HALF, T, ONE_MINUS_T, ONE_MINUS_TT = (_symbol(name) for name in ("half", "t", "one_minus_t", "one_minus_tt"))
 SINE_SQUARED, COSINE_FOURTH, COSINE_AT_TURN = (_symbol(n) for n in ("sine_squared", "cosine_fourth", "cosine_at_turn"))
-COSINE_TERM_AT_TURN = _symbol("cosine_term_at_turn")
 
 # Symbols for a launch: the distance from the axis, and V**2 there.
 OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
@@ -149,6 +148,8 @@ def symmetric_orbits(
         return None  # second differences keep more digits next to a pole that is elsewhere
     divisor = sp.together(slope.xreplace(by_square)) * ONE_MINUS_YT  # each takes one division
     integrand = 4 * sp.together(of_pole.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
+    if integrand.has(COSINE_TERM):
+        integrand = _with_cosine_term(integrand)
     if of_pole.has(_COSINE_OF_POLE):
         power = sp.degree(sp.together(slope).as_numer_denom()[1], _COSINE_OF_POLE)
         divisor *= by_square[_COSINE_OF_POLE] ** (power + POWER_OF_POLE)
@@ -192,7 +193,6 @@ def _invariants(waves: Waves, argument: sp.Expr) -> tuple[tuple[sp.Symbol, sp.Ex
         (SINE_SQUARED, sine**2),
         (COSINE_FOURTH, (1 + cosine) ** 2 / 4),
         (COSINE_AT_TURN, sp.cos(2 * argument)),
-        (COSINE_TERM_AT_TURN, 4 * sp.cos(2 * argument) / (1 + cosine) ** 2),
     )
 
 
@@ -246,23 +246,20 @@ def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: s
     """Return the symbols of one place, where Y = ``sine2``*T and ``sine2 + cosine2`` = 1, as sums without
     cancellation.
 
-    COSINE_TERM keeps its digits next to a pole, where COSINE_AT_TURN is small.
+    COSINE_TERM, a sum of terms of one sign, keeps its digits next to a pole, where COSINE_AT_TURN is small.
     """
     y, one_minus_y, one_minus_yt = (
         invariants.get(T, T) * sine2,
         cosine2 + invariants.get(ONE_MINUS_T, ONE_MINUS_T) * sine2,
         cosine2 + invariants.get(ONE_MINUS_TT, ONE_MINUS_TT) * sine2,
     )
-    # The same in two ways: a difference, and terms of one sign, which have more roundings but do not cancel.
-    plain = one_minus_y**2 - 4 * y
-    positive = cosine2 * one_minus_yt + invariants.get(COSINE_TERM_AT_TURN, COSINE_TERM_AT_TURN) * sine2
-    at_turn = invariants.get(COSINE_AT_TURN, COSINE_AT_TURN)
+    at_turn, sine_squared = (invariants.get(symbol, symbol) for symbol in (COSINE_AT_TURN, SINE_SQUARED))
     return {
         Y: y,
         T_MINUS_Y: invariants.get(T, T) * cosine2,
         ONE_MINUS_Y: one_minus_y,
         ONE_MINUS_YT: one_minus_yt,
-        COSINE_TERM: at_turn * plain + (1 - at_turn) * positive,
+        COSINE_TERM: at_turn * (1 + y) ** 2 + 2 * sine_squared * cosine2 * one_minus_yt,
     }
 
 
@@ -347,6 +344,17 @@ def _with_poles(form: sp.Expr, waves: Waves) -> sp.Expr:
         return power
 
     return form.replace(lambda t: t.is_Pow and t.exp.is_Integer and t.exp < 0 and t.base.is_Add, named)
+
+
+def _with_cosine_term(form: sp.Expr) -> sp.Expr:
+    """Write multiples of (1 - Y)**2 - 4*Y in sums by COSINE_TERM, whose terms do not cancel."""
+
+    def named(total: sp.Expr) -> sp.Expr:
+        count = total.coeff(ONE_MINUS_Y**2)
+        found = count and total.coeff(Y) == -4 * count
+        return total + count * (COSINE_TERM - ONE_MINUS_Y**2 + 4 * Y) if found else total
+
+    return form.replace(lambda t: t.is_Add, named)
 
 
 def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:

@@ -222,7 +222,7 @@ def load_launches(fns, columns, begin, number, orbits, domain, monotone, scratch
     fill_row(columns, DIRECTION, begin, number, direction)
     for j in range(n):
         rests[j] = fma(v2[j], v2[j], -(v2[j] * v2[j]))
-    fill_axis_offsets(n, rows, domain, monotone, fns.time_integrand != 0)
+    fill_axis_offsets(n, rows, domain, monotone, fns.time_integrand != 0 or fns.agm_arguments != 0)
     for j in range(n):
         index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
         v2[j] *= v2[j]

@@ -43,8 +43,9 @@ def fill_axis_offsets(n, rows, domain, monotone, with_rests):  # type: ignore[no
     rounding takes from the place may be many roundings of the offset. ``domain`` has the rows DOMAIN_LOW to
     AXIS_STEP_LOW of `strided`.
     """
-    start, offsets, any_other = rows[LAUNCH_PLACE, :n], rows[AXIS_OFFSET, :n], False
+    start, offsets, rests = rows[LAUNCH_PLACE, :n], rows[AXIS_OFFSET, :n], rows[HALF_REST, :n]
     places, places_low, steps, steps_low = domain[3, :n], domain[4, :n], domain[5, :n], domain[6, :n]
+    w0, any_other = rows[LAUNCH_V2, :n], with_rests
     for j in range(n):
         offsets[j] = (start[j] - places[j]) - places_low[j]
         any_other |= (steps[j] > 0.0) & (fabs(offsets[j]) > steps[j])
@@ -55,15 +56,10 @@ def fill_axis_offsets(n, rows, domain, monotone, with_rests):  # type: ignore[no
             period = 2.0 * steps[j]
             periods = choose(period > 0.0, floor_of(distance / period + 0.5), 0.0)
             lacking = (rounding + lost) - periods * (2.0 * steps_low[j])
-            offset = fma(-periods, period, distance) + lacking
+            offset, rest = two_sum(fma(-periods, period, distance), lacking)
             offsets[j] = choose(monotone | (periods == 0.0), offset, nan)
-    if with_rests:
-        rests, w0 = rows[HALF_REST, :n], rows[LAUNCH_V2, :n]
-        for j in range(n):
-            distance, rounding = two_sum(start[j], -places[j])
-            offset, lost = two_sum(distance, -places_low[j])
-            known = (w0[j] == 0.0) & (offset == offsets[j])  # otherwise in another period, or there is no axis
-            rests[j] = choose(known, choose(offset < 0.0, -(rounding + lost), rounding + lost), 0.0)
+            known = (w0[j] == 0.0) & (offset == offsets[j])  # otherwise there is no axis in this period
+            rests[j] = choose(known, choose(offset < 0.0, -rest, rest), 0.0)
 
 
 @Inner
@@ -84,11 +80,12 @@ def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-de
     ahead, behind, axis = rows[ZERO, :n], rows[ZERO_BEHIND, :n], rows[AXIS_DISTANCE, :n]
     places, steps, offsets = domain[3, :n], domain[5, :n], rows[AXIS_OFFSET, :n]
     out, halves, thrown = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[5, :n]
+    rests = rows[HALF_REST, :n]
     call_turning_point_batch(fns.turning_point, n, offsets, w0, p, out)
     for j in range(n):
-        rests = w0[j] == 0.0
-        halves[j] = choose(rests, fabs(offsets[j]), out[0, j])
-        ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
+        at_rest = w0[j] == 0.0
+        halves[j] = choose(at_rest, fabs(offsets[j]), out[0, j])
+        ahead[j] = choose(at_rest, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
         thrown[j] = choose((offsets[j] == offsets[j]) & (w0[j] > 0.0), 1.0, 0.0)
     if contains(thrown, 1.0):
         ends, away = work[7, :n], work[8, :n]
@@ -99,19 +96,20 @@ def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-de
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, ends, away, p, slopes)
         for j in range(n):
             left = fma(-2.0 * away[j], slopes[0, j], w0[j]) + roundings[j]
-            missed = ahead[j] * (left / (2.0 * slopes[2, j]))
-            halves[j] += choose(thrown[j] == 1.0, missed, 0.0)
+            missed = choose(thrown[j] == 1.0, ahead[j] * (left / (2.0 * slopes[2, j])), 0.0)
+            halves[j], rounding = two_sum(halves[j], missed)
+            rests[j] = choose(thrown[j] == 1.0, rounding, rests[j])
     widths = rows[HALF_WIDTH, :n]
     for j in range(n):
-        offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
+        offset, half, sense, step, at_rest = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
         well = (out[1, j] > 0.0) & (alone | (size < step))
         clear = is_clear_of_axes(size, start[j], places[j], step)
         inside = choose(size > half, half, size)  # many periods away the offset has the larger rounding error
         ascent = choose(sense * offset < 0.0, -inside, inside)
-        known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
+        known_well = well & ((at_rest & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
         ahead[j], behind[j] = choose(known_well, half - ascent, 0.0), choose(known_well, half + ascent, nan)
-        widths[j] = choose(known_well, half, nan)
+        widths[j], rests[j] = choose(known_well, half, nan), choose(known_well | at_rest, rests[j], 0.0)
         direction[j] = choose(known_well, sense, direction[j])
         axis[j] = -sense * offset
         state[j] = choose(well & (out[2, j] > 1.0 + NEAR_MAXIMUM), NOWHERE, SEEKING)

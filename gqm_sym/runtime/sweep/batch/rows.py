@@ -13,7 +13,7 @@ VALUE                the mean of the time integrand by the last level of nodes  
 CHANGE               relative change of the time by that level                            time
 FACTOR_LOW           smallest value of V**2's regular factor at the nodes                 time
 FACTOR_HIGH          its largest value                                                    time
-FACTOR_AT_TURN       its value at the turning points of a thrown body in an even well     time
+FACTOR_AT_TURN       its smallest value at turning points that are rounded                 time
 OFFSET_LOW           offset of the lower end of the orbit from the launch place           time, proof
 OFFSET_HIGH          offset of the upper end                                              time, proof
 END_LOW, END_HIGH    both ends as values of the curve's parameter                         time of librations

@@ -67,11 +67,10 @@ PI_HIGH, PI_LOW = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
 # The verdict on an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 
-# The ratio of the smallest to the largest regular factor of V**2 above which roundings of the turning points, or of the
-# energy of a lap, do not matter: for librations from rest, one turning point of which is exact, for other librations,
-# and for laps. In even wells both turning points may be near a hilltop, so the factor at these is used, unless they are
-# exact, as those of a launch from rest are.
-MIN_REST_RATIO, MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.25, 0.1, 0.5, 0.9
+# The ratio of the smallest to the largest regular factor of V**2 above which roundings do not matter, for librations in
+# wells that are not even and for laps; and that of the factor at turning points which are rounded. Those of a launch
+# from rest are exact where it starts, and both are in an even well.
+MIN_RATIO, MIN_LAP_RATIO, MIN_TURN_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.1, 0.4, 0.5, 0.9
 
 # The same for all librations whose turning points are known to more digits than a double has.
 MIN_EXACT_RATIO = 0.03
@@ -234,6 +233,18 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def keep_factor_at_turn(n, rows, offset, factors):  # type: ignore[no-untyped-def]
+    """Keep the smallest factor of V**2 at turning points that are rounded: all but those at which a body is released.
+
+    ``offset`` is the row of the turning point's offset from the launch.
+    """
+    for j in range(n):
+        exact = (rows[LAUNCH_V2, j] == 0.0) & (rows[offset, j] == 0.0)
+        factor, known = choose(exact, inf, factors[j]), rows[FACTOR_AT_TURN, j]
+        rows[FACTOR_AT_TURN, j] = choose(factor < known, factor, known)
+
+
+@Inner
 def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
     """Set the mean of each orbit's integrand by a level of the rule, and the verdict on it.
 
@@ -306,9 +317,10 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
         rows[FACTOR_AT_TURN, j] = inf
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD else 1.0
     ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
-    from_rest = MIN_REST_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
+    from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
-    ratios = from_rest, thrown, MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO
+    at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
+    ratios = from_rest, thrown, at_turns
     if is_careful(scratch):
         ratios = MIN_EXACT_RATIO, MIN_LAP_RATIO if kind == CIRCULATION else MIN_EXACT_RATIO, 0.0
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
@@ -323,6 +335,8 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
                     _, rounding = two_sum(rows[LAUNCH_PLACE, j], offset)
                     exact = rest & ((kind == AXIS_LIBRATION) | (rounding == 0.0))
                     rows[FACTOR_AT_TURN, j] = choose(exact, inf, rows[FACTOR_LOW, j])
+            elif kind == LIBRATION and begin == 0 and (node == 0 or node == last):
+                keep_factor_at_turn(n, rows, OFFSET_LOW if node == 0 else OFFSET_HIGH, work[3, :n])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
@@ -352,10 +366,11 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
 def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Fill half periods or periods by the arithmetic-geometric mean; orbits next to a separatrix stay undecided."""
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
-    p, halves = orbits.params[: count * n].reshape(count, n), work[0, :n]
-    pair, clear, times = work[1:3].reshape(-1)[: 2 * n].reshape(2, n), work[3, :n], work[4, :n]
-    rests, from_thrown = work[5, :n], MIN_CANCELLATION_RATIO if is_careful(scratch) else MIN_AXIS_RATIO
-    fill_halves(n, rows, halves)
+    p, halves = orbits.params[: count * n].reshape(count, n), work[:2].reshape(-1)[: 2 * n]
+    pair, clear, times = work[2:4].reshape(-1)[: 2 * n].reshape(2, n), work[4, :n], work[5, :n]
+    rests, from_thrown = work[6, :n], MIN_CANCELLATION_RATIO if is_careful(scratch) else MIN_AXIS_RATIO
+    fill_halves(n, rows, halves[:n])
+    halves[n:] = rows[HALF_REST, :n]
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]
