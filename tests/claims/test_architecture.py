@@ -138,6 +138,7 @@ TESTED_THROUGH = {
     "gradients/lanes/vectors.py": "runtime/gradients/lanes/test_evaluation.py",
     "gradients/orbit.py": "runtime/gradients/test_quantities.py",
     "gradients/panels.py": "runtime/gradients/test_sensitivity.py",
+    "gradients/passages/first_differences.py": "runtime/gradients/passages/test_slow_orbits.py",
     "gradients/passages/from_turns.py": "runtime/gradients/passages/test_slow_orbits.py",
     "gradients/passages/quantities.py": "runtime/gradients/passages/test_passage.py",
     "gradients/path.py": "runtime/gradients/test_sensitivity.py",

@@ -26,7 +26,7 @@ from gqm_sym.runtime.gradients.lanes.interpreter import (
     SCALE,
     TIMES_PAIR,
 )
-from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, RESULTS, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, RESULTS, WAVE_DIFFERENCES, LaneRecorder
 from gqm_sym.runtime.gradients.lanes.scaling import Terms, combined
 
 Codes = NDArray[np.int64]
@@ -40,6 +40,7 @@ WITH_PAIR: dict[int, tuple[int, int]] = {
     interpreter.SUBTRACT: (MINUS_PAIR, PAIR_MINUS),
     interpreter.MULTIPLY: (TIMES_PAIR, TIMES_PAIR),
     interpreter.DIVIDE: (PAIR_OVER, PAIR_OVER),  # a pair in the denominator is a factor instead
+    WAVE_DIFFERENCES: (WAVE_DIFFERENCES, WAVE_DIFFERENCES),
 }
 
 

@@ -1,8 +1,13 @@
-"""Divided differences of a formula over three places, recorded without cancellation.
+"""Second divided differences of a formula over both turning points and a place, recorded without cancellation.
 
-A formula is called with a number that has a value at each of three places, and the divided differences of these. The
-rules for sums, products and compositions are exact (MATHS, section 3). They are symmetric in the outer places, so that
-odd parts cancel exactly in an even well.
+A formula is called with a number that is its chord, the linear function with its values at both turning points a and b,
+plus ``(lam - a) (lam - b)`` times its second divided difference over a, the place and b. With the distance y from the
+middle of the orbit and half its width h, that is
+
+    f = mean + slope y + (y**2 - h**2) f[a, lam, b].
+
+Mean and slope of the chord do not depend on the place. The rules for sums, products, quotients, roots and compositions
+are exact (MATHS, section 3), and odd parts cancel exactly in an even well.
 """
 
 from fractions import Fraction
@@ -11,15 +16,7 @@ from typing import Any
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.lanes.operations import WithoutRuleError
 
-
-def is_same(a: TapeNumber, b: TapeNumber) -> bool:
-    """Return whether two numbers are the same register, or the same constant."""
-    return a.register == b.register and a.known == b.known
-
-
-def mean(a: TapeNumber, b: TapeNumber) -> TapeNumber:
-    """Return the mean of two numbers."""
-    return a if is_same(a, b) else (a + b) * Fraction(1, 2)
+HALF = Fraction(1, 2)
 
 
 class Places:
@@ -29,197 +26,165 @@ class Places:
     ----------
     op : LaneRecorder or SeriesRecorder
         The tape.
-    ends, shares : two numbers each
-        a and b, and the shares of the way from a and from b at the place.
+    ends : pair of numbers
+        a and b.
+    tilt, bow : number
+        Of the phase angle phi at the place, -cos(phi) and sin(phi)**2.
     """
 
-    def __init__(self, op: Any, ends: tuple[TapeNumber, TapeNumber], shares: tuple[TapeNumber, TapeNumber]) -> None:
-        (a, b), (share, rest), half = ends, shares, Fraction(1, 2)
-        self.op, self.whole, self.shares = op, b - a, shares
-        self.gaps = self.whole * share, self.whole * rest
-        # The distances of a, of the place between them, and of b from the middle, which is known to more digits.
-        self.middle, self.tilt = (a + b) * half, share - rest
-        self.distances = -half * self.whole, half * self.whole * self.tilt, half * self.whole
+    def __init__(self, op: Any, ends: tuple[TapeNumber, TapeNumber], tilt: TapeNumber, bow: TapeNumber) -> None:
+        a, b = ends
+        self.op, self.tilt, self.half = op, tilt, (b - a) * HALF
+        self.square = self.half * self.half
+        # The distance y from the middle of the orbit, and y**2 - h**2.
+        self.distance, self.gap = self.half * tilt, -self.square * bow
         self.pi, self.e, self.mpf = self.spread(op.pi), self.spread(op.e), self.spread
-        one, zero = op.number(1), op.number(0)
-        self.place = Differenced(self, (a, self.middle + self.distances[1], b), (one, one), zero)
+        self.place = Differenced(self, (a + b) * HALF, op.number(1), op.number(0))
 
     def spread(self, value: Any) -> "Differenced":
         """Return a number over the places; a constant is the same at all of them."""
         if isinstance(value, Differenced):
             return value
-        number, zero = self.op.number(value), self.op.number(0)
-        return Differenced(self, (number, number, number), (zero, zero), zero)
+        return Differenced(self, self.op.number(value), self.op.number(0), self.op.number(0))
 
     def of(self, formula: Any, p: Any) -> "Differenced":
         """Return a formula ``f(op, lam, p)`` over the places."""
         return self.spread(formula(self, self.place, [self.spread(number) for number in p]))
 
-    def _of(self, u: Any, values: Any, parts: Any) -> Any:
-        """Return a function of a number over the places.
-
-        Parameters
-        ----------
-        u : Differenced
-            The argument.
-        values : three numbers
-            The values of the function.
-        parts : three numbers
-            Its divided differences over the first two, the last two, and all three values of the argument.
-        """
-        first, last, second = parts
-        left, right = u.first
-        whole = u.over_ends
-        both = mean(first, last) * u.second
-        bent = second * (whole * mean(left, right))
-        return Differenced(self, values, (first * left, last * right), both + bent)
-
-    def _waves(self, u: "Differenced", sign: int, functions: tuple[Any, Any], turned: bool) -> Any:
-        """Return a sine (``turned``) or cosine, or their hyperbolic counterparts (``sign`` -1).
-
-        ``functions`` are the odd and the even function.
-        """
-        op, half = self.op, Fraction(1, 2)
-        odd, even = functions
+    def _wave(self, u: "Differenced", sign: int, *, is_odd: bool) -> "Differenced":
+        """Return the sine (``is_odd``) or cosine of a number, or their hyperbolic counterparts (``sign`` -1)."""
+        op = self.op
+        odd, even = (op.sin, op.cos) if sign > 0 else (op.sinh, op.cosh)
         if u.is_constant:
-            return self.spread((odd if turned else even)(u.at[1]))
-        gaps = [gap * rate * half for gap, rate in zip(self.gaps, u.first, strict=True)]
-        both, slope = op.sinc_pair(*(sign * (gap * gap) for gap in gaps))
-        whole = self.whole * u.over_ends * Fraction(1, 4)
-        product = op.sinc(whole, sign) * both * half
-        across = even(whole) * ((gaps[1] - gaps[0]) * slope) * sign
-        around = self._around(u, sign, functions)
-        # The derivative of the cosine is minus the sine; all other derivatives have no sign.
-        slope_sign = -1 if sign > 0 and not turned else 1
-        is_odd, (left, middle, right) = 0 if turned else 1, self._between(u)
-        same, other = around(middle)[is_odd], around(middle)[1 - is_odd]
-        second = (slope_sign * (other * across) + (-sign) * (same * product)) * half
-        firsts = [
-            slope_sign * (around(place)[1 - is_odd] * op.sinc(gap, sign))
-            for place, gap in zip((left, right), gaps, strict=True)
-        ]
-        values = [around(place)[is_odd] for place in (self.distances if u.is_linear else u.at)]
-        return self._of(u, values, (*firsts, second))
-
-    def _between(self, u: "Differenced") -> tuple[Any, Any, Any]:
-        """Return the middles between a and the place, between all three with the place twice, and between it and b.
-
-        They are distances from the middle of the orbit if the argument is linear in the place, else values of it.
-        """
-        a, x, b = self.distances if u.is_linear else u.at
-        half = Fraction(1, 2)
+            return self.spread((odd if is_odd else even)(u.mean))
+        # About the middle, the argument is a constant plus t, which is the phase at the end of the orbit.
+        rate, end = u.slope, u.slope * self.half
+        squared = sign * (end * end)
+        of_even, of_odd = op.wave_differences(squared, self.tilt)
+        sine, cosine = odd(u.mean), even(u.mean)
+        evens = even(end), op.number(0), sign * (rate * rate) * of_even
+        odds = op.number(0), rate * op.sinc(end, sign), sign * (rate * (rate * rate)) * self.distance * of_odd
+        # By the theorems of addition; the cosine has the sign that the sine has as its derivative.
+        one, other = (sine, cosine) if is_odd else (cosine, sine if sign < 0 else -sine)
+        found = Differenced(self, *(one * x + other * y for x, y in zip(evens, odds, strict=True)))
         if u.is_linear:
-            return -half * self.gaps[1], half * x, half * self.gaps[0]
-        return mean(a, x), (a + b + 2 * x) * Fraction(1, 4), mean(x, b)
+            return found
+        # What the argument has beyond its chord changes the wave by that times a divided difference over both.
+        beyond = u.second * self.gap * HALF
+        mean = u.chord + beyond
+        slope = (even(mean) if is_odd else odd(mean) * (-1 if sign > 0 else 1)) * op.sinc(beyond, sign)
+        return Differenced(self, found.mean, found.slope, found.second + u.second * slope)
 
-    def _around(self, u: "Differenced", sign: int, functions: tuple[Any, Any]) -> Any:
-        """Return a function that gives the odd and the even function at what `_between` gives."""
-        odd, even = functions
-        if not u.is_linear:
-            return lambda value: (odd(value), even(value))
-        rate, middle = u.first[0], mean(u.at[0], u.at[2])
-        sine, cosine = odd(middle), even(middle)
-
-        def turned(distance: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
-            phase = distance * rate
-            s, c = odd(phase), even(phase)
-            return c * sine + s * cosine, c * cosine - sign * (s * sine)
-
-        return turned
-
-    def sin(self, u: Any) -> Any:
+    def sin(self, u: Any) -> "Differenced":
         """Record a sine."""
-        return self._waves(self.spread(u), 1, (self.op.sin, self.op.cos), True)
+        return self._wave(self.spread(u), 1, is_odd=True)
 
-    def cos(self, u: Any) -> Any:
+    def cos(self, u: Any) -> "Differenced":
         """Record a cosine."""
-        return self._waves(self.spread(u), 1, (self.op.sin, self.op.cos), False)
+        return self._wave(self.spread(u), 1, is_odd=False)
 
-    def sinh(self, u: Any) -> Any:
+    def sinh(self, u: Any) -> "Differenced":
         """Record a hyperbolic sine."""
-        return self._waves(self.spread(u), -1, (self.op.sinh, self.op.cosh), True)
+        return self._wave(self.spread(u), -1, is_odd=True)
 
-    def cosh(self, u: Any) -> Any:
+    def cosh(self, u: Any) -> "Differenced":
         """Record a hyperbolic cosine."""
-        return self._waves(self.spread(u), -1, (self.op.sinh, self.op.cosh), False)
+        return self._wave(self.spread(u), -1, is_odd=False)
 
-    def exp(self, u: Any) -> Any:
+    def exp(self, u: Any) -> "Differenced":
         """Record an exponential."""
         number = self.spread(u)
-        return self.spread(self.op.exp(number.at[1])) if number.is_constant else self.cosh(u) + self.sinh(u)
+        return self.spread(self.op.exp(number.mean)) if number.is_constant else self.cosh(u) + self.sinh(u)
 
-    def tan(self, u: Any) -> Any:
+    def tan(self, u: Any) -> "Differenced":
         """Record a tangent."""
         return self.sin(u) / self.cos(u)
 
-    def tanh(self, u: Any) -> Any:
+    def tanh(self, u: Any) -> "Differenced":
         """Record a hyperbolic tangent."""
         return self.sinh(u) / self.cosh(u)
 
-    def sqrt(self, u: Any) -> Any:
+    def sqrt(self, u: Any) -> "Differenced":
         """Record a square root."""
-        number = self.spread(u)
+        number, op = self.spread(u), self.op
         if number.is_constant:
-            return self.spread(self.op.sqrt(number.at[1]))
-        roots = tuple(self.op.sqrt(value) for value in number.at)
-        left, right, ends = roots[0] + roots[1], roots[1] + roots[2], roots[0] + roots[2]
-        return self._of(number, roots, (1 / left, 1 / right, -1 / (left * right * ends)))
+            return self.spread(op.sqrt(number.mean))
+        left, right = (op.sqrt(value) for value in number.ends)
+        mean, slope, root = (left + right) * HALF, number.slope / (left + right), op.sqrt(number.at)
+        second = (number.second - slope * slope) / (root + (mean + slope * self.distance))
+        return Differenced(self, mean, slope, second, root)
 
     def __getattr__(self, name: str) -> Any:
         function = getattr(self.op, name)
 
-        def of_constant(u: Any) -> Any:
+        def of_constant(u: Any) -> Differenced:
             number = self.spread(u)
             if not number.is_constant:
                 raise WithoutRuleError
-            return self.spread(function(number.at[1]))
+            return self.spread(function(number.mean))
 
         return of_constant
 
 
 class Differenced:
-    """A number that depends on the place, over three places.
+    """A number that depends on the place, as its chord and its second divided difference.
 
-    Attributes
+    Parameters
     ----------
-    at : three numbers
-        The values.
-    first : two numbers
-        The divided differences over the first two and the last two places.
+    places : Places
+        The places.
+    mean, slope : number
+        The mean of the values at both turning points, and the divided difference over these.
     second : number
-        The divided difference over all three.
+        The divided difference over both and the place.
+    at : number, optional
+        The value at the place; otherwise it follows from the others.
     """
 
-    __slots__ = ("at", "first", "places", "second")
+    __slots__ = ("_at", "mean", "places", "second", "slope")
 
-    def __init__(self, places: Places, at: Any, first: Any, second: Any) -> None:
-        self.places, self.at, self.first, self.second = places, tuple(at), tuple(first), second
+    def __init__(self, places: Places, mean: Any, slope: Any, second: Any, at: Any = None) -> None:
+        self.places, self.mean, self.slope, self.second, self._at = places, mean, slope, second, at
 
     @property
     def is_constant(self) -> bool:
         """Whether the number does not depend on the place."""
-        return all(part.known == 0 for part in self.first)
+        return bool(self.slope.known == 0) and self.is_linear
 
     @property
     def is_linear(self) -> bool:
         """Whether the number is a linear function of the place."""
-        return self.second.known == 0 and is_same(*self.first)
+        return bool(self.second.known == 0)
 
     @property
-    def over_ends(self) -> TapeNumber:
-        """The divided difference over the first and the last place."""
-        (left, right), (share, rest) = self.first, self.places.shares
-        found: TapeNumber = left if is_same(left, right) else left * share + right * rest
+    def chord(self) -> TapeNumber:
+        """The value of the chord at the place."""
+        found: TapeNumber = self.mean + self.slope * self.places.distance
         return found
+
+    @property
+    def at(self) -> TapeNumber:
+        """The value at the place."""
+        if self._at is None:
+            self._at = self.chord + self.second * self.places.gap
+        found: TapeNumber = self._at
+        return found
+
+    @property
+    def ends(self) -> tuple[TapeNumber, TapeNumber]:
+        """The values at both turning points."""
+        step = self.slope * self.places.half
+        return self.mean - step, self.mean + step
 
     def _linear(self, other: Any, sign: int) -> "Differenced":
         v = self.places.spread(other)
-
+        is_chord = self.is_linear and v.is_linear
         return Differenced(
             self.places,
-            [a + sign * b for a, b in zip(self.at, v.at, strict=True)],
-            [a + sign * b for a, b in zip(self.first, v.first, strict=True)],
+            self.mean + sign * v.mean,
+            self.slope + sign * v.slope,
             self.second + sign * v.second,
+            None if is_chord else self.at + sign * v.at,
         )
 
     def __add__(self, other: Any) -> "Differenced":
@@ -237,26 +202,23 @@ class Differenced:
         return self * -1
 
     def __mul__(self, other: Any) -> "Differenced":
-        v = self.places.spread(other)
-        (a, x, b), (p, y, q) = self.at, v.at
-        (left, right), (low, high) = self.first, v.first
-        first = (
-            left * mean(p, y) + mean(a, x) * low,
-            right * mean(y, q) + mean(x, b) * high,
-        )
+        v, places = self.places.spread(other), self.places
+        if self.is_constant or v.is_constant:
+            factor, number = (self, v) if self.is_constant else (v, self)
+            by = factor.mean
+            return Differenced(places, by * number.mean, by * number.slope, by * number.second, by * number.at)
+        slopes = self.slope * v.slope
+        mean = self.mean * v.mean + slopes * places.square
         if self is v:
-            first = left * (a + x), right * (x + b)
-        outer = self.second * mean(p, q) + mean(a, b) * v.second
-        inner = mean(left * high, right * low)
-        return Differenced(self.places, (a * p, x * y, b * q), first, outer + inner)
+            second = slopes + self.second * (self.at + self.chord)
+        else:
+            second = slopes + (self.second * v.at + self.chord * v.second)
+        return Differenced(places, mean, self.mean * v.slope + self.slope * v.mean, second, self.at * v.at)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> "Differenced":
-        v = self.places.spread(other)
-        if v.is_constant:
-            return self * self.places.spread(1 / v.at[1])
-        return self * v.inverse()
+        return self * self.places.spread(other).inverse()
 
     def __rtruediv__(self, other: Any) -> "Differenced":
         return self.places.spread(other) * self.inverse()
@@ -264,18 +226,19 @@ class Differenced:
     def inverse(self) -> "Differenced":
         """Return the reciprocal."""
         if self.is_constant:
-            return self.places.spread(1 / self.at[1])
-        a, x, b = inverses = [1 / value for value in self.at]
-        parts = -(a * x), -(x * b), a * (x * b)
-        found: Differenced = self.places._of(self, inverses, parts)
-        return found
+            return self.places.spread(1 / self.mean)
+        (left, right), inverse = self.ends, 1 / self.at
+        share = 1 / (left * right)
+        chord = share * (self.mean - self.slope * self.places.distance)
+        second = inverse * (self.slope * self.slope * share - chord * self.second)
+        return Differenced(self.places, self.mean * share, -(self.slope * share), second, inverse)
 
     def __abs__(self) -> "Differenced":
         raise WithoutRuleError
 
     def __pow__(self, other: Any) -> "Differenced":
         power = self.places.spread(other)
-        exponent = power.at[1]
+        exponent = power.mean
         if not power.is_constant or exponent.known is None or exponent.known.denominator > 2:
             raise WithoutRuleError
         base = self if exponent.known.denominator == 1 else self.places.sqrt(self)

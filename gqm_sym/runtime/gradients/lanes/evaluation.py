@@ -39,7 +39,7 @@ MAX_DIFFERENCE = 3e-9
 
 # The nodes at which the variances of rounding errors are found. A program of them with more than so many operations is
 # carried out at every other one only, where it may find variances up to a half too large.
-NOISE_NODES, MAX_NOISE_OPERATIONS = tuple(MIN_INTERVALS * k // 4 for k in range(5)), 512
+NOISE_NODES, MAX_NOISE_OPERATIONS = tuple(MIN_INTERVALS * k // 4 for k in range(5)), 1024
 
 # The states of an orbit.
 OPEN, ANSWERED, LEFT = range(3)

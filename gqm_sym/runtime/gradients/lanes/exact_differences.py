@@ -18,8 +18,11 @@ from gqm_sym.runtime.gradients.lanes.programs import swing_inputs, swing_of, tot
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source, assemble
 
-# The series of sin(t)/t in t**2, highest power first. For squares up to 1 its rest is below 1e-36.
-TERMS = tuple(Fraction((-1) ** k, factorial(2 * k + 1)) for k in reversed(range(16)))
+# The series of cos(t) and of sin(t)/t in t**2, highest power first. For squares up to 1 their rests are below 1e-36.
+TERMS = 16
+EVEN, ODD = (
+    tuple(Fraction((-1) ** k, factorial(2 * k + odd)) for k in reversed(range(TERMS + 1 - odd))) for odd in (0, 1)
+)
 
 
 class SeriesRecorder(LaneRecorder):
@@ -37,18 +40,19 @@ class SeriesRecorder(LaneRecorder):
 
     def sinc(self, t: TapeNumber, sign: int) -> TapeNumber:
         """Record sin(t)/t, or sinh(t)/t for the sign -1."""
-        return self._series(sign * (t * t), sign * (t * t))[0]
+        square = sign * (t * t)
+        return self._series(ODD, square, square)[0]
 
-    def sinc_pair(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
-        """Record S(p) + S(q) and S[p, q]."""
-        value, slope = self._series(p, q)
-        return 2 * value + (q - p) * slope, slope
+    def wave_differences(self, p: TapeNumber, tilt: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record C[q, p] and S[q, p] for ``q = p*tilt**2``."""
+        of_even, of_odd = (self._series(terms, p, p * (tilt * tilt))[1] for terms in (EVEN, ODD))
+        return of_even, of_odd
 
-    def _series(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
-        """Record S(p) and S[p, q]."""
+    def _series(self, terms: tuple[Fraction, ...], p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record the value of a series at p, and its divided difference over p and q."""
         self.squares = self.squares + p * p + q * q
         value, slope = self.number(0), self.number(0)
-        for term in TERMS:
+        for term in terms:
             slope, value = slope * q + value, value * p + term
         return value, slope
 
@@ -85,8 +89,8 @@ def exact_rates_program(source: Source, plan: Plan) -> Program | None:
 def exact_rates(op: SeriesRecorder, source: Source, plan: Plan) -> list[TapeNumber]:
     """Record dt/dphi and its derivatives with respect to `scaling.Plan.moves`."""
     p, _, (a, b), moves = swing_of(op, source, plan)
-    over = Places(op, (a, b), (op.place, 1 - op.place))
-    factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
+    over = Places(op, (a, b), 2 * op.place - 1, 4 * (op.place * (1 - op.place)))
+    factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at
     rate = ds / op.sqrt(2 * factor)
     by_inputs = gradient(op, rate, [a, b, *p])
     return [rate, *(total_change(op, by_inputs, move) for move in moves)]

@@ -4,19 +4,18 @@ A register is a row of the work space with a double for each lane. Numbers that 
 doubles, in registers of the interpreter in double-double arithmetic.
 """
 
+from fractions import Fraction
 from math import fabs, factorial, log, nan, sqrt
-from typing import Any
 
-from llvmlite import ir
+import numpy as np
 from numba import carray, types
-from numba.extending import intrinsic
 
 from gqm_sym.runtime.arithmetic.elementary import atan, cos, exp, inverse_root, sin
 from gqm_sym.runtime.compiled.emitted import Emitted
-from gqm_sym.runtime.compiled.intrinsics import choose, fma
+from gqm_sym.runtime.compiled.intrinsics import choose, fma, polynomial_pair
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.uncompiled import fma as fma_in_python
-from gqm_sym.runtime.compiled.uncompiled import in_python
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.double_double.arithmetic import split
 from gqm_sym.runtime.double_double.interpreter import (
     ADD,
     ARC_TANGENT,
@@ -31,51 +30,32 @@ from gqm_sym.runtime.double_double.interpreter import (
     SQUARE_ROOT,
     SUBTRACT,
 )
-from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, INVERSE_ROOT, ROUNDING, SINC, SINC_PAIR
+from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, INVERSE_ROOT, ROUNDING, SINC, WAVE_DIFFERENCES
 
 # Operations of which one operand does not depend on the place: node + pair, node - pair, pair - node, node * pair,
 # pair / node, the product with a double, and the pair itself.
-PLUS_PAIR, MINUS_PAIR, PAIR_MINUS, TIMES_PAIR, PAIR_OVER, SCALE, FROM_PAIR = range(ERROR_BOUND + 1, ERROR_BOUND + 8)
+PLUS_PAIR, MINUS_PAIR, PAIR_MINUS, TIMES_PAIR, PAIR_OVER, SCALE, FROM_PAIR = range(
+    WAVE_DIFFERENCES + 1, WAVE_DIFFERENCES + 8
+)
 
 # The power series of S(p) = sin(sqrt(p))/sqrt(p), highest power first, and the range of p in which it has all digits.
 TERMS, MIN_SQUARE, MAX_SQUARE = 18, -16.0, 16.0
 SERIES = tuple((-1.0) ** k / factorial(2 * k + 1) for k in reversed(range(TERMS)))
 
+# With ``t = tilt``, three results of WAVE_DIFFERENCES are sums of these coefficients, lowest power first, times
+# ``1 + t**2 + t**4 + ... + t**(2*n)`` and a power of p: C[q, p] and the derivatives of C[q, p] and S[q, p], which have
+# one power less. The fourth follows: ``3 S[q, p] = C[q, p] - 2 p dS[q, p]/dp``, because ``2 p S'(p) = C(p) - S(p)``.
+# Coefficients are two doubles each, because their roundings would be common to all nodes.
+EVEN, ODD = ([Fraction((-1) ** (n + 1), factorial(2 * n + last)) for n in range(TERMS - 1)] for last in (2, 3))
+SUMS = [EVEN, *([n * number for n, number in enumerate(row)] for row in (EVEN, ODD))]
+WAVES, RESTS = (np.array([[split(number)[part] for number in row] for row in SUMS]) for part in (0, 1))
+FIRST_TERMS, RESULT_OF_SUM, THIRD = (0, 1, 1), (0, 2, 3), split(Fraction(1, 3))
+
+# Work space on the stack.
+sums_of_powers = on_stack(TERMS)
+
 # The smallest normal number.
 MIN_NORMAL = 2.0**-1022
-
-
-@intrinsic
-def sinc_series(_, p, q):  # type: ignore[no-untyped-def]
-    """Return S(p), S(q), S[p, q], S'(p), S'(q), S[p, p, q] and S[p, q, q], by Horner's scheme without a loop."""
-
-    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        p, q = args
-        real = ir.DoubleType()
-        at_p = at_q = slope = by_p = by_q = slope_p = slope_q = ir.Constant(real, 0.0)
-        for coefficient in SERIES:
-            slope_q = builder.fma(slope_q, q, slope)
-            slope_p = builder.fma(slope_p, q, by_p)
-            slope = builder.fma(slope, q, at_p)
-            by_p, by_q = builder.fma(by_p, p, at_p), builder.fma(by_q, q, at_q)
-            at_p = builder.fma(at_p, p, ir.Constant(real, coefficient))
-            at_q = builder.fma(at_q, q, ir.Constant(real, coefficient))
-        found = at_p, at_q, slope, by_p, by_q, slope_p, slope_q
-        return context.make_tuple(builder, signature.return_type, found)
-
-    return types.UniTuple(types.float64, 7)(types.float64, types.float64), lower
-
-
-@in_python(sinc_series)
-def _sinc_series(p: Any, q: Any) -> Any:
-    at_p = at_q = slope = by_p = by_q = slope_p = slope_q = 0.0
-    for coefficient in SERIES:
-        slope_q = fma_in_python(slope_q, q, slope)
-        slope_p = fma_in_python(slope_p, q, by_p)
-        slope = fma_in_python(slope, q, at_p)
-        by_p, by_q = fma_in_python(by_p, p, at_p), fma_in_python(by_q, q, at_q)
-        at_p, at_q = fma_in_python(at_p, p, coefficient), fma_in_python(at_q, q, coefficient)
-    return at_p, at_q, slope, by_p, by_q, slope_p, slope_q
 
 
 @Inner
@@ -151,22 +131,40 @@ def fill_waves(n, a, out, other):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_sincs(n, p, out):  # type: ignore[no-untyped-def]
-    """Fill two registers with S(p) and its derivative."""
-    for i in range(n):
-        value, _, _, slope, _, _, _ = sinc_series(p[i], p[i])
-        out[i], out[BLOCK + i] = choose((p[i] >= MIN_SQUARE) & (p[i] <= MAX_SQUARE), value, nan), slope
+def is_inside(p):  # type: ignore[no-untyped-def]
+    """Return whether a number is in the range of the power series."""
+    return (p >= MIN_SQUARE) & (p <= MAX_SQUARE)
 
 
 @Inner
-def fill_sinc_pairs(n, p, q, out):  # type: ignore[no-untyped-def]
-    """Fill six registers with the results of SINC_PAIR."""
+def fill_sincs(n, p, out):  # type: ignore[no-untyped-def]
+    """Fill two registers with S(p) and its derivative."""
     for i in range(n):
-        at_p, at_q, slope, by_p, by_q, slope_p, slope_q = sinc_series(p[i], q[i])
-        inside = (p[i] >= MIN_SQUARE) & (p[i] <= MAX_SQUARE) & (q[i] >= MIN_SQUARE) & (q[i] <= MAX_SQUARE)
-        out[i], out[BLOCK + i] = choose(inside, at_p + at_q, nan), slope
-        out[2 * BLOCK + i], out[3 * BLOCK + i] = by_p, by_q
-        out[4 * BLOCK + i], out[5 * BLOCK + i] = slope_p, slope_q
+        value, slope = polynomial_pair(SERIES, p[i], p[i])
+        out[i], out[BLOCK + i] = choose(is_inside(p[i]), value, nan), slope
+
+
+@Inner
+def fill_wave_differences(n, tilts, high, low, out):  # type: ignore[no-untyped-def]
+    """Fill four registers with the results of WAVE_DIFFERENCES for the number high + low."""
+    square, powers = tilts[0] * tilts[0], sums_of_powers()
+    powers[0] = 1.0
+    for k in range(1, TERMS - 1):
+        powers[k] = fma(powers[k - 1], square, 1.0)
+    for which in range(3):
+        at = RESULT_OF_SUM[which] * BLOCK
+        row = out[at : at + n]
+        row[:] = 0.0
+        for k in range(TERMS - 2, FIRST_TERMS[which] - 1, -1):
+            term = fma(WAVES[which, k], powers[k], RESTS[which, k] * powers[k])
+            for i in range(n):
+                row[i] = fma(row[i], high[i], term)
+    for i in range(n):
+        even, slope = out[i], out[3 * BLOCK + i]
+        threefold = fma(-2.0 * high[i], slope, even)
+        odd = fma(THIRD[0], threefold, THIRD[1] * threefold)
+        out[i] = choose(is_inside(high[i]), fma(low[i], out[2 * BLOCK + i], even), nan)
+        out[BLOCK + i] = choose(is_inside(high[i]), fma(low[i], slope, odd), nan)
 
 
 @Inner
@@ -189,7 +187,9 @@ def fill_function(operation, n, a, out):  # type: ignore[no-untyped-def]
 @Inner
 def carry_out_pair(operation, n, a, high, low, out):  # type: ignore[no-untyped-def]
     """Carry out an operation of which one operand is a pair."""
-    if operation == TIMES_PAIR:
+    if operation == WAVE_DIFFERENCES:
+        fill_wave_differences(n, a, high, low, out)
+    elif operation == TIMES_PAIR:
         fill_pair_products(n, a, high, low, out)
     elif operation <= PAIR_MINUS:
         signs = (-1.0 if operation == PAIR_MINUS else 1.0, -1.0 if operation == MINUS_PAIR else 1.0)
@@ -239,8 +239,6 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
             fill_waves(n, a, out, registers[at + BLOCK : at + 2 * BLOCK])
         elif operation == SINC:
             fill_sincs(n, a, out)
-        elif operation == SINC_PAIR:
-            fill_sinc_pairs(n, a, b, out)
         else:
             fill_function(operation, n, a, out)
 

@@ -182,7 +182,7 @@ def _carry_out_doubles(
     kept: dict[int, int],
     body: BodyArguments,
 ) -> None:
-    DoubleBody(*body, kept).carry_out(*rows, stored)
+    DoubleBody(body, kept).carry_out(*rows, stored)
 
 
 def _results(row: Sequence[int]) -> range:
@@ -239,7 +239,9 @@ def _compiled(parts: Sequence[tuple[int, Sequence[_Step]]], scratch_size: int = 
             builder.position_at_end(loop)
             index = builder.phi(WHOLE)
             index.add_incoming(zero, before)
-            step((builder, builder.gep(work, [index]), builder.gep(scratch, [index])))
+            in_common = ir.IRBuilder(before)
+            in_common.position_before(before.terminator)
+            step((builder, builder.gep(work, [index]), builder.gep(scratch, [index]), (in_common, work)))
             following = builder.add(index, ir.Constant(WHOLE, WIDTH))
             index.add_incoming(following, builder.block)
             builder.cbranch(builder.icmp_signed("<", following, count), loop, after)

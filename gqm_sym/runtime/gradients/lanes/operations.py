@@ -1,8 +1,9 @@
 """A tape for double precision: the operations of other tapes, and divided differences of waves without cancellation.
 
-With ``S(t**2) = sin(t)/t``, the divided differences of sines and cosines are products of these and of S and its divided
-difference in the squares of half the gaps; for exponentials the squares are negative (MATHS, section 3). Each of the
-two operations below also gives its derivatives, so that formulas with them can be differentiated.
+With ``S(t**2) = sin(t)/t`` and ``C(t**2) = cos(t)``, the divided differences of sines and cosines over places at the
+same distance on both sides of a middle and one between them are products of these and of divided differences of S and
+C; for exponentials the squares are negative (MATHS, section 3). The operations below also give their derivatives, so
+that formulas with them can be differentiated.
 """
 
 from collections.abc import Iterator
@@ -13,23 +14,24 @@ from gqm_sym.runtime.double_double.interpreter import ABSOLUTE, ADD, DIVIDE, MUL
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import RecorderOfMore
 
-# Operations after those of the interpreter in double-double arithmetic. SINC gives S(p) and its derivative. SINC_PAIR
-# gives S(p) + S(q), the divided difference S[p, q], and the derivatives of both: S'(p), S'(q), S[p, p, q], S[p, q, q].
+# Operations after those of the interpreter in double-double arithmetic. SINC gives S(p) and its derivative.
 # INVERSE_ROOT gives 1/sqrt(x) with the sign of another number.
-SINC, SINC_PAIR, INVERSE_ROOT = range(ABSOLUTE + 1, ABSOLUTE + 4)
+SINC, INVERSE_ROOT = ABSOLUTE + 1, ABSOLUTE + 2
 
 # The operation that gives the bound on the error of a number in double-double arithmetic, in units of ROUNDING: a
 # typical rounding error of a double near 1.
 ERROR_BOUND, ROUNDING = INVERSE_ROOT + 1, 0.3 * 2.0**-52
 
+# The operation for the square p of a phase at the ends of an orbit, which does not depend on the place, and for the
+# coordinate ``tilt`` of the place, at which the square of the phase is ``q = p*tilt**2``. It gives the divided
+# differences C[q, p] and S[q, p], and their derivatives with respect to p. The place is the same for all orbits.
+WAVE_DIFFERENCES = ERROR_BOUND + 1
+
 # The number of results of each operation that has several; they are in consecutive registers.
-RESULTS = {SINE_COSINE: 2, SINC: 2, SINC_PAIR: 6}
+RESULTS = {SINE_COSINE: 2, SINC: 2, WAVE_DIFFERENCES: 4}
 
 # The largest number of terms of a divided difference of a power.
 MAX_TERMS = 24
-
-# For the two results of SINC_PAIR that have derivatives: the results that are those with respect to p and to q.
-PAIR_PARTIALS = {0: (2, 3), 1: (4, 5)}
 
 
 class WithoutRuleError(Exception):
@@ -37,7 +39,7 @@ class WithoutRuleError(Exception):
 
 
 class LaneRecorder(RecorderOfMore):
-    """A tape that is being recorded, with the operations SINC, SINC_PAIR and INVERSE_ROOT.
+    """A tape that is being recorded, with the operations SINC, WAVE_DIFFERENCES and INVERSE_ROOT.
 
     Attributes
     ----------
@@ -56,7 +58,7 @@ class LaneRecorder(RecorderOfMore):
     def _entry(self, *entry: Any) -> int:
         is_new = entry not in self._known
         register = super()._entry(*entry)
-        if is_new and entry[0] in (SINC, SINC_PAIR):
+        if is_new and entry[0] in (SINC, WAVE_DIFFERENCES):
             self.entries += [("result", register, k) for k in range(1, RESULTS[entry[0]])]
         return register
 
@@ -201,10 +203,10 @@ class LaneRecorder(RecorderOfMore):
             return (self.sin(t) if sign > 0 else self.sinh(t)) / t
         return self.result(SINC, sign * (t * t))
 
-    def sinc_pair(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
-        """Record S(p) + S(q) and S[p, q]."""
-        both = self.result(SINC_PAIR, p, q)
-        return both, self.at(both.register + 1)
+    def wave_differences(self, p: TapeNumber, tilt: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
+        """Record C[q, p] and S[q, p] for ``q = p*tilt**2``."""
+        of_even = self.result(WAVE_DIFFERENCES, p, tilt)
+        return of_even, self.at(of_even.register + 1)
 
     def error_bound(self, register: int) -> TapeNumber:
         """Record the bound on the error of a number that does not depend on the place."""
@@ -220,8 +222,8 @@ class LaneRecorder(RecorderOfMore):
         return (operands[0], operands[1]) if code == "result" else (register, 0)
 
     def is_other(self, register: int) -> bool:
-        """Return whether a register is filled by SINC, SINC_PAIR or INVERSE_ROOT."""
-        return self.entries[self.base(register)[0]][0] in (SINC, SINC_PAIR, INVERSE_ROOT)
+        """Return whether a register is filled by SINC, WAVE_DIFFERENCES or INVERSE_ROOT."""
+        return self.entries[self.base(register)[0]][0] in (SINC, WAVE_DIFFERENCES, INVERSE_ROOT)
 
     def other_partials(self, register: int) -> Iterator[tuple[int, TapeNumber]]:
         """Yield the operands of a result of these operations, each with the result's partial derivative by it."""
@@ -233,5 +235,4 @@ class LaneRecorder(RecorderOfMore):
         elif code == SINC:
             yield operands[0], self.at(base + 1)
         else:
-            for operand, result in zip(operands, PAIR_PARTIALS[which], strict=True):
-                yield operand, self.at(base + result)
+            yield operands[0], self.at(base + 2 + which)

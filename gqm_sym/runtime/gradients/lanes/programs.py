@@ -27,11 +27,11 @@ from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRule
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, Terms, combined, terms_of
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.gradients.programs import assemble as in_double_double
-from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, OFFSETS_FROM_A, OFFSETS_TO_B, SINES_SQUARED
+from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, NODE_SHARES, SINES_SQUARED
 
-# The coordinates of the nodes of the trapezoidal rule: the squares of the sine and cosine of half the phase angle, or
-# of the angle from an axis of symmetry.
-ALONG = np.array([OFFSETS_FROM_A, OFFSETS_TO_B])
+# The coordinates of the nodes of the trapezoidal rule: minus the cosine of the phase angle and the square of its sine,
+# or the squares of the cosine and sine of the angle from an axis of symmetry.
+ALONG = np.array([np.copysign(np.sqrt(COSINES_SQUARED), NODE_SHARES - 0.5), SINES_SQUARED])
 FROM_AXIS = np.array([COSINES_SQUARED, SINES_SQUARED])
 
 # The steps of an arithmetic-geometric mean. The relative difference of two numbers in the ratio 1 : 10 is then 4e-9,
@@ -119,14 +119,14 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     """Return the program of the time per phase angle of a libration, differentiated at the same phase angle.
 
     Its inputs are those of `swing_of`, and the slope of the potential at the launch place. A place has two coordinates:
-    the squares of the sine and of the cosine of half the phase angle. The results are Q and the derivatives of the time
+    minus the cosine of the phase angle, and the square of its sine. The results are Q and the derivatives of the time
     per phase angle. It is None if the potential contains an operation without a rule for divided differences.
     """
     op = LaneRecorder(swing_inputs(source, plan) + 1, 2, by_inverses=True)
     p, launch, (a, b), moves = swing_of(op, source, plan)
-    over = Places(op, (a, b), (op.places[0], op.places[1]))
+    over = Places(op, (a, b), *op.places)
     try:
-        factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at[1]
+        factor, ds = over.of(source.formulas.effective_potential, p).second, over.of(source.formulas.ds, p).at
     except WithoutRuleError:
         return None
     rate, adjoints = quotient_with_root(op, ds, 2 * factor)

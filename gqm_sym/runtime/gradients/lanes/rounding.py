@@ -13,19 +13,20 @@ from fractions import Fraction
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import partials
-from gqm_sym.runtime.gradients.lanes.operations import INVERSE_ROOT, SINC, SINC_PAIR, LaneRecorder
+from gqm_sym.runtime.gradients.lanes.operations import INVERSE_ROOT, SINC, WAVE_DIFFERENCES, LaneRecorder
 from gqm_sym.runtime.gradients.lanes.scaling import Terms, combined
 
-# The second derivative of S(p) at 0, and the derivatives of S[p, p, q], by the operations and the numbers of the
-# results whose derivatives they are. These derivatives are not on the tape.
-SECOND, THIRD = Fraction(1, 60), Fraction(1, 2520)
+# The second derivatives at 0 of S(p), and of the differences that WAVE_DIFFERENCES gives, at the ends of an orbit, by
+# the operations and the numbers of the results whose derivatives they are. These derivatives are not on the tape.
 SLOPES = {
-    (SINC, 1): SECOND,
-    (SINC_PAIR, 2): SECOND,
-    (SINC_PAIR, 3): SECOND,
-    (SINC_PAIR, 4): THIRD,
-    (SINC_PAIR, 5): THIRD,
+    (SINC, 1): Fraction(1, 60),
+    (WAVE_DIFFERENCES, 2): Fraction(1, 120),
+    (WAVE_DIFFERENCES, 3): Fraction(1, 840),
 }
+
+# The rounding errors of the results of WAVE_DIFFERENCES are those of the largest terms of their series, although these
+# may cancel: the terms of zeroth order at the ends of an orbit.
+LARGEST_TERMS = (Fraction(1, 2), Fraction(1, 6), Fraction(1, 12), Fraction(1, 60))
 
 # The relative changes of the results of operations by those of their operands, where they are constants.
 MULTIPLES: dict[int, tuple[Fraction, ...]] = {
@@ -69,20 +70,23 @@ def _alone(terms: Sequence[Terms]) -> list[int]:
 def _variance(op: LaneRecorder, wanted: int) -> TapeNumber:
     """Return the variance of one register: the sum of the squares of the changes by all roundings on the way to it."""
     ways = _Ways(op, wanted)
-    shares, uncertain = defaultdict[int, Fraction](Fraction), list[TapeNumber]()
+    shares, others = defaultdict[int, Fraction](Fraction), list[TapeNumber]()
     for k in range(wanted, -1, -1):
         if not ways.lead_from(k):
             continue
         if not op.depends(k):
             if k in op.uncertain:
-                uncertain.append(ways.slope(k) * op.error_bound(k))
+                others.append(ways.slope(k) * op.error_bound(k))
             continue
         share, base = ways.change(k)
-        if share and not _is_exact(op, k):
+        operation, which = op.base(k)
+        if op.entries[operation][0] == WAVE_DIFFERENCES:
+            others.append(ways.slope(k) * LARGEST_TERMS[which])
+        elif share and not _is_exact(op, k):
             shares[op.register(base)] += share * share
         ways.follow(k)
     found = [_square(op.at(register)) * share for register, share in shares.items()]
-    return sum([*found, *map(_square, uncertain)], op.number(0))
+    return sum([*found, *map(_square, others)], op.number(0))
 
 
 def _square(number: TapeNumber) -> TapeNumber:

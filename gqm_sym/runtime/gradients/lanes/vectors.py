@@ -13,7 +13,13 @@ from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.gradients.lanes import interpreter as in_lanes
-from gqm_sym.runtime.gradients.lanes.operations import ERROR_BOUND, INVERSE_ROOT, RESULTS, ROUNDING, SINC, SINC_PAIR
+from gqm_sym.runtime.gradients.lanes.operations import (
+    ERROR_BOUND,
+    INVERSE_ROOT,
+    RESULTS,
+    ROUNDING,
+    SINC,
+)
 
 # The number of orbits in a vector, which every number of orbits that a program is called with is a multiple of.
 WIDTH = 8
@@ -24,7 +30,7 @@ VECTOR = ir.VectorType(REAL, WIDTH)
 PAIR = tuple[ir.Value, ir.Value, ir.Value]
 """A number in double-double arithmetic: its high double, its low one, and the bound on the error."""
 
-BodyArguments = tuple[ir.IRBuilder, ir.Value, ir.Value]
+BodyArguments = tuple[ir.IRBuilder, ir.Value, ir.Value, tuple[ir.IRBuilder, ir.Value]]
 """The arguments of `Body`."""
 
 
@@ -39,10 +45,14 @@ class Body:
         The address of the first orbit's double in the first register.
     scratch : ir.Value
         The same address in memory for numbers that later loops need.
+    before : (ir.IRBuilder, ir.Value)
+        The builder of what is done once before the loop over orbits, and the address of the first register.
     """
 
-    def __init__(self, builder: ir.IRBuilder, here: ir.Value, scratch: ir.Value) -> None:
-        self.builder, self._here, self.scratch = builder, here, scratch
+    def __init__(
+        self, builder: ir.IRBuilder, here: ir.Value, scratch: ir.Value, before: tuple[ir.IRBuilder, ir.Value]
+    ) -> None:
+        self.builder, self._here, self.scratch, self.before = builder, here, scratch, before
         self._loaded: dict[int, ir.Value] = {}
 
     def constant(self, value: float) -> ir.Value:
@@ -167,7 +177,7 @@ PAIR_OPERATIONS: dict[int, Callable[[PairBody, PAIR, PAIR], PAIR]] = {
 # The operations in doubles that are written as code. An interpreter carries out all others.
 DOUBLE_OPERATIONS = {
     *(interpreter.ADD, interpreter.SUBTRACT, interpreter.MULTIPLY, interpreter.DIVIDE, interpreter.SQUARE_ROOT),
-    *(SINC, SINC_PAIR, INVERSE_ROOT, *range(ERROR_BOUND, in_lanes.FROM_PAIR + 1)),
+    *(SINC, INVERSE_ROOT, *range(ERROR_BOUND, in_lanes.FROM_PAIR + 1)),
 }
 
 
@@ -176,15 +186,16 @@ class DoubleBody(Body):
 
     Parameters
     ----------
-    builder, here, scratch
-        As for `Body`.
+    body : tuple
+        The arguments of `Body`.
     kept : dict
         The positions of numbers in the memory for later loops.
     """
 
-    def __init__(self, builder: ir.IRBuilder, here: ir.Value, scratch: ir.Value, kept: dict[int, int]) -> None:
-        super().__init__(builder, here, scratch)
+    def __init__(self, body: BodyArguments, kept: dict[int, int]) -> None:
+        super().__init__(*body)
         self._found, self._kept = dict[int, ir.Value](), kept
+        self._terms_at: dict[int, list[dict[int, ir.Value]]] = {}
 
     def carry_out(self, codes: Iterable[Sequence[int]], copied: Iterable[int], stored: dict[int, int]) -> None:
         """Carry out operations, of which each result has a negative number.
@@ -202,7 +213,7 @@ class DoubleBody(Body):
             self.store(self.load(position), self._kept[position], self.scratch)
         for code, out, left, right in codes:
             several = code in RESULTS
-            results = self._several(code, self._number(left), right) if several else [self._one(code, left, right)]
+            results = self._several(code, left, right) if several else [self._one(code, left, right)]
             for k, value in enumerate(results):
                 self._found[out - k] = value
                 if out - k in self._kept:
@@ -267,30 +278,56 @@ class DoubleBody(Body):
         y = builder.select(is_normal, y, self.constant(float("nan")))
         return builder.select(builder.fcmp_ordered("<", other, self.constant(0.0)), builder.fneg(y), y)
 
-    def _several(self, code: int, a: ir.Value, right: int) -> Sequence[ir.Value]:
+    def _several(self, code: int, left: int, right: int) -> Sequence[ir.Value]:
         """Return the results of an operation that has several."""
-        b = a if code == SINC else self._number(right)
-        at_a, at_b, slope, by_a, by_b, slope_a, slope_b = self._series(a, b)
-        inside = self._is_inside(a)
-        if code == SINC_PAIR:
-            inside = self.builder.and_(inside, self._is_inside(b))
-        value = at_a if code == SINC else self.builder.fadd(at_a, at_b)
-        value = self.builder.select(inside, value, self.constant(float("nan")))
-        return (value, by_a) if code == SINC else (value, slope, by_a, by_b, slope_a, slope_b)
+        if code == SINC:
+            a = self._number(left)
+            value = slope = self.constant(0.0)
+            for coefficient in in_lanes.SERIES:
+                slope = self.called("fma", slope, a, value)
+                value = self.called("fma", value, a, self.constant(coefficient))
+            return self._where_inside(a, value), slope
+        return self._wave_differences(left, self.load(right), self.load(right + LOW))
 
-    def _is_inside(self, p: ir.Value) -> ir.Value:
-        """Return whether numbers are in the range of the power series."""
+    def _where_inside(self, p: ir.Value, value: ir.Value) -> ir.Value:
+        """Return values where p is in the range of the power series, and NaN elsewhere."""
         low = self.builder.fcmp_ordered(">=", p, self.constant(in_lanes.MIN_SQUARE))
-        return self.builder.and_(low, self.builder.fcmp_ordered("<=", p, self.constant(in_lanes.MAX_SQUARE)))
+        inside = self.builder.and_(low, self.builder.fcmp_ordered("<=", p, self.constant(in_lanes.MAX_SQUARE)))
+        return self.builder.select(inside, value, self.constant(float("nan")))
 
-    def _series(self, p: ir.Value, q: ir.Value) -> tuple[ir.Value, ...]:
-        """Return what `interpreter.sinc_series` does."""
-        at_p = at_q = slope = by_p = by_q = slope_p = slope_q = self.constant(0.0)
-        for coefficient in in_lanes.SERIES:
-            slope_q = self.called("fma", slope_q, q, slope)
-            slope_p = self.called("fma", slope_p, q, by_p)
-            slope = self.called("fma", slope, q, at_p)
-            by_p, by_q = self.called("fma", by_p, p, at_p), self.called("fma", by_q, q, at_q)
-            at_p = self.called("fma", at_p, p, self.constant(coefficient))
-            at_q = self.called("fma", at_q, q, self.constant(coefficient))
-        return at_p, at_q, slope, by_p, by_q, slope_p, slope_q
+    def _wave_differences(self, tilt: int, high: ir.Value, low: ir.Value) -> Sequence[ir.Value]:
+        """Return what `interpreter.fill_wave_differences` does."""
+        sums = [self.constant(0.0)] * 3
+        for terms in reversed(self._terms(tilt)):  # the sums side by side, so that none waits for another
+            for which, term in terms.items():
+                sums[which] = self.called("fma", sums[which], high, term)
+        even, by_even, by_odd = sums
+        odd = self.called("fma", self.builder.fmul(self.constant(-2.0), high), by_odd, even)
+        third, rest = map(self.constant, in_lanes.THIRD)
+        odd = self.called("fma", third, odd, self.builder.fmul(rest, odd))
+        values = [self.called("fma", low, by, value) for by, value in ((by_even, even), (by_odd, odd))]
+        return [*(self._where_inside(high, value) for value in values), by_even, by_odd]
+
+    def _terms(self, tilt: int) -> list[dict[int, ir.Value]]:
+        """Return the terms of the series of `interpreter.fill_wave_differences`, which all orbits have in common: for
+        each number of them, those of the three sums that have it.
+        """
+        if tilt in self._terms_at:
+            return self._terms_at[tilt]
+        (builder, work), one = self.before, ir.Constant(REAL, 1.0)
+        place = builder.load(builder.gep(work, [ir.Constant(WHOLE, tilt)]))
+        square, power, found = builder.fmul(place, place), one, list[dict[int, ir.Value]]()
+        nothing, zero = ir.Constant(VECTOR, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+        for number, coefficients in enumerate(zip(in_lanes.WAVES.T.tolist(), in_lanes.RESTS.T.tolist(), strict=True)):
+            power = builder.fma(power, square, one) if number else one
+            terms = {}
+            for which, pair in enumerate(zip(*coefficients, strict=True)):
+                if number >= in_lanes.FIRST_TERMS[which]:
+                    high, low = (ir.Constant(REAL, part) for part in pair)
+                    term = builder.fma(high, power, builder.fmul(low, power))
+                    term = builder.insert_element(nothing, term, zero)
+                    terms[which] = builder.shuffle_vector(term, nothing, everywhere)
+            found.append(terms)
+        self._terms_at[tilt] = found
+        return found

@@ -22,11 +22,11 @@ from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
 from gqm_sym.runtime.gradients.evaluation import values
-from gqm_sym.runtime.gradients.lanes.differences import Places
 from gqm_sym.runtime.gradients.lanes.exact_differences import SeriesRecorder, assembled
-from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
+from gqm_sym.runtime.gradients.lanes.operations import WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.programs import total_change
 from gqm_sym.runtime.gradients.panels import shares_at, shares_on, weights_on
+from gqm_sym.runtime.gradients.passages.first_differences import TwoPlaces
 from gqm_sym.runtime.gradients.programs import Program, Source
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
@@ -51,10 +51,6 @@ class WaveRecorder(SeriesRecorder):
             found, even = found * even, 2 * even * even - 1
         return found
 
-    def sinc_pair(self, p: TapeNumber, q: TapeNumber) -> tuple[TapeNumber, TapeNumber]:
-        """Record S(p) + S(q) and S[p, q], which divided differences over two places do not need."""
-        return LaneRecorder.sinc_pair(self, p, q)
-
 
 @lru_cache(maxsize=64)
 def from_turn_program(source: Source, wanted: tuple[int, ...] | None = None) -> Program | None:
@@ -72,8 +68,8 @@ def from_turn_program(source: Source, wanted: tuple[int, ...] | None = None) -> 
         for j, k in enumerate(rows)
     ]
     try:
-        over = Places(op, (a, b), (share, 1 - share))
-        slope, ds = over.of(source.formulas.effective_potential, p).first[0], over.of(source.formulas.ds, p).at[1]
+        over = TwoPlaces(op, (a, b), share)
+        slope, ds = over.of(source.formulas.effective_potential, p).first, over.of(source.formulas.ds, p).at[1]
         width = b - a
         rate = ds * op.sqrt((1 - share) * (width / (-2 * slope)))
 

@@ -26,19 +26,21 @@ FORMULAS: dict[str, Callable[..., Any]] = {
     "roots": lambda op, u, p: op.sqrt(1 + p[0] * u**2) + (1 + u) ** (op.mpf(-3) / 2) + op.sqrt(p[0]) * u**2,
     "waves of waves": lambda op, u, p: op.sin(p[0] * op.cos(u)) + op.tan(u / 4) + op.pi * u**2,
 }
-P = 0.7
+P, PLACE = 0.7, (-0.6, 0.64)
 
 # Widths of orbits and phase angles. The widest reaches over more than half a wave of 3*u.
 ORBITS = ((1e-6, 1.1), (0.01, 1.1), (0.5, 1.1), (1.9, 1.1), (2.6, 2.9))
 
 
-def carried_out(program: LaneProgram, run: Callable[..., None], p: float, ends: tuple[float, float], phi: float) -> Any:
-    """Return the results of a program in the first lane, at one phase angle."""
+def carried_out(
+    program: LaneProgram, run: Callable[..., None], p: float, ends: tuple[float, float], place: tuple[float, float]
+) -> Any:
+    """Return the results of a program in the first lane, at a place given by its two coordinates."""
     work = program.work.copy()
     for k, value in enumerate((p, *ends)):
         work[k * ROW : k * ROW + LOW] = value
-    for at, share in zip(program.coordinates, (np.sin(phi / 2) ** 2, np.cos(phi / 2) ** 2), strict=True):
-        work[at : at + BLOCK] = share
+    for at, coordinate in zip(program.coordinates, place, strict=True):
+        work[at : at + BLOCK] = coordinate
     INTERPRETER.call(program.before.ctypes.data, 0, len(program.before), work.ctypes.data, BLOCK)
     run(program.nodes.ctypes.data, 0, len(program.nodes), work.ctypes.data, BLOCK)
     return work[program.outputs]
@@ -47,9 +49,7 @@ def carried_out(program: LaneProgram, run: Callable[..., None], p: float, ends: 
 def recorded(name: str) -> LaneProgram:
     """Return the program of a second divided difference, and of its derivatives with respect to p and both ends."""
     op = LaneRecorder(3, 2)
-    second = (
-        Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(FORMULAS[name], op.values[:1]).second
-    )
+    second = Places(op, (op.values[1], op.values[2]), *op.places).of(FORMULAS[name], op.values[:1]).second
     moves = [[op.number(int(j == k)) for j in range(3)] for k in range(3)]
     return assemble(op, [second, *changes(op, [(second, op.number(1))], op.values, moves)])
 
@@ -60,11 +60,11 @@ def test_differences_of_formulas(name: str) -> None:
     program = recorded(name)
     for width, phi in ORBITS:
         ends = (0.35, 0.35 + width)
-        found = carried_out(program, LANES_INTERPRETER.call, P, ends, phi)
+        found = carried_out(program, LANES_INTERPRETER.call, P, ends, (-np.cos(phi), np.sin(phi) ** 2))
         with mp.workdps(60):
 
             def second(p: Any, a: Any, b: Any, phi: float = phi) -> mpf:
-                u = a + (b - a) * mpf(np.sin(phi / 2) ** 2)
+                u = a + (b - a) * (1 - mpf(np.cos(phi))) / 2
                 f = [FORMULAS[name](mp, place, [p]) for place in (a, u, b)]
                 return ((f[2] - f[1]) / (b - u) - (f[1] - f[0]) / (u - a)) / (b - a)
 
@@ -86,7 +86,7 @@ def test_python_gives_the_same_bits(name: str) -> None:
     in_python = plain_by_address(LANES_INTERPRETER.function, LANES_INTERPRETER.signature, LANES_INTERPRETER.text)
     assert in_python is not None
     LANES_INTERPRETER.compile()
-    plain, compiled = (carried_out(program, run, P, ends, 0.7) for run in (in_python, LANES_INTERPRETER.call))
+    plain, compiled = (carried_out(program, run, P, ends, PLACE) for run in (in_python, LANES_INTERPRETER.call))
     np.testing.assert_array_equal(plain, compiled)
 
 
@@ -97,7 +97,7 @@ def test_formulas_without_a_rule(formula: Any) -> None:
     """Other functions are refused, so that other arithmetic is used."""
     op = LaneRecorder(3, 2)
     with pytest.raises(WithoutRuleError):
-        Places(op, (op.values[1], op.values[2]), (op.places[0], op.places[1])).of(formula, op.values[:1])
+        Places(op, (op.values[1], op.values[2]), *op.places).of(formula, op.values[:1])
 
 
 @pytest.mark.parametrize("scale", [1.0, -1.0, 1e100, -1e-100])
@@ -115,10 +115,11 @@ def test_roots_of_quotients(scale: float, with_root: bool) -> None:
         rate, given = root_of_quotient(op, above, below)
     moves = [[op.number(int(j == k)) for j in range(3)] for k in range(3)]
     program, phi = assemble(op, [rate, *changes(op, given, op.values, moves)]), 0.9
-    found = carried_out(program, LANES_INTERPRETER.call, P, (0.35, 1.25), phi)
+    place = np.sin(phi / 2) ** 2, np.cos(phi / 2) ** 2
+    found = carried_out(program, LANES_INTERPRETER.call, P, (0.35, 1.25), place)
     in_python = plain_by_address(LANES_INTERPRETER.function, LANES_INTERPRETER.signature, LANES_INTERPRETER.text)
-    np.testing.assert_array_equal(carried_out(program, in_python, P, (0.35, 1.25), phi), found)
-    share, rest = np.sin(phi / 2) ** 2, np.cos(phi / 2) ** 2
+    np.testing.assert_array_equal(carried_out(program, in_python, P, (0.35, 1.25), place), found)
+    share, rest = place
     x, y = 0.35 + P * share, 1.25 + P * rest
     root = x / (abs(scale) * np.sqrt(y)) if with_root else np.sqrt(x / y)
     by_x, by_y = root / x * (1.0 if with_root else 0.5), -root / (2 * y)
@@ -130,4 +131,4 @@ def test_a_root_of_a_number_that_is_not_normal() -> None:
     op = LaneRecorder(3, 2)
     program = assemble(op, [root_of_quotient(op, op.values[0] * op.places[0], op.number(1))[0]])
     for p in (0.0, -1.0, 1e-310):
-        assert np.isnan(carried_out(program, LANES_INTERPRETER.call, p, (0.35, 1.25), 0.9)).all()
+        assert np.isnan(carried_out(program, LANES_INTERPRETER.call, p, (0.35, 1.25), (0.2, 0.8))).all()
