@@ -97,10 +97,13 @@ def divided(first, panels, slopes):  # type: ignore[no-untyped-def]
     for k in range(count):
         if not is_resolved(panels[k], slopes, k * WIDE):
             more += PARTS - 1
+    before = np.full(count + more, -1)
     if more == 0:
-        return first, panels, np.arange(count)
-    starts, found = np.empty_like(first), np.empty((count + more, panels.shape[1]))
-    before, terms, at, half = np.full(count + more, -1), np.empty(WIDE), 0, 0
+        for k in range(count):
+            before[k] = k
+        return first, panels, before
+    starts, found = np.empty(first.size, dtype=np.int64), np.empty((count + more, panels.shape[1]))
+    terms, at, half = np.empty(WIDE), 0, 0
     for k in range(count):
         while half < first.size and first[half] == k:
             starts[half], half = at, half + 1
