@@ -22,7 +22,7 @@ def _beside_the_benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mp, "dps", 40)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", TABLES)
 def test_our_rows_are_within_their_limits(name: str) -> None:
     """Each row of ours is run once and compared with its reference of 40 digits."""
@@ -32,6 +32,7 @@ def test_our_rows_are_within_their_limits(name: str) -> None:
         assert row.error(row.call()) <= row.line, f"{row.work}, {row.who}"
 
 
+@pytest.mark.extended
 def test_where_the_time_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each step of the table can be run, which calls compiled functions of the runtime by their own arguments."""
     calls = import_module("calls")

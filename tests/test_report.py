@@ -124,6 +124,7 @@ def test_other_motions(launch: list[str], here: Path) -> None:
     assert ["launch at theta", given] in rows(page(*launch))
 
 
+@pytest.mark.extended
 def test_where_it_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The page is written to the caller's folder by the name in the file; wrong input writes nothing."""
     assert tool.main(["report", "swing.yaml"]) == 0

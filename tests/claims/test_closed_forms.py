@@ -328,6 +328,7 @@ def test_particular_solutions(source: sp.Expr, decay: sp.Expr, solution: sp.Expr
         assert sp.simplify(found - solution) == 0
 
 
+@pytest.mark.extended
 def test_the_march_follows_the_closed_form() -> None:
     """V² of the runtime agrees with the closed form on a leg in each direction and beyond a change of contact sign."""
     for name, lam0, v0, v, places in (

@@ -151,7 +151,7 @@ def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNam
     assert error(motion.legs[0].t_end, first) <= TIME * float(first)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @EVERY_CASE
 def test_positions(case: PaperCase, module_named: ModuleNamed) -> None:
     """lam, x, z and v agree with the tables, early and after thousands of periods."""

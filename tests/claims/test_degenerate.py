@@ -175,6 +175,7 @@ def test_the_error_bound_is_useful(edge: Edge, edge_motion: MotionOf) -> None:
     assert overstatement(edge_motion(edge), rows, edge.lam_scale) <= USEFUL
 
 
+@pytest.mark.extended
 def test_separatrices_are_ill_conditioned_and_say_so(edge_motion: MotionOf) -> None:
     """A launch within 1e-14 of a hilltop magnifies its own rounding error; the condition number says so, and the
     quadrature adds nothing.

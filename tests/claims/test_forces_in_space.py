@@ -26,7 +26,7 @@ def vectors(found: Any) -> Any:
     return np.stack([found.normal_x, found.normal_y, found.normal_z], axis=1)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_a_frame_that_turns(mu: float, built: Build) -> None:
     """Places and the contact force with its Coriolis part are right in both directions of motion, and friction includes
@@ -221,6 +221,7 @@ def test_a_rough_track_that_turns_and_pushes_upwards_only(
     assert motion.state(motion.t_end).n_vertical == pytest.approx(0.0, abs=1e-11)
 
 
+@pytest.mark.extended
 def test_drag_on_a_track_that_turns_and_pushes_upwards_only(built: Build) -> None:
     """Drag leaves the law linear in V**2, but not the component of N that decides about contact."""
     frame = gqm.Gravity() + gqm.RotatingFrame(Omega="1/2")

@@ -41,7 +41,7 @@ LAUNCHES = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", LAUNCHES)
 @examples(2)
 @given(data=st.data())

@@ -122,7 +122,7 @@ def test_sweeps_have_the_same(built: Build) -> None:
         assert swept.gradient[k] == pytest.approx(list(single.values()), rel=1e-13)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("way", [1, -1])
 def test_sensitivities(way: int, built: Build) -> None:
     """The change of the contact force at a given time is right to 12 digits in both directions of motion."""

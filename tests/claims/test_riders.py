@@ -148,6 +148,7 @@ def test_states_of_a_rough_track(rough: ModuleType) -> None:
         assert getattr(path, name)[0] == pytest.approx(getattr(state, name)[0], rel=1e-12)
 
 
+@pytest.mark.extended
 def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
     """If friction holds the body, the loads are those of gravity alone and their rates are zero."""
     motion = rough.solve("5/2", 1, mu="3/5")
@@ -158,6 +159,7 @@ def test_a_rider_at_rest_feels_his_weight(rough: ModuleType) -> None:
     assert (state.onset_vertical, state.onset_lateral, state.onset_longitudinal) == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.extended
 def test_a_rider_who_starts_or_turns(rough: ModuleType) -> None:
     """At a launch from rest and at a turn, the loads are the limits of those of the motion afterwards."""
     motion = rough.solve(-1, t_max=12)
@@ -169,6 +171,7 @@ def test_a_rider_who_starts_or_turns(rough: ModuleType) -> None:
         assert found == pytest.approx([float(load) for load in true], rel=1e-14, abs=1e-14)
 
 
+@pytest.mark.extended
 def test_a_vertical_loop(loop: ModuleType) -> None:
     """Between top and bottom the load changes by six g, all the way round the rider is upright, and levels are crossed
     where closed forms say.

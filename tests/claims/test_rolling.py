@@ -253,6 +253,7 @@ def grip(theta: float, start: float, beta: float) -> float:
     return beta / (1 + beta) * np.sin(theta) / carried
 
 
+@pytest.mark.extended
 def test_slip_is_told_where_it_begins(slippery: ModuleType) -> None:
     """Slip events occur at the launch if friction does not hold there, otherwise on the other side, and in the outer
     part of every swing.

@@ -179,6 +179,7 @@ def test_the_rounding_of_an_end_near_a_hilltop_is_charged(families: dict[str, Mo
     assert soak_bounds.faults(module, family, NEAR_HILLTOP) == ([], len(soak_bounds.SHARES))
 
 
+@pytest.mark.extended
 def test_forces_that_cancel_along_a_track_but_not_across_it(families: dict[str, ModuleType]) -> None:
     """A rounding of the points across the track moves a turning point by eleven times as much (seed 144)."""
     call = {"lam0": 2.467701708628926, "v0": 0.0, "direction": -1, "k": 4.345879535611289, "g": 9.81}
@@ -219,7 +220,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
     return soak_kinds.build(tmp_path_factory.mktemp("kinds"))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("near", [1e-1, 2.5e-3, 1e-6, 1e-10, -1e-10, -2.5e-3])
 @pytest.mark.parametrize("v0", [0.68, 1e-5, 60.0])
 def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dict[str, ModuleType]) -> None:

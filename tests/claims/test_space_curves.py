@@ -455,6 +455,7 @@ def test_a_law_of_the_users_own_knows_y() -> None:
     assert "y" in gqm.derive(gqm.Curve.graph("u**2", parameter="u"), gqm.Gravity() + law).parameters
 
 
+@pytest.mark.extended
 def test_periods_of_closed_curves_and_units_of_their_parameters() -> None:
     """The periods of waves are found, and so are the units of the parameters in the coordinates."""
     assert gqm.families.viviani().period == 4 * sp.pi

@@ -185,6 +185,7 @@ def test_planar_tracks_are_not_banked(roll: Any) -> None:
         gqm.Curve.sampled(ring(48)[:, [0, 2]], roll=roll)
 
 
+@pytest.mark.extended
 def test_work_of_friction_over_a_circuit() -> None:
     """Along a circuit of surveyed points the lost energy is the work of friction, by Gauss's rule between the points,
     with the contact force by Newton's law from the derivatives of the track.

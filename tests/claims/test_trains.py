@@ -216,6 +216,7 @@ def test_across_joints(build: Build) -> None:
     np.testing.assert_allclose(found, v0**2 - 2 * 9.81 * (heights - heights[0]), rtol=0, atol=4e-14)
 
 
+@pytest.mark.extended
 def test_drag(build: Build) -> None:
     """A train on a circle with drag turns where a pendulum under weaker gravity does."""
     module = build("train_with_drag", gqm.families.circle(), gqm.QuadraticDrag())
@@ -228,6 +229,7 @@ def test_drag(build: Build) -> None:
         assert train.t_end == pytest.approx(pendulum.t_end, rel=1e-13)
 
 
+@pytest.mark.extended
 def test_in_space(build: Build) -> None:
     """Along points in space a vertical track gives the planar motion, and sweeps give single motions."""
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
@@ -447,6 +449,7 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     assert start.cars(0).coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
 
 
+@pytest.mark.extended
 def test_cars_pass_jumps_of_curvature(build: Build) -> None:
     """Friction jumps when a car passes the end of an arc, between which places DOP853 integrates Newton's law; motions
     ended at one of them as if the track were singular there.

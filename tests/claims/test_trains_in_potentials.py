@@ -33,7 +33,7 @@ def sinc(length: Any, radius: Any) -> Any:
     return mp.sinc(mpf(length) / mpf(radius))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("radius", "length", "place"), [(1, 1, 1.2), (2, 1.5, -0.7), (3, 2, 2.0), (1, 1e-6, 1.0), (1, 2.0**-40, 0.01)]
 )

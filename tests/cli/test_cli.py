@@ -415,7 +415,7 @@ def test_a_reader_that_leaves_is_no_error() -> None:
 # -- pictures --------------------------------------------------------------------------------
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_a_figure_in_each_format(here: Commands, ending: str, begins: bytes) -> None:
     """Both commands write the same figure, and the same bytes when repeated."""

@@ -99,6 +99,7 @@ def test_a_period_is_one_however_often_it_goes_round(period):
     assert drawn("cos(u)", "sin(u)", period=period).period == sp.sympify(period)
 
 
+@pytest.mark.extended
 def test_what_run_time_values_decide_is_not_refused():
     """A period that depends on run-time values is accepted: a wheel of radius r inside one of radius R closes after one
     turn for whole R/r only.

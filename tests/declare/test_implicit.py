@@ -148,7 +148,7 @@ def test_motion(famous: FamousMotion, by: str, famous_module: ModuleOf) -> None:
         assert error(states.v[k], row["v"]) <= POSITION * fastest
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @EVERY_MOTION
 def test_the_error_bound(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """The bound holds at every time, early and late, and is at most a hundred times the error. The worst ratio measured
@@ -227,6 +227,7 @@ def superellipse(generated_folder: Path) -> ModuleType:
     return gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_superellipse", folder=generated_folder)
 
 
+@pytest.mark.extended
 def test_family(superellipse: ModuleType) -> None:
     """The reference case of the paper's Table 3 is right."""
     cases = json.loads((DATA / "paper_cases.json").read_text(encoding="utf-8"))
@@ -254,6 +255,7 @@ def test_family(superellipse: ModuleType) -> None:
         assert error(field.normal_force[k], row["N"]) <= SAMPLE * 20
 
 
+@pytest.mark.extended
 def test_run_time_parameters(generated_folder: Path) -> None:
     """Start, domain and F may contain run-time parameters, and each set of values has its own chart."""
     curve = gqm.Curve.implicit(

@@ -79,7 +79,7 @@ def test_a_model_says_what_it_is(curve, force):
     assert len(text.splitlines()) <= 12
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("make", [copy.copy, copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
 def test_everything_declared_can_be_copied(make):
     """Everything that is declared can be copied, and the copy is the same."""

@@ -105,7 +105,7 @@ def half_period(height: Callable[[Any], Any], start: mpf, speed: mpf, ends: list
     return total * mp.pi / number
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("height", list(WELLS))
 @pytest.mark.parametrize("origin", ["40", "c"])
 def test_sweeps_about_a_place(height: str, origin: str, tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_the_quadrature_agrees_with_published_values(degrees, known):
     assert abs(bounce(degrees) - mpf(known)) < 1e-8
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("degrees", [80, 60, 45, 30, 20, 16, 15, 10, 5, 3, 2, 1])
 def test_a_field_line_has_mirror_points(degrees, field_line):
     """A field line has mirror points however far out they lie, where the potential grows without bounds."""

@@ -41,7 +41,7 @@ def compare(found: Limited, place: int, values: list[Any], wanted: list[list[Any
             assert abs(got - slope) <= enough * max(scale, float(abs(slope))), (place, name)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("between", [None, (-0.5, 1.25)])
 @pytest.mark.parametrize("given", [{}, {"lam0": "-1/4"}])
 def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: Path) -> None:
@@ -83,6 +83,7 @@ def test_along_an_implicit_curve(between: Any, given: dict[str, Any], tmp_path: 
             compare(found, k, quantities(*at), slopes_of(quantities, at), tuple(LIMITS))
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("friction", [False, True])
 def test_along_a_rail(friction: bool, tmp_path: Path) -> None:
     """On a line and an arc, whose lengths are parameters, derivatives are those of closed forms, with friction too."""

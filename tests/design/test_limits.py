@@ -66,7 +66,7 @@ def all_limited(tracks: _Tracks, between: Any = None) -> Limited:
     return found
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("mu", [MU, 0])
 @pytest.mark.parametrize("given", [{}, {"lam0": "-1/4"}])
 def test_derivatives_along_a_family(mu: Any, given: dict[str, Any], tmp_path: Path) -> None:

@@ -88,6 +88,7 @@ def test_titles_have_one_unit() -> None:
         assert gqm.design.from_load("1", speed, until=1).title.endswith(f"from v0 = {said}")
 
 
+@pytest.mark.extended
 def test_a_load_with_a_pole() -> None:
     """Where a load grows without bound the track ends."""
     with pytest.raises(GQMError, match=r"the track ends near s = 0\.99|no finite value"):

@@ -58,6 +58,7 @@ def test_a_period_that_grows(growing: ModuleType) -> None:
         assert abs(mpf(growing.solve(0.75).period_to(22)) - true[5]) <= mpf("1e-20")
 
 
+@pytest.mark.extended
 def test_an_uneven_share(folder: Path) -> None:
     """A period that is no polynomial is met with a third of the length on the right; the time on both sides is the
     same.

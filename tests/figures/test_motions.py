@@ -87,6 +87,7 @@ def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str
     assert sum(np.isfinite(curve).any() for curve in curves) > 1
 
 
+@pytest.mark.extended
 def test_notebooks_show_figures(circle: ModuleType) -> None:
     """IPython shows each figure as a picture, without pyplot."""
     for what in ("track", "speed_and_force", "portrait"):
@@ -110,6 +111,7 @@ def test_an_unknown_figure(circle: ModuleType) -> None:
         circle.solve(1.0).plot("map")
 
 
+@pytest.mark.extended
 def test_animation(circle: ModuleType, tmp_path: Path) -> None:
     """A GIF has as many frames as requested."""
     animations.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)

@@ -23,6 +23,7 @@ def hills(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     return gqm.build(gqm.derive(track, gqm.Gravity()), name="hills", folder=tmp_path_factory.mktemp("rides"))
 
 
+@pytest.mark.extended
 def test_a_ride(hills: ModuleType, tmp_path: Path) -> None:
     """Track and loads are those of states, the colours are the vertical load, and limits are drawn at their values."""
     motion = hills.solve(0, 10)

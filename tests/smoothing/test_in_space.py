@@ -87,6 +87,7 @@ def test_loads_are_within_their_error(scatter: float, stop: float, known: bool) 
     assert 0.2 < np.sqrt(np.mean(size**2)) < 1.0
 
 
+@pytest.mark.extended
 def test_exact_points_stay() -> None:
     """Points without scatter are on the smooth track, and the track is rotated when they are."""
     points, _ = surveyed(0.0, 0, 4.5)

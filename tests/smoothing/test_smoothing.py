@@ -267,6 +267,7 @@ def test_a_closed_track_closes(seed: int) -> None:
     assert np.ptp(bend) < 0.5 * np.abs(bend).max() + 1e-4
 
 
+@pytest.mark.extended
 @examples(15, otherwise=2)
 @given(
     angle=st.floats(-3.2, 3.2),
@@ -314,6 +315,7 @@ def test_many_points() -> None:
     assert curve.smoothing.standard_deviation == pytest.approx(0.03, rel=0.02)
 
 
+@pytest.mark.extended
 def test_a_place_measured_twice_is_no_mistake() -> None:
     """Rows that repeat the one before are no new points, but messages count them; neighbours may be in any order."""
     points = np.round(TRACKS["parabola"].surveyed(2000, 0.01, 0), 2)
@@ -457,6 +459,7 @@ def test_the_command_line_prints_the_changes(tmp_path: Path, capsys: pytest.Capt
     assert err.count("\n") == 1
 
 
+@pytest.mark.extended
 def test_the_figure() -> None:
     """The figure has three panels: the track, shifts in millimetres and curvature with its band; axes of the caller are
     accepted.

@@ -1,8 +1,8 @@
 """Which tests run at every change, and which only in the extended run (``make test-all``).
 
-A test is marked ``extended`` if it takes more than about a second of processor time and what it claims is also claimed
-by a test that runs at every change: for another curve, force or size. A test with many cases that all pass through the
-same code is marked ``sample``: at every change some of its cases run.
+A test is marked ``extended`` if it takes more than about half a second of processor time and what it claims is also
+claimed by a test that runs at every change: for another curve, force or size. A test with many cases that all pass
+through the same code is marked ``sample``: at every change some of its cases run.
 
 ``sample(3)`` keeps three cases, spread evenly from the first to the last. ``sample(each=("curve", "force"))`` keeps the
 first case with each value of each of these arguments. Tables of cases therefore begin and end with what is hardest.

@@ -198,7 +198,7 @@ FORCES = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("axis", ["x", "catenary"])
 @pytest.mark.parametrize("force", range(len(FORCES)))
 def test_powers_and_waves_together(axis: str, force: int) -> None:
@@ -258,6 +258,7 @@ def test_a_pendulum_has_the_elliptic_integral() -> None:
     assert [sp.simplify(a - b) for a, b in zip(by_quarter, squares, strict=True)] == [0, 0]
 
 
+@pytest.mark.extended
 def test_parameters_with_the_names_of_variables_of_an_orbit(tmp_path: Path) -> None:
     """Run-time parameters may have the names of the variables of an orbit."""
     names = ["fall", "half", "halves", "top", "top_lack", "top_apart", "top_sine", "stretch", "scale"]

@@ -154,6 +154,7 @@ def test_beside_a_singular_point(generated_folder: Path) -> None:
     assert ulps(motion.half_period, "1.003562114539050285946395584607442") <= PERIOD_ULPS
 
 
+@pytest.mark.extended
 def test_another_force(generated_folder: Path) -> None:
     """On a rotating hoop V**2 changes with x as well."""
     curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
@@ -325,6 +326,7 @@ def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
         assert agrees(motion.period_to(30), 2 * (down + up))
 
 
+@pytest.mark.extended
 def test_launch_by_a_length_over_many_pieces(generated_folder: Path) -> None:
     """Far along a parabola the length is (u sqrt(1 + u**2) + asinh(u))/2, and the swing's time agrees with a
     quadrature.

@@ -37,6 +37,7 @@ def test_in_a_vertical_plane_it_is_the_planar_track(force: Any, tmp_path: Path) 
         assert same.normal_force == pytest.approx(np.abs(state.normal_force), rel=1e-13)
 
 
+@pytest.mark.extended
 def test_the_period_is_the_sum_over_the_lines(tmp_path: Path) -> None:
     """A body slides down and up four lines with a constant acceleration on each."""
     motion = built(tmp_path, "zigzag", POINTS, gqm.Gravity()).solve(0.1, 0)
@@ -56,6 +57,7 @@ def test_the_period_is_the_sum_over_the_lines(tmp_path: Path) -> None:
     assert [event.kind for event in motion.events] == ["corner"] * 3 + ["turn"] + ["corner"] * 3 + ["turn"]
 
 
+@pytest.mark.extended
 def test_friction_by_the_slope_of_each_line(tmp_path: Path) -> None:
     """Friction takes μ g cos(slope) from the acceleration, and the contact force is m g cos(slope) at any speed."""
     module = built(tmp_path, "rough_zigzag", POINTS, gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))

@@ -207,6 +207,7 @@ def integrated(speed: float) -> Any:
     return runs
 
 
+@pytest.mark.extended
 def test_force_along_a_loop(loop: ModuleType) -> None:
     """Time, place, speed and N along the loop agree with an integration in time; N is smallest at the top."""
     motion = loop.solve(lam0=0.0, v0=9.3)
@@ -254,7 +255,7 @@ def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
     assert abs(lost.t - brentq(force, run.t[0], 0.5 * (run.t[0] + run.t[-1]), xtol=1e-15)) <= 1e-10
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("s0", "v0"), [(2.5, 1e-5), (2.5, 1e-8), (1.0 - 2.0**-30, 0.0)])
 def test_slow_motion_along_a_level_line(s0: float, v0: float, tmp_path: Path) -> None:
     """Between two arcs a body turns after a pendulum's quarter period on each, however slowly it crosses the line.

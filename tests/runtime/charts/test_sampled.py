@@ -345,6 +345,7 @@ def test_bad_files_are_refused(tmp_path: Path, points: str, data: bytes | str | 
         spec(folder, points, data, "../track.csv" if points.startswith("..") else "track.csv")
 
 
+@pytest.mark.extended
 def test_long_files_are_read(tmp_path: Path) -> None:
     """A file of points has its own limits, because reading it takes longer than a YAML file may."""
     rows = "\n".join(f"{x},{x % 2}" for x in range(120_000))

@@ -97,6 +97,7 @@ def test_points_in_a_vertical_plane(cosine: float, sine: float) -> None:
         assert np.abs(cosine * two.normal_y - sine * two.normal_x).max() <= 1e-12 * np.abs(one.normal_force).max()
 
 
+@pytest.mark.extended
 def test_a_straight_track() -> None:
     """On a slope W is 2 g s sin(slope), and the contact force is that of the slope."""
     points = np.outer(np.arange(8.0), (3.0, 4.0, -12.0))

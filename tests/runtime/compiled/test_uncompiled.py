@@ -69,7 +69,7 @@ def _results(function: Emitted, call: Any, seed: int, count: int) -> np.ndarray:
     return out.view(np.int64)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("module", MODULES)
 def test_bits_are_those_of_compiled_code(module: str) -> None:
     """The bits agree for each function, for arguments over six decades, infinities, NaN and numbers next to

@@ -82,7 +82,7 @@ def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: 
         assert is_within(orbit(motion).duration, wanted)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", SWINGS)
 def test_the_same_as_with_more_digits(name: str) -> None:
     """Half periods, turning points, times to the launch and of panels are those of 34 digits, within the bound."""

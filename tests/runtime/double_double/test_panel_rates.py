@@ -70,6 +70,7 @@ def test_what_cancels_is_left_alone(circle: ModuleType) -> None:
         assert rates(motion, REGULAR, (mpf(1), mpf(1) - mpf("1e-16")), (mpf(0), mpf(1))) is None
 
 
+@pytest.mark.extended
 @given(gap=st.floats(3.0, 11.0), lam0=st.floats(-2.5, 2.5), turns=st.booleans())
 @examples(40)
 def test_beside_the_separatrix(gap: float, lam0: float, turns: bool, circle: ModuleType) -> None:

@@ -165,6 +165,7 @@ def test_turning_points(ring: ModuleType) -> None:
         assert found[name] == pytest.approx((float(end), -float(end)), rel=4e-16)
 
 
+@pytest.mark.extended
 def test_sweeps_and_fits(ring: ModuleType) -> None:
     """Sweeps have gradients along charts, and so have fits: the length of a pendulum from its positions."""
     swept = ring.sweep("period", lam0=[0.5, 1.0], R=[1.0, 2.0], gradient=("R", "lam0"))

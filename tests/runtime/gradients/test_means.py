@@ -223,6 +223,7 @@ def largest_force(v0: Any, L: Any, length: Any, g: Any) -> tuple[Any]:
     return (v0**2 / L + g,)
 
 
+@pytest.mark.extended
 def test_three_parts(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Under more parts of a potential than there are coordinates, laps have derivatives too."""
     law, folder = gqm.Gravity() + gqm.Potential("k*x**2/2 + c*x**4/4", parameters=["k", "c"]), tmp_path_factory

@@ -68,7 +68,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     np.testing.assert_allclose(slow_values, values(fast._program, fast._rule[0], *nodes)[:, 0], rtol=1e-15, atol=1e-20)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("launch", [{"lam0": "pi - 1/10**12"}, {"lam0": "3/10", "v0": 6.193843872478898}])
 def test_beside_the_separatrix(launch: dict[str, Any]) -> None:
     """Half periods of swings that end beside the top, and periods of laps that just pass it, have all derivatives."""

@@ -14,7 +14,7 @@ CURVES = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", CURVES)
 def test_no_swing_is_too_small_for_derivatives(name: str, tmp_path: Path) -> None:
     """The derivative by g is -T/(2 g), and that by the launch place grows in proportion to the distance.

@@ -32,7 +32,7 @@ def contact_force(point: sp.Matrix) -> sp.Expr:
     return sp.sqrt(vector.dot(vector))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(
     ("name", "launch", "point", "parameters"),
     [

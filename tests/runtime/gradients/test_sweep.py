@@ -115,7 +115,7 @@ def test_turning_points_come_with_times() -> None:
     np.testing.assert_array_equal(columns[3, LOWER_END:], [np.nan, np.inf])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["ellipse", "rolling_circle", "double_well", "circle_spring"])
 def test_as_single_motions(name: str) -> None:
     """For random launches in both directions, sweeps and single motions agree on librations and circulations, for all
@@ -173,7 +173,7 @@ def test_turning_points_and_extremes_of_pendulums() -> None:
     np.testing.assert_allclose(lightest[swings].T, at_turn, rtol=8 * ULP)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["ellipse", "double_well", "rolling_circle"])
 def test_extremes_of_random_launches(name: str) -> None:
     """Extremes are those of single motions, which improve their places in another way; none is solved singly."""

@@ -35,7 +35,7 @@ def test_a_pendulum() -> None:
     assert isnan(top.frequency)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("spin", [3.0, 4.0, 5.0, 12.0])
 def test_a_rotating_hoop(spin: float) -> None:
     """Below the critical speed the bottom is stable; above it two other places are, with the frequency
@@ -66,6 +66,7 @@ def test_a_parabola_on_the_open_line(height: str) -> None:
     assert only.frequency == pytest.approx(sqrt(9.81 * bend), rel=TOLERANCE)
 
 
+@pytest.mark.extended
 def test_a_double_well_and_a_quartic() -> None:
     """Two wells lie beside a hill; with a force of third power, small oscillations become slower without limit."""
     left, hill, right = model(gqm.Curve.graph("x**4 - x**2")).equilibria()
@@ -133,6 +134,7 @@ def test_nothing_rests_on_a_slope_and_anything_on_a_plane() -> None:
         model(gqm.Curve.parametric(x="u", z="3", parameter="u")).equilibria()
 
 
+@pytest.mark.extended
 def test_a_catenary() -> None:
     """At the bottom of z = c*cosh(x/c) the square of the frequency is g/c, for any c."""
     (only,) = model(gqm.families.catenary(c="1/3")).equilibria()

@@ -171,7 +171,7 @@ def test_random_landscapes(
         assert abs(place - truth) <= TURN_PLACE + 1e-14 * size / slope
 
 
-@pytest.mark.sample(3)
+@pytest.mark.extended
 @pytest.mark.parametrize("gap", ["1e-6", "1e-10", "1e-14", "1e-20", "1e-40"])
 def test_tops_that_all_but_touch_the_energy(gap: str, module_of: ModuleOf) -> None:
     """A pendulum with v0**2 = 4 g L (1 -+ gap) turns before the top or goes round; without a gap, it does neither."""
@@ -214,6 +214,7 @@ def test_a_cusp_stops_the_walk(start: float, cusp: float, direction: int, module
     assert abs(far - cusp) <= 1e-14
 
 
+@pytest.mark.extended
 def test_a_curve_that_is_not_there(generated_folder: Path) -> None:
     """If a parameter makes a coordinate the root of a negative number, an error says so, from rest and moving."""
     ellipse = gqm.Curve.parametric(
@@ -235,7 +236,7 @@ def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -
     assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("scale", [1e3, 1.0, 1e-3, 1e-6, 1e-12])
 def test_an_exponential_wall_of_any_width(generated_folder: Any, scale: float, direction: int) -> None:

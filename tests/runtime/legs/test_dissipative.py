@@ -174,6 +174,7 @@ def test_contact_that_is_lost_after_two_turns(build: Build) -> None:
     assert loop.solve(0.5, contact="above").t_end == math.inf
 
 
+@pytest.mark.extended
 def test_an_end_after_many_turns() -> None:
     """A pendulum with so little friction that it turns 33 000 times rests when its mean loss says so, give or take one
     turn, in a sweep too. It was said to swing for ever. One that would turn 3e8 times is refused, and one whose loss
@@ -210,6 +211,7 @@ def root(build: Build) -> ModuleType:
     return build("root", gqm.Curve.graph("x*sqrt(x)"), gqm.QuadraticDrag(b="0.1"))
 
 
+@pytest.mark.extended
 def test_a_singular_point_is_reached(root: ModuleType) -> None:
     """From rest at 1, W is 2 g times the integral of z' exp(-2 b (s(u) - s(x))), and the time is that of ds/sqrt(W)."""
     (event,) = root.solve(lam0=1).events
@@ -274,6 +276,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
         motion.lam(10.0)
 
 
+@pytest.mark.extended
 def test_over_a_joint_and_back(build: Build) -> None:
     """Along a level line, up an arc to its turn, down again and to rest, each part agrees with its closed form.
 

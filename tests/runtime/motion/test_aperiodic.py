@@ -481,6 +481,7 @@ def open_tracks(generated_folder: Any, module_of: ModuleOf) -> dict[str, ModuleT
     }
 
 
+@pytest.mark.extended
 def test_contact_lost_on_waves(open_tracks: dict[str, ModuleType]) -> None:
     """Thrown along z = sin(x) at 8 m/s a body leaves at N = 0, before it is asked for anything."""
     motion = open_tracks["waves"].solve("0", 8, -1, contact="above")
@@ -496,6 +497,7 @@ def test_contact_lost_on_waves(open_tracks: dict[str, ModuleType]) -> None:
     assert {event.kind for event in bilateral.events} == {"contact-sign"}
 
 
+@pytest.mark.extended
 def test_a_fall_into_a_centre_ends(open_tracks: dict[str, ModuleType]) -> None:
     """From rest at distance 1 the fall takes pi/2**(3/2), which is known without following the body first."""
     for launch in ({}, {"t_max": 10}):
@@ -526,7 +528,7 @@ def test_rest_with_friction_on_the_wrong_side() -> None:
     assert (motion.t_end, motion.events[0].kind) == (0.0, "liftoff")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("lam0", ["-1", "1", -1.0])
 def test_a_ridge_as_high_as_the_launch(lam0: Any, generated_folder: Any) -> None:
     """A ridge as high as the launch is never reached, from either side; one unit away the potential is that of the

@@ -53,7 +53,7 @@ def test_from_rest_at_the_top_cusp(hanging: ModuleType, lam0: object, end: float
     assert np.abs(np.abs(state.v) - 4 * R * W * np.sin(W * t)).max() <= 1e-14
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("v0", [1e-4, 1e-2, 0.3, 1.0, 20.0])
 def test_thrown_from_a_cusp(hanging: ModuleType, v0: float) -> None:
     """A body thrown from one cusp moves through to the other."""
@@ -63,6 +63,7 @@ def test_thrown_from_a_cusp(hanging: ModuleType, v0: float) -> None:
     assert abs(motion.t_end - truth) <= 1e-14 * truth
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("v0", [1e-5, 0.1, 1.0, 4.0])
 def test_up_the_arch_and_back(arch: ModuleType, v0: float) -> None:
     """A body too slow for the top comes back to its cusp."""

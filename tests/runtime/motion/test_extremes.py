@@ -49,6 +49,7 @@ def test_a_circulation(swing: ModuleType) -> None:
     assert motion.v_max == (8.0, 0.0, 0.0)
 
 
+@pytest.mark.extended
 def test_near_the_separatrix_the_peak_is_short(swing: ModuleType) -> None:
     """The fast part of the motion, a thousandth of the period, is found."""
     motion = swing.solve("pi - 1/1000000000000")
@@ -124,6 +125,7 @@ def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None
     assert slope.solve(0, t_max=2).v_max.value == pytest.approx(2 * 9.81 * sqrt(0.5), rel=1e-14)
 
 
+@pytest.mark.extended
 def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
     """The body ends where arc length and time converge; it was fastest at the lowest place of the spiral before."""
     spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound", folder=tmp_path)
@@ -142,7 +144,7 @@ CUSP_FORCES = {
 }
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("force", CUSP_FORCES)
 @pytest.mark.parametrize(("lam0", "direction"), [(-1.5, 1), (1.25, -1)])
 def test_a_load_that_grows_without_bound(force: str, lam0: float, direction: int, tmp_path: Path) -> None:

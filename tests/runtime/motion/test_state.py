@@ -135,6 +135,7 @@ def test_energy_is_kept(swing: ModuleType) -> None:
     assert energy.kinetic + energy.potential == pytest.approx(np.full(TIMES.size, 6 - 15 * np.cos(1)), rel=1e-13)
 
 
+@pytest.mark.extended
 def test_the_speed_beside_a_hilltop() -> None:
     """A body that passes a hilltop slowly has V**2 = v0**2 + 2 g h (2 x**2 - x**4), however much of that cancels in
     doubles.

@@ -23,7 +23,7 @@ def planes() -> ModuleType:
     return load(ROOT / "generated" / "planes.py", "planes")
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("lam0", "v0", "direction"), LAUNCHES)
 def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, planes: ModuleType) -> None:
     """V**2 along the motion is that of the height lost, and the bound on places is useful."""
@@ -35,6 +35,7 @@ def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, plan
     assert np.max(motion.error_bound(t)) <= USEFUL
 
 
+@pytest.mark.extended
 def test_many_hills_and_a_slow_passage() -> None:
     """After 400 panels the rest of the orbit was left to one, on which nothing was right, or the launch was refused;
     now it is right.

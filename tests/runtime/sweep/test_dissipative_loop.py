@@ -267,6 +267,7 @@ def test_arrivals_at_the_end_of_a_track(build: Build) -> None:
     assert arrivals.values == pytest.approx(ends.values, rel=2.0**-52)
 
 
+@pytest.mark.extended
 def test_a_curve_for_each_parameter(build: Build) -> None:
     """Launches are grouped by the parameters of the chart; those without a curve are refused one by one."""
     rail = gqm.Curve.piecewise([gqm.line(length="a"), gqm.arc(radius=1, angle="pi/2")])

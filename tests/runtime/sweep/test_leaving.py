@@ -57,6 +57,7 @@ def test_down_a_helix_that_turns(build: Build) -> None:
             assert (np.abs(swept.values - truth) <= 4e-15 * size).all()
 
 
+@pytest.mark.extended
 def test_up_and_down_a_rail_that_turns(build: Build) -> None:
     """The force on a body that turns on a rail in a rotating frame has the extremes of the solved motion, which are
     searched on its panels.

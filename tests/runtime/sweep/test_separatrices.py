@@ -74,7 +74,7 @@ def asked(motion: Any, quantity: str, place: float) -> Any:
     return found if np.isfinite(found) else None
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", HILLS)
 def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType]) -> None:
     """A sweep gives the same kinds of motion, and values that differ by roundings times the condition number."""
@@ -112,6 +112,7 @@ def ulps(value: float, truth: Any) -> float:
     return abs(float((mpf(value) - truth) / mpf(float(np.spacing(value)))))
 
 
+@pytest.mark.extended
 def test_bodies_that_pass_a_hilltop_closely_on_a_closed_curve(modules: dict[str, ModuleType]) -> None:
     """Lap times and arrivals agree with elliptic integrals, and no launch is solved singly."""
     gaps = 10.0 ** -np.array([2.1, 3.2, 4.3, 6.4, 8.5])

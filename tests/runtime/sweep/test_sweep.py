@@ -137,6 +137,7 @@ def test_turning_points_and_loads_as_of_one_motion(v0: float, module_of: ModuleO
             assert list(pair) == pytest.approx(sorted(circle.solve(start, v0, L=1).turning_points), rel=5e-16)
 
 
+@pytest.mark.extended
 def test_largest_loads_where_one_maximum_becomes_two(module_of: ModuleOf) -> None:
     """On the ellipse with axes 2 and 1 the load is largest at the bottom, and beside it for releases higher than -1/3.
 
@@ -263,6 +264,7 @@ def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
     assert (whole.values[77] == circle.sweep("half_period", amplitude, L=float(length[77, 0])).values).all()
 
 
+@pytest.mark.extended
 def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
     """None of many states exceeds the extremes, and the most extreme of these comes near."""
     model = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.CoulombFriction(mu="0.1"))

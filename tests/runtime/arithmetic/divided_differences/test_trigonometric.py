@@ -5,6 +5,7 @@ mpmath.
 import math
 import random
 
+import pytest
 from mpmath import mp, mpf
 
 from gqm_sym.runtime.arithmetic.divided_differences.trigonometric import (
@@ -45,6 +46,7 @@ def pairs(count: int) -> list[tuple[float, float]]:
     return found
 
 
+@pytest.mark.extended
 def test_second_differences_about_the_middle() -> None:
     """Second differences of cos and sin over -h, v, h are right from the gaps alone."""
     for h1, h2 in pairs(2000):
@@ -101,6 +103,7 @@ def test_factors_of_second_differences_of_hyperbolic_functions() -> None:
     assert math.isnan(divdiff1_cosh_in_square(MAX_HYPERBOLIC_SPAN, 1.001 * MAX_HYPERBOLIC_SPAN))
 
 
+@pytest.mark.extended
 def test_second_difference_of_the_hyperbolic_tangent() -> None:
     """Its factors of both ends and of the gaps give it up to the widest orbits that they are for."""
     draw = random.Random(8)

@@ -116,6 +116,7 @@ def test_times_on_the_way(ring: ModuleType) -> None:
             assert abs(mpf(row[0]) + mpf(row[1]) - time_to(place)) <= 1e-26
 
 
+@pytest.mark.extended
 @given(height=st.floats(0.01, 1.4), side=st.sampled_from([-1, 1]))
 @examples(40)
 def test_two_planes(height: float, side: int, module_for: Callable[..., ModuleType]) -> None:
@@ -148,7 +149,7 @@ def test_an_arc_between_lines(angle: float, module_for: Callable[..., ModuleType
         holds(on_line, swing + 2 * mp.sqrt(w) / g)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("launch", [{"lam0": 3.3}, {"lam0": 4.05}, {"lam0": 2.2, "v0": 2.5}])
 def test_a_spline(launch: dict[str, float], module_for: Callable[..., ModuleType]) -> None:
     """Extended precision, which knows the spline by other formulas and integrates it by other rules, agrees."""
@@ -190,6 +191,7 @@ def test_a_shape_with_a_cosine_of_a_parameter(module_for: Callable[..., ModuleTy
             holds(module.solve(lam0=0.75, alpha=angle), 2 * mp.ellipk(k**2) * mp.sqrt(length / mpf(G)))
 
 
+@pytest.mark.extended
 def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -> None:
     """Launches that differ in mass or gravity only are swept along one chart, and get what each gets alone."""
     curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1}, tangent=-1)

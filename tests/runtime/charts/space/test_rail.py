@@ -102,6 +102,7 @@ def test_loads_on_riders(tmp_path: Path) -> None:
         assert ours[name] == pytest.approx(theirs[name], rel=1e-14, abs=2e-14), name
 
 
+@pytest.mark.extended
 def test_a_loop_has_no_level(tmp_path: Path) -> None:
     """Where the tangent is vertical the frame has no roll angle; on steep climbs it has one."""
     loop = gqm.transition(length=8, pitch="1/2")

@@ -109,7 +109,7 @@ def test_neighbours_do_not_matter() -> None:
         np.testing.assert_allclose(column, wanted, rtol=4 * ULP)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["double_well", "circle", "ellipse", "rolling_circle"])
 def test_machine_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Machine code for a program gives the same bits as the interpreters, for librations from rest and others, and for

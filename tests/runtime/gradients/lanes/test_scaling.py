@@ -99,7 +99,7 @@ def test_random_launches(name: str, *, is_thrown: bool) -> None:
                 assert abs(found.gradient[k, column] - wanted) <= 4 * ULP * abs(wanted)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("rate", [1, 3])
 def test_thrown_along_waves(rate: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Multiples of half the width of an orbit are differentiated, whatever constants they are joined with."""

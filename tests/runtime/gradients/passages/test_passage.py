@@ -120,6 +120,7 @@ def over_the_hill(lam0: Any, v0: Any, h: Any, g: Any, to: Any) -> list[Any]:
     return [mp.quad(rate, mp.linspace(lam0, to, 9))]
 
 
+@pytest.mark.extended
 def test_over_a_hill(hill: ModuleType) -> None:
     """The time to a place, and the contact force at its least, which is inside the motion."""
     given = {"lam0": mpf(-2), "v0": mpf(5), "h": mpf(1), "g": mpf("9.81")}

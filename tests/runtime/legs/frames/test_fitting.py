@@ -93,7 +93,7 @@ def spring_at(t: Any, start: Any, down: Any, rate: Any, beyond: Any, c: Any) -> 
     return v / beyond * mp.exp(-c * (t - down) / 2) * mp.sin(beyond * (t - down))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.extended
 @pytest.mark.parametrize("seed", range(12))
 def test_swings_with_drag_about_a_joint(seed: int, rails: dict[str, ModuleType]) -> None:
     """Legs take as long, and end where, the solution for V**2 on both arcs says."""
@@ -141,7 +141,7 @@ def swing_with_drag(start: Any, near: Any, far: Any, b: Any) -> tuple[Any, Any]:
     return first + last, end
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("angle", ["1e-7", "1e-3"])
 def test_an_equilibrium_beside_a_joint(angle: str, tmp_path: Path) -> None:
     """Swings within one arc take as long as without the joint, and those that pass it as long as on both arcs."""

@@ -87,7 +87,7 @@ def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: P
     assert begins[0] == pytest.approx(begins[1], rel=TURN_TIMES)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("lam0", ["1/10", "-1e-3", "1e-6", "-1e-9", "1e-13", "-1e-16", "1e-19"])
 def test_a_body_departs_from_any_hilltop_alike(lam0: str, law: str, pairs: Pairs) -> None:
@@ -127,6 +127,7 @@ def test_rest_on_a_hilltop(pairs: Pairs) -> None:
         pairs("hilltop", "viscous")[1].solve(f"{SHAPES['hilltop'][2]} + 1e-25")
 
 
+@pytest.mark.extended
 @pytest.mark.parametrize("where", [0, 1])
 def test_a_swing_that_has_died_away_stays(where: int, pairs: Pairs) -> None:
     """A swing that has died away stays at the equilibrium within the bound, where V**2 or the place has no digits

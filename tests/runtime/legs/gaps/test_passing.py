@@ -55,7 +55,7 @@ def plane(tmp_path_factory: pytest.TempPathFactory) -> CompiledModel:
     return gqm.build(model, name="plane", folder=Path(tmp_path_factory.mktemp("plane")))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("down", [True, False])
 def test_times_on_an_inclined_plane(plane: CompiledModel, *, down: bool) -> None:
     """The force is ``a - c V**2`` downhill and ``-a - c V**2`` uphill, for which time has a closed form."""

@@ -116,7 +116,7 @@ def test_sweeps_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
             assert abs(places[start] - rows[-1, 1]) <= PLACES * high
 
 
-@pytest.mark.sample(3)
+@pytest.mark.extended
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_drag_on_planes(mu: float, track: tuple[ModuleType, Any]) -> None:
     """Random launches with drag are followed and only lose energy; with friction as well they are followed to their

@@ -89,7 +89,7 @@ def rings(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], CompiledM
     return built
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("pieces", "amplitude"), [(80, 0.18), (80, 0.21), (80, 0.55), (8, 0.55), (8, 1.1)])
 def test_times_to_rest_on_a_tilted_circle(pieces: int, amplitude: float, rings: Callable[[int], CompiledModel]) -> None:
     """Legs along some short pieces, on which V**2 is far from linear, and along many; and turns sought on parts of long

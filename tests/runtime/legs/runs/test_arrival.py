@@ -47,7 +47,7 @@ def test_drag_on_a_slope(slope: Callable[[Any, str], ModuleType]) -> None:
     assert (np.isnan(late.values) == (cosh(sqrt(a * c)) < np.exp(c * PLACES))).all()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("force", ["friction", "drag", "droplet"])
 def test_places_before_and_behind_a_turn(force: str, generated_folder: Path) -> None:
     """In a bowl, places before the first turn are passed as the solved motion says, and places behind it are not."""

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 import gqm_sym as gqm
 
 
+@pytest.mark.extended
 def test_n_may_change_its_sign_where_all_forces_vanish(tmp_path: Path) -> None:
     """A leg was refused on which N changes its sign at an inflection in the centre of a central force.
 

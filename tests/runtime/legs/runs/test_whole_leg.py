@@ -330,7 +330,7 @@ IN_SPACE = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("name", "curve", "given", "turns", "durations", "passage", "largest"), IN_SPACE)
 def test_friction_in_space(
     name: str,

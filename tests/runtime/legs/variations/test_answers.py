@@ -226,6 +226,7 @@ def falling(lam0: mpf, v0: mpf, L: mpf, mu: mpf, g: mpf, m: mpf, **_: mpf) -> An
 RING = {"lam0": "-0.9", "v0": "5.6", "L": "1.1", "mu": "0.05", "g": "9.81", "m": "0.7"}
 
 
+@pytest.mark.extended
 def test_where_contact_is_lost() -> None:
     """A bead on a rough ring that can only push inwards lifts off at a time with the right derivatives, and so are its
     extremes before.

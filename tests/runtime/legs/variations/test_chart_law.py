@@ -47,7 +47,7 @@ LAUNCHES = [
 ]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize(("arc", "radius", "v0", "times"), LAUNCHES)
 def test_states_on_a_circle(arc: float, radius: float, v0: float, times: tuple[float, ...], ring: ModuleType) -> None:
     """Sensitivities, ends and turning points are those of the circle as a formula, also over laps."""
@@ -188,7 +188,7 @@ def test_a_rail_in_space_is_the_planar_one(generated_folder: Path) -> None:
     assert np.abs(there.normal_force - here.normal_force).max() <= 4 * TOLERANCE * np.abs(here.normal_force).max()
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("name", ["points", "rail"])
 def test_in_space_as_differences(name: str, generated_folder: Path) -> None:
     """Derivatives along points and rails in space are those of differences of answers, also by a shape."""

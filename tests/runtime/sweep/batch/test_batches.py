@@ -260,6 +260,7 @@ def test_wells_about_neighbouring_axes_differ(tmp_path: Path) -> None:
     assert refused.status.tolist() == [quantities.ANSWERED, quantities.REFUSED, quantities.REFUSED]
 
 
+@pytest.mark.extended
 def test_pieces_of_a_proof_are_small_beside_a_pole(tmp_path: Path) -> None:
     """Bounds of the slope of this potential are too wide next to 0, where its terms have poles that cancel; equal
     pieces of an orbit that reaches this place would have to be too many. V**2 does not lose the digits that cancel.

@@ -82,7 +82,7 @@ def true_orbit(lam0: mpf, v0: mpf, near: list[float]) -> tuple[float, list[float
         return float(mp.quad(rate, edges, method="gauss-legendre")), [float(low), float(high)]
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("v0", [0.0, 1.5])
 def test_wells_between_hills(v0: float, spiral: ModuleType) -> None:
     """On a spiral with an axis of symmetry that is wells away, orbits turn at the first hill, not at the mirror

@@ -125,6 +125,7 @@ def test_released_at_rest_in_later_laps(build: Callable[..., ModuleType]) -> Non
     assert np.abs(errors(values, truths)).max() <= MAX_ERROR
 
 
+@pytest.mark.extended
 def test_between_the_cusps_of_a_tricuspoid(build: Callable[..., ModuleType]) -> None:
     """The square of ds has a double root at each cusp, and its expanded terms cancelled near it; with the square S of
     the sine of half the distance from the axis, half periods are complete elliptic integrals of 2*S/(1 - 2*S).
@@ -206,6 +207,7 @@ def half_period_on_graph(height: Callable[[Any], Any], ds: Callable[[Any], Any],
     return mp.pi * total / nodes * abs(end - start) / 2
 
 
+@pytest.mark.extended
 def test_turns_far_from_zero(tmp_path: Path) -> None:
     """Waves of a place, at the ends of an orbit too, follow from the launch and the distance from there, whose sum is
     not rounded: after a hundred turns these times were up to 278 ulp off.
@@ -231,6 +233,7 @@ def test_turns_far_from_zero(tmp_path: Path) -> None:
     assert np.abs(errors(swept.values, truths)).max() <= MAX_ERROR
 
 
+@pytest.mark.extended
 def test_wide_swings_far_from_zero(tmp_path: Path) -> None:
     """The rounding of an end counts where it is more than that of the width: these times were up to 4 ulp off."""
     curve = gqm.Curve.graph("cosh(3*(x-7)/2)+x/3", parameter="x")
@@ -289,6 +292,7 @@ def half_period_on_conchoid(start: float) -> Any:
     return mp.pi * total / nodes / mp.sqrt(2 * mpf(9.81))
 
 
+@pytest.mark.extended
 def test_from_rest_next_to_a_pole(tmp_path: Path) -> None:
     """The distance from an axis at pi/2 is no double, and what rounding takes from it counts next to the pole: these
     times were up to 16 ulp off.

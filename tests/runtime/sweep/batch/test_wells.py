@@ -54,7 +54,7 @@ def test_a_launch_alone_has_the_same_bits() -> None:
         assert singly.values == pytest.approx(together.values, rel=5e-16, abs=0.0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.extended
 @pytest.mark.parametrize("count", [1, 8, 131])
 def test_bodies_that_all_rest_have_the_same_bits(count: int) -> None:
     """Where all bodies are released at rest, in their well or beyond the ends of the curve, no zero is searched; one

@@ -81,6 +81,7 @@ def loss_on_hills(b: float, start: float, speed: float) -> tuple[float, float]:
     return float(sum(ways)), float(mp.sqrt(v2(mp.findroot(slope, -1.8))))
 
 
+@pytest.mark.extended
 def test_a_body_that_turns_before_it_leaves(generated_folder: Path) -> None:
     """The left crest is higher than the right one; contact is lost where z'' V**2 = -g (1 + z'**2)."""
     hills = gqm.Curve.graph("b*sin(x) - x/4", parameter="x", domain=(-6, 6))

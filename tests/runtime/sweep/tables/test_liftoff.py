@@ -76,6 +76,7 @@ def test_a_launch_backwards_from_a_joint(hump: ModuleType) -> None:
     assert float(hump.sweep("t_end", 2.0, 5.0, 1, contact="above").values) == 0.0
 
 
+@pytest.mark.extended
 def test_a_body_in_a_ring_up_to_where_it_leaves(generated_folder: Path) -> None:
     """Thrown up from the lowest place with V0**2 = share * g, a body leaves where 3 cos(s) = 2 - share.
 

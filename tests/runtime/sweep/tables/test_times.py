@@ -221,6 +221,7 @@ def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of:
     assert np.array_equal(sweep("t_end", every_other, speed, contact="above").values, swept.values, equal_nan=True)
 
 
+@pytest.mark.extended
 def test_rolling_in_a_hoop(tmp_path: Path) -> None:
     """The centre of a ball swings as a pendulum of length L - rho and inertia 1 + beta; a ball too large is refused."""
     model = gqm.derive(gqm.families.circle(L="L"), gqm.Gravity() + gqm.Rolling(beta="2/5", radius="rho"))
@@ -235,6 +236,7 @@ def test_rolling_in_a_hoop(tmp_path: Path) -> None:
     assert swept.status.tolist() == [0, STATUS_SENTENCES.index("the launch is refused; solve says why")]
 
 
+@pytest.mark.extended
 def test_fastest_place_beside_the_launch(tmp_path: Path) -> None:
     """On an ellipse a ball launched beside the lowest place is fastest behind its launch, as its energy says."""
     ellipse = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
