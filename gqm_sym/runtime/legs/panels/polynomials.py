@@ -6,7 +6,7 @@ or the end of the domain. ``x`` runs from -1 at the beginning of the panel to 1 
 """
 
 from functools import cache
-from math import cos, fabs, fsum, pi, sin
+from math import cos, fabs, fsum, inf, pi, sin
 
 import numpy as np
 
@@ -227,7 +227,7 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     verdict : int
         ONE_SIGN if the series has the sign so far up to its end; TO_ZERO if it does, but is within the noise at its
         end; OTHER_SIGN if it begins with the other sign; CROSSES if it changes from the sign so far to the other; ZERO
-        if it is within the noise, or undecided on a smallest part; else UNDECIDED.
+        if it is within the noise, undecided on a smallest part, or not known; else UNDECIDED.
     before : int
         The sign with which it starts, if it was not known before.
     x : float
@@ -236,6 +236,8 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     spread = 0.0
     for k in range(1, COUNT):
         spread += fabs(part[k])
+    if not fabs(part[0]) + spread < inf:  # such as beyond a turn, for a law that contains the root of V**2
+        return ZERO, before, 2.0
     if fabs(part[0]) > spread + noise:
         found = 1 if part[0] > 0.0 else -1
         before = found if before == 0 else before

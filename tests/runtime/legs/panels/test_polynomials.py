@@ -140,6 +140,13 @@ def test_a_wrong_sign_to_begin_with_changes_at_once() -> None:
     assert first_change(_series([-1.0 + 1e-11]), 1, NOISE)[0] == 2.0  # but not within the error of its first place
 
 
+def test_a_series_without_values_has_no_change() -> None:
+    """It ends at once, although no bound decides anything on any part."""
+    c = _series([0.3])
+    c[3] = np.nan
+    assert first_change(c, 1, NOISE)[:2] == (2.0, 1)
+
+
 WIDTH = 3 * LANES
 _weighed = over_rows(lambda a, b, c: a - b * c / (2.0 + abs(a)), WIDTH)
 _root = over_rows(np.sqrt, WIDTH)
