@@ -8,6 +8,7 @@ from math import pi, sqrt
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from weakref import WeakValueDictionary
 
 import pytest
 
@@ -194,6 +195,8 @@ def test_a_module_for_another_interface(version: int, text: str, path: Path, mon
     path.write_text(text.replace(f"interface={INTERFACE})", f"interface={version})"), encoding="utf-8")
     monkeypatch.setattr(jit.COMPILER, "callback", _failing(AssertionError("compiled")))
     monkeypatch.setattr(jit.COMPILER, "record", lambda *_: None)
+    # Otherwise its functions are those of a module with the same text that another test has loaded.
+    monkeypatch.setattr("gqm_sym.runtime.compiled.emitted._IN_USE", WeakValueDictionary())
     with pytest.raises(OutdatedModuleError, match=rf"bowl\.py: .*interface {version} .*{INTERFACE}; run gqm-gen"):
         load(path, "outdated")
     path.write_text(text, encoding="utf-8")
