@@ -10,8 +10,9 @@ Mean and slope of the chord do not depend on the place. The rules for sums, prod
 are exact (MATHS, section 3), and odd parts cancel exactly in an even well.
 """
 
+from abc import ABC, abstractmethod
 from fractions import Fraction
-from typing import Any
+from typing import Any, Self
 
 from gqm_sym.runtime.double_double.recording import TapeNumber
 from gqm_sym.runtime.gradients.lanes.operations import WithoutRuleError
@@ -19,7 +20,131 @@ from gqm_sym.runtime.gradients.lanes.operations import WithoutRuleError
 HALF = Fraction(1, 2)
 
 
-class Places:
+class PlacesBase(ABC):
+    """Places over which divided differences are recorded, and the namespace of operations for numbers over them.
+
+    Attributes
+    ----------
+    op : LaneRecorder or SeriesRecorder
+        The tape.
+    place : NumberOverPlaces
+        The place itself.
+    """
+
+    op: Any
+    place: Any
+
+    @abstractmethod
+    def spread(self, value: Any) -> Any:
+        """Return a number over the places; a constant is the same at all of them."""
+
+    def tan(self, u: Any) -> Any:
+        """Record a tangent."""
+        return self.sin(u) / self.cos(u)
+
+    def tanh(self, u: Any) -> Any:
+        """Record a hyperbolic tangent."""
+        return self.sinh(u) / self.cosh(u)
+
+    def of(self, formula: Any, p: Any) -> Any:
+        """Return a formula ``f(op, lam, p)`` over the places."""
+        return self.spread(formula(self, self.place, [self.spread(number) for number in p]))
+
+    def __getattr__(self, name: str) -> Any:
+        function = getattr(self.op, name)
+
+        def of_constant(u: Any) -> Any:
+            number = self.spread(u)
+            if not number.is_constant:
+                raise WithoutRuleError
+            return self.spread(function(number.constant))
+
+        return of_constant
+
+
+class NumberOverPlaces(ABC):
+    """A number that depends on the place, with its divided differences: what follows from sums, products and
+    reciprocals.
+    """
+
+    __slots__ = ()
+
+    places: Any
+
+    @property
+    @abstractmethod
+    def is_constant(self) -> bool:
+        """Whether the number does not depend on the place."""
+
+    @property
+    @abstractmethod
+    def constant(self) -> TapeNumber:
+        """The value of a number that does not depend on the place."""
+
+    @abstractmethod
+    def _linear(self, other: Any, sign: int) -> Self:
+        """Return the sum with a multiple of another number."""
+
+    @abstractmethod
+    def __mul__(self, other: Any) -> Self: ...
+
+    @abstractmethod
+    def inverse(self) -> Self:
+        """Return the reciprocal."""
+
+    def __add__(self, other: Any) -> Self:
+        return self._linear(other, 1)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Self:
+        return self._linear(other, -1)
+
+    def __rsub__(self, other: Any) -> Self:
+        found: Self = self.places.spread(other) - self
+        return found
+
+    def __neg__(self) -> Self:
+        return self * -1
+
+    def __rmul__(self, other: Any) -> Self:
+        found: Self = self * other
+        return found
+
+    def __truediv__(self, other: Any) -> Self:
+        found: Self = self * self.places.spread(other).inverse()
+        return found
+
+    def __rtruediv__(self, other: Any) -> Self:
+        found: Self = self.places.spread(other) * self.inverse()
+        return found
+
+    def __abs__(self) -> Self:
+        raise WithoutRuleError
+
+    def __pow__(self, other: Any) -> Self:
+        power = self.places.spread(other)
+        exponent = power.constant
+        if not power.is_constant or exponent.known is None or exponent.known.denominator > 2:
+            raise WithoutRuleError
+        base: Self = self if exponent.known.denominator == 1 else self.places.sqrt(self)
+        found = base.to(abs(exponent.known.numerator))
+        return found.inverse() if exponent.known < 0 else found
+
+    def __rpow__(self, other: Any) -> Self:
+        raise WithoutRuleError
+
+    def to(self, count: int) -> Self:
+        """Return the power with a positive integer exponent."""
+        if count < 2:
+            one: Self = self.places.spread(1)
+            return self if count else one
+        half = self.to(count // 2)
+        square = half * half
+        return square * self if count % 2 else square
+
+
+class Places(PlacesBase):
     """Both turning points a and b and a place between them, and the namespace of operations for numbers over them.
 
     Parameters
@@ -46,10 +171,6 @@ class Places:
         if isinstance(value, Differenced):
             return value
         return Differenced(self, self.op.number(value), self.op.number(0), self.op.number(0))
-
-    def of(self, formula: Any, p: Any) -> "Differenced":
-        """Return a formula ``f(op, lam, p)`` over the places."""
-        return self.spread(formula(self, self.place, [self.spread(number) for number in p]))
 
     def _wave(self, u: "Differenced", sign: int, *, is_odd: bool) -> "Differenced":
         """Return the sine (``is_odd``) or cosine of a number, or their hyperbolic counterparts (``sign`` -1)."""
@@ -96,14 +217,6 @@ class Places:
         number = self.spread(u)
         return self.spread(self.op.exp(number.mean)) if number.is_constant else self.cosh(u) + self.sinh(u)
 
-    def tan(self, u: Any) -> "Differenced":
-        """Record a tangent."""
-        return self.sin(u) / self.cos(u)
-
-    def tanh(self, u: Any) -> "Differenced":
-        """Record a hyperbolic tangent."""
-        return self.sinh(u) / self.cosh(u)
-
     def sqrt(self, u: Any) -> "Differenced":
         """Record a square root."""
         number, op = self.spread(u), self.op
@@ -114,19 +227,8 @@ class Places:
         second = (number.second - slope * slope) / (root + (mean + slope * self.distance))
         return Differenced(self, mean, slope, second, root)
 
-    def __getattr__(self, name: str) -> Any:
-        function = getattr(self.op, name)
 
-        def of_constant(u: Any) -> Differenced:
-            number = self.spread(u)
-            if not number.is_constant:
-                raise WithoutRuleError
-            return self.spread(function(number.mean))
-
-        return of_constant
-
-
-class Differenced:
+class Differenced(NumberOverPlaces):
     """A number that depends on the place, as its chord and its second divided difference.
 
     Parameters
@@ -143,6 +245,8 @@ class Differenced:
 
     __slots__ = ("_at", "mean", "places", "second", "slope")
 
+    places: Places
+
     def __init__(self, places: Places, mean: Any, slope: Any, second: Any, at: Any = None) -> None:
         self.places, self.mean, self.slope, self.second, self._at = places, mean, slope, second, at
 
@@ -150,6 +254,12 @@ class Differenced:
     def is_constant(self) -> bool:
         """Whether the number does not depend on the place."""
         return bool(self.slope.known == 0) and self.is_linear
+
+    @property
+    def constant(self) -> TapeNumber:
+        """The value of a number that does not depend on the place."""
+        found: TapeNumber = self.mean
+        return found
 
     @property
     def is_linear(self) -> bool:
@@ -187,20 +297,6 @@ class Differenced:
             None if is_chord else self.at + sign * v.at,
         )
 
-    def __add__(self, other: Any) -> "Differenced":
-        return self._linear(other, 1)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> "Differenced":
-        return self._linear(other, -1)
-
-    def __rsub__(self, other: Any) -> "Differenced":
-        return self.places.spread(other) - self
-
-    def __neg__(self) -> "Differenced":
-        return self * -1
-
     def __mul__(self, other: Any) -> "Differenced":
         v, places = self.places.spread(other), self.places
         if self.is_constant or v.is_constant:
@@ -215,14 +311,6 @@ class Differenced:
             second = slopes + (self.second * v.at + self.chord * v.second)
         return Differenced(places, mean, self.mean * v.slope + self.slope * v.mean, second, self.at * v.at)
 
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "Differenced":
-        return self * self.places.spread(other).inverse()
-
-    def __rtruediv__(self, other: Any) -> "Differenced":
-        return self.places.spread(other) * self.inverse()
-
     def inverse(self) -> "Differenced":
         """Return the reciprocal."""
         if self.is_constant:
@@ -232,26 +320,3 @@ class Differenced:
         chord = share * (self.mean - self.slope * self.places.distance)
         second = inverse * (self.slope * self.slope * share - chord * self.second)
         return Differenced(self.places, self.mean * share, -(self.slope * share), second, inverse)
-
-    def __abs__(self) -> "Differenced":
-        raise WithoutRuleError
-
-    def __pow__(self, other: Any) -> "Differenced":
-        power = self.places.spread(other)
-        exponent = power.mean
-        if not power.is_constant or exponent.known is None or exponent.known.denominator > 2:
-            raise WithoutRuleError
-        base = self if exponent.known.denominator == 1 else self.places.sqrt(self)
-        found = base.to(abs(exponent.known.numerator))
-        return found.inverse() if exponent.known < 0 else found
-
-    def __rpow__(self, other: Any) -> "Differenced":
-        raise WithoutRuleError
-
-    def to(self, count: int) -> "Differenced":
-        """Return the power with a positive integer exponent."""
-        if count < 2:
-            return self if count else self.places.spread(1)
-        half = self.to(count // 2)
-        square = half * half
-        return square * self if count % 2 else square

@@ -3,16 +3,14 @@
 The rules for sums, products and compositions are exact (MATHS, section 3).
 """
 
-from fractions import Fraction
 from typing import Any
 
 from gqm_sym.runtime.double_double.recording import TapeNumber
-from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
+from gqm_sym.runtime.gradients.lanes.differences import HALF, NumberOverPlaces, PlacesBase
+from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
 
-HALF = Fraction(1, 2)
 
-
-class TwoPlaces:
+class TwoPlaces(PlacesBase):
     """A turning point a and a place, and the namespace of operations for numbers over both.
 
     Parameters
@@ -37,10 +35,6 @@ class TwoPlaces:
             return value
         number = self.op.number(value)
         return FirstDifference(self, (number, number), self.op.number(0))
-
-    def of(self, formula: Any, p: Any) -> "FirstDifference":
-        """Return a formula ``f(op, lam, p)`` over both places."""
-        return self.spread(formula(self, self.place, [self.spread(number) for number in p]))
 
     def _wave(self, u: "FirstDifference", function: Any, derivative: Any, sign: int) -> "FirstDifference":
         """Return a wave with its derivative, given as functions; those of hyperbolic ones have the ``sign`` -1."""
@@ -70,14 +64,6 @@ class TwoPlaces:
         """Record an exponential."""
         return self._wave(self.spread(u), self.op.exp, self.op.exp, -1)
 
-    def tan(self, u: Any) -> "FirstDifference":
-        """Record a tangent."""
-        return self.sin(u) / self.cos(u)
-
-    def tanh(self, u: Any) -> "FirstDifference":
-        """Record a hyperbolic tangent."""
-        return self.sinh(u) / self.cosh(u)
-
     def sqrt(self, u: Any) -> "FirstDifference":
         """Record a square root."""
         number = self.spread(u)
@@ -86,19 +72,8 @@ class TwoPlaces:
             return self.spread(x)
         return FirstDifference(self, (a, x), number.first / (a + x))
 
-    def __getattr__(self, name: str) -> Any:
-        function = getattr(self.op, name)
 
-        def of_constant(u: Any) -> FirstDifference:
-            number = self.spread(u)
-            if not number.is_constant:
-                raise WithoutRuleError
-            return self.spread(function(number.at[1]))
-
-        return of_constant
-
-
-class FirstDifference:
+class FirstDifference(NumberOverPlaces):
     """A number that depends on the place, over a turning point and a place.
 
     Attributes
@@ -119,62 +94,23 @@ class FirstDifference:
         """Whether the number does not depend on the place."""
         return bool(self.first.known == 0)
 
+    @property
+    def constant(self) -> TapeNumber:
+        """The value of a number that does not depend on the place."""
+        found: TapeNumber = self.at[1]
+        return found
+
     def _linear(self, other: Any, sign: int) -> "FirstDifference":
         v = self.places.spread(other)
         at = [one + sign * two for one, two in zip(self.at, v.at, strict=True)]
         return FirstDifference(self.places, at, self.first + sign * v.first)
-
-    def __add__(self, other: Any) -> "FirstDifference":
-        return self._linear(other, 1)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> "FirstDifference":
-        return self._linear(other, -1)
-
-    def __rsub__(self, other: Any) -> "FirstDifference":
-        return self.places.spread(other) - self
-
-    def __neg__(self) -> "FirstDifference":
-        return self * -1
 
     def __mul__(self, other: Any) -> "FirstDifference":
         v = self.places.spread(other)
         (a, x), (p, y) = self.at, v.at
         return FirstDifference(self.places, (a * p, x * y), self.first * y + a * v.first)
 
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> "FirstDifference":
-        return self * self.places.spread(other).inverse()
-
-    def __rtruediv__(self, other: Any) -> "FirstDifference":
-        return self.places.spread(other) * self.inverse()
-
     def inverse(self) -> "FirstDifference":
         """Return the reciprocal."""
         a, x = (1 / value for value in self.at)
         return FirstDifference(self.places, (a, x), -(a * x) * self.first)
-
-    def __abs__(self) -> "FirstDifference":
-        raise WithoutRuleError
-
-    def __pow__(self, other: Any) -> "FirstDifference":
-        power = self.places.spread(other)
-        exponent = power.at[1]
-        if not power.is_constant or exponent.known is None or exponent.known.denominator > 2:
-            raise WithoutRuleError
-        base = self if exponent.known.denominator == 1 else self.places.sqrt(self)
-        found = base.to(abs(exponent.known.numerator))
-        return found.inverse() if exponent.known < 0 else found
-
-    def __rpow__(self, other: Any) -> "FirstDifference":
-        raise WithoutRuleError
-
-    def to(self, count: int) -> "FirstDifference":
-        """Return the power with a positive integer exponent."""
-        if count < 2:
-            return self if count else self.places.spread(1)
-        half = self.to(count // 2)
-        square = half * half
-        return square * self if count % 2 else square

@@ -14,15 +14,12 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.inversion import leg_tables, records
 from gqm_sym.runtime.inversion.leg_tables import WIDE
-from gqm_sym.runtime.inversion.table import TERMS, tabulate
+from gqm_sym.runtime.inversion.table import PARTS_PER_SEGMENT, TERMS, tabulate
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES, end_errors, time_errors_of_panels
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
-
-# The number of equal parts of the time for each interval; they serve to find the interval of a time.
-SLOTS_PER_INTERVAL = 32
 
 # The nodes of the Gauss-Legendre rule on [-1, 1], and the matrix from values at them to Legendre coefficients.
 NODES = np.polynomial.legendre.leggauss(WIDE)[0]
@@ -296,7 +293,7 @@ def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) ->
         counts = [len(piece.panels) for piece in pieces]
         states[:, leg_tables.PANEL] += np.repeat(np.cumsum([0, *counts[:-1]]), [len(piece.states) for piece in pieces])
     until = intervals[:, leg_tables.UNTIL]
-    parts, last = SLOTS_PER_INTERVAL * len(until), len(until) - 1
+    parts, last = PARTS_PER_SEGMENT * len(until), len(until) - 1
     slots: NDArray[np.int64] = np.zeros(parts + 1, dtype=np.int64)
     # Rounding may assign a time to the slot after its own.
     slots[1:] = until.searchsorted(until[-1] / parts * np.arange(parts), side="right")
