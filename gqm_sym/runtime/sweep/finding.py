@@ -1,6 +1,6 @@
 """The orbit of one launch: on the table of its curve, or by a search along the curve."""
 
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
@@ -25,6 +25,18 @@ from gqm_sym.runtime.sweep.orbit import CURVE_ENDS, Orbit
 from gqm_sym.runtime.sweep.quantities import ANSWERED, NOT_FINITE, NOT_PERIODIC, OUTSIDE_DOMAIN, UNDECIDED
 from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, find_passage, passage_of
 from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
+
+# The range of places within which an orbit is sought on an endless curve, if that is the whole curve.
+EVERYWHERE = (-inf, inf)
+
+
+@Inlined
+def within_range(lam0, first, last, period, within):  # type: ignore[no-untyped-def]
+    """Return the ends of the curve, or where it is endless those of the range ``within`` which an orbit is sought."""
+    if period > 0.0:
+        return first, last
+    low, high = min(within[0], lam0), max(within[1], lam0)
+    return first if isfinite(first) else low, last if isfinite(last) else high
 
 
 @Inner
@@ -58,11 +70,12 @@ def ends_at_cusp(curve, lam0, v2, ahead, behind):  # type: ignore[no-untyped-def
 
 
 @Inlined
-def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
+def find_orbit(curve, columns, k, monotone, spans, known, within):  # type: ignore[no-untyped-def]
     """Return the status of launch k, which is ANSWERED if it has an orbit, this orbit, and the panels that it passes in
     a table. The status is NOT_PERIODIC if the motion ends at a cusp.
 
-    The orbit's span is taken from ``spans`` if it is ``known``.
+    The orbit's span is taken from ``spans`` if it is ``known``. A body on an endless curve leaves it where it leaves
+    the range of places ``within`` which its orbit is sought.
     """
     lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
     first, last, period = (
@@ -91,6 +104,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     orbit, passage = find_passage(curve, lam0, v0, direction)
     if passage.panels > 0:
         return ANSWERED, orbit, passage
+    first, last = within_range(lam0, first, last, period, within)
     domain = DomainNumbers(first, last, period, axis, step)
     direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
     kind = orbit_kind(direction, ahead, behind, v0, period)

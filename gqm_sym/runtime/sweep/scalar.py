@@ -32,7 +32,6 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on, extreme_on_table
-from gqm_sym.runtime.sweep.finding import find_orbit
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
@@ -40,6 +39,7 @@ from gqm_sym.runtime.sweep.quantities import (
     ARRIVAL_TIME,
     END_TIME,
     HALF_PERIOD,
+    MIN_SPEED,
     NEVER_THERE,
     NOT_PERIODIC,
     PERIOD,
@@ -53,6 +53,7 @@ from gqm_sym.runtime.sweep.single.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself, until_loss
 from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
+from gqm_sym.runtime.sweep.single.until import checked_arrival, find_for, is_later, part_until, stops_beside_turn
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
@@ -86,7 +87,7 @@ class GivenCurve(NamedTuple):
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
-        The last time in s, infinite if there is none; only END_TIME depends on it.
+        The last time in s, infinite if there is none; END_TIME, ARRIVAL_TIME and extremes depend on it.
     exact : RecordedFormulas
         The formulas as a tape; empty at first, because few launches need it.
     signed, path_in_space, directed : bool, int, bool
@@ -235,6 +236,28 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
 
 
 @Inner
+def passes_all(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignore[no-untyped-def]
+    """Return whether a body passes its whole orbit, in both directions if it turns, before the last time."""
+    quantity = HALF_PERIOD if orbit.leaves == 0 else ARRIVAL_TIME
+    time = best_value(curve, orbit, passage, tabulated, quantity, nan, buffers)
+    if orbit.leaves == 0 and not orbit.circulates:
+        time *= 2.0
+    return is_later(t_max, time)
+
+
+@Inner
+def extreme_until(curve, orbit, passage, quantity, t_max, buffers):  # type: ignore[no-untyped-def]
+    """Return an extreme up to the last time, before which a body does not pass its whole orbit; NaN if it is not
+    accurate, depends on the direction of motion, or the orbit is on a table.
+    """
+    if passage.panels > 0 or curve.directed:
+        return nan
+    decided, part = part_until(curve, orbit, t_max, buffers.work)
+    decided = decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part))
+    return value_by_itself(curve, part, quantity, nan, buffers) if decided else nan
+
+
+@Inner
 def loss_of(curve, orbit, passage, half_v2_at_edges, asked):  # type: ignore[no-untyped-def]
     """Return whether it is decided if a body leaves the track, the place at which it does (NaN if it keeps contact),
     the `Loss` on the table, and the orbit up to this place, which is found without a table.
@@ -305,6 +328,9 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
+    if quantity in EXTREMES and t_max < inf and not passes_all(curve, orbit, passage, tabulated, t_max, buffers):
+        out[0] = extreme_until(curve, orbit, passage, quantity, t_max, buffers)
+        return ANSWERED if isfinite(out[0]) else UNDECIDED
     return fill_value(curve, orbit, passage, tabulated, (quantity, target, lost, limit), buffers, out)
 
 
@@ -358,12 +384,14 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)
-        status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
         lam0, target = element(columns, LAM0, k), element(columns, TARGET, k)
+        far = quantity, target, t_max
+        status, orbit, passage = find_for(curve, columns, k, monotone, spans, known, far, buffers)
         if status == UNDECIDED and v0 == 0.0 and rests_on_level(curve, lam0):
             status = fill_at_rest(curve, lam0, (quantity, target, side, t_max), values[k])
         elif status == ANSWERED:
             status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
+            status = checked_arrival(status, quantity, t_max, values[k])
         elif status == NOT_PERIODIC and (quantity not in PERIODIC or side != 0):
             status = UNDECIDED
         statuses[k], routes[k] = status, SINGLE

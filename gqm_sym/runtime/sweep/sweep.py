@@ -30,6 +30,7 @@ from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.columns import as_doubles, broadcast_shape, check_launches, columns_of
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
 from gqm_sym.runtime.sweep.exact_orbits import answer_exactly
+from gqm_sym.runtime.sweep.extremes import EXTREMES
 from gqm_sym.runtime.sweep.groups import Group, groups_of, rests_on_corner
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
@@ -176,12 +177,13 @@ def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Return whether compiled loops can compute the quantity for most launches.
 
-    They cannot for motions that lose energy, and for motions with a last time they compute only the end. They do not
-    distinguish the sides of a space curve.
+    They cannot for motions that lose energy, and do not distinguish the sides of a space curve. Of extremes they do not
+    compare the last time with that of a loss of contact.
     """
     if not formulas.signed and ONLY_SIGN[contact]:
         return False
-    timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
+    compares = not (ONLY_SIGN[contact] and quantity.code in EXTREMES)
+    timely = t_max is None or (compares and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
@@ -211,12 +213,13 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
             in_batches, asked_for = partial(answer_batches, batches.addresses(), layout), found._replace(values=spans)
-            in_batches(*launches, wanted, NO_TAPE, asked_for)
+            exact = _recorded(formulas, asked.lows)
+            in_batches(*launches, wanted, False, exact, asked_for)
             left = np.flatnonzero(found.status == quantities.UNDECIDED)
-            if left.size and (exact := _recorded(formulas, asked.lows)).work.size:
+            if left.size and exact.work.size:
                 again = [line if line.size == 1 else line[left] for line in lines]
                 some = asked_for.part(left)
-                in_batches(pointers(again), formulas.monotone, wanted, exact, some)
+                in_batches(pointers(again), formulas.monotone, wanted, True, exact, some)
                 asked_for.put(left, some)
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue

@@ -134,6 +134,14 @@ def refined_end(fns, p, orbit, end, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def with_refined_ends(curve, orbit, work):  # type: ignore[no-untyped-def]
+    """Return a libration with turning points that are accurate to all digits (`refined_end`)."""
+    low = refined_end(curve.fns, curve.p, orbit, orbit.low, work)
+    high = refined_end(curve.fns, curve.p, orbit, orbit.high, work)
+    return Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, 0)
+
+
+@Inner
 def phase_of(below, above):  # type: ignore[no-untyped-def]
     """Return the phase angle of a place, given its distances from the lower and the upper end."""
     return 2.0 * atan2(sqrt(below), sqrt(above))
@@ -233,12 +241,9 @@ def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
         return arrival_on_way_out(curve, orbit, ahead, work)
     if orbit.circulates:
         return arrival_on_lap(curve, orbit, ahead)
-    width = orbit.high - orbit.low
-    low = refined_end(curve.fns, curve.p, orbit, orbit.low, work)
-    high = refined_end(curve.fns, curve.p, orbit, orbit.high, work)
-    if not orbit.lam0 + low <= place <= orbit.lam0 + high:
+    orbit, width = with_refined_ends(curve, orbit, work), orbit.high - orbit.low
+    if not orbit.lam0 + orbit.low <= place <= orbit.lam0 + orbit.high:
         return inf
-    orbit = Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, 0)
     half_period, start, stop, from_upper = times_from_end(curve, orbit, width, ahead, work, series)
     onwards = orbit.direction * ahead > 0.0
     if (orbit.direction > 0) == from_upper:  # the body is launched towards that end

@@ -1,0 +1,191 @@
+"""The orbit of one of many launches as far as a question needs it, and the part that a body passes up to a time."""
+
+from math import fabs, inf, isfinite, nan, sqrt
+
+import numpy as np
+
+from gqm_sym.runtime.arithmetic.elementary import cos, sin
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.strided import DOMAIN_HIGH, DOMAIN_LOW, DOMAIN_PERIOD, LAM0, element
+from gqm_sym.runtime.inversion.table import place_on_panel
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
+from gqm_sym.runtime.quadrature.time_panels import (
+    DEGREE,
+    are_accurate,
+    derivative,
+    joints_between,
+    orbit_panels,
+    panel_of,
+    read_off,
+)
+from gqm_sym.runtime.sweep.extremes import EXTREMES
+from gqm_sym.runtime.sweep.finding import EVERYWHERE, find_orbit
+from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.quantities import ANSWERED, ARRIVAL_TIME, END_TIME, NEVER_THERE, UNDECIDED
+from gqm_sym.runtime.sweep.single.arrivals import arrival, phase_of, refined_end, with_refined_ends
+
+# The distances from the launch, in units of `unit_of`, within which both turning points of a body on an endless curve
+# are sought first, and then the place that it reaches in time; how often the latter is doubled; and after how many
+# inaccurate times the search is given up.
+TO_TURNS, FIRST_DISTANCE, MAX_DOUBLINGS, MAX_UNKNOWN = 64.0, 1.0, 40, 4
+
+# The unit of distances as a share of the place of the launch, but at least 1.
+UNIT_SHARE = 2.0**-4
+
+# The distance from a turning point as a share of the way there within which the place of a body does not have all the
+# digits of its speed.
+NEAR_TURN = 2.0**-7
+
+# The share of a time by which another one must differ to be later beyond doubt.
+ROUNDED_TIME = 1e-12
+
+
+@Inlined
+def is_endless(columns, k):  # type: ignore[no-untyped-def]
+    """Return whether a launch is on a curve without an end on one side at least."""
+    low, high = element(columns, DOMAIN_LOW, k), element(columns, DOMAIN_HIGH, k)
+    return element(columns, DOMAIN_PERIOD, k) == 0.0 and not isfinite(high - low)
+
+
+@Inlined
+def find_for(curve, columns, k, monotone, spans, known, asked, buffers):  # type: ignore[no-untyped-def]
+    """Return what `find_orbit` does, on an endless curve as far as a question needs it.
+
+    ``asked`` is the quantity, the place for ARRIVAL_TIME, and the last time. A body that goes on for ever leaves its
+    orbit at that place, or after that time.
+    """
+    quantity, target, t_max = asked
+    lam0, within, unknown, distance = element(columns, LAM0, k), EVERYWHERE, 0, TO_TURNS
+    unit = max(1.0, UNIT_SHARE * fabs(lam0))
+    by_time = t_max < inf and (quantity == END_TIME or quantity in EXTREMES) and is_endless(columns, k)
+    if quantity == ARRIVAL_TIME:
+        within = (target, inf) if target < lam0 else (-inf, target)
+    for doublings in range(-1, MAX_DOUBLINGS):
+        if by_time:
+            within = (lam0 - distance * unit, lam0 + distance * unit)
+        status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known, within)
+        is_open = status == ANSWERED and orbit.leaves != 0 and passage.panels == 0
+        if not by_time or not (is_open or (status == UNDECIDED and doublings < 0)):
+            break
+        if doublings < 0:
+            distance = FIRST_DISTANCE
+            continue
+        time = arrival(curve, orbit, nan, buffers.work, buffers.series)
+        if time > t_max:
+            break
+        unknown += 1 if time != time else 0
+        distance *= 2.0
+        if unknown == MAX_UNKNOWN or doublings == MAX_DOUBLINGS - 1:
+            status = UNDECIDED
+            break
+    return status, orbit, passage
+
+
+@Inner
+def is_later(one, other):  # type: ignore[no-untyped-def]
+    """Return whether a time is later than another one beyond doubt."""
+    return one * (1.0 - ROUNDED_TIME) >= other
+
+
+@Inner
+def checked_arrival(status, quantity, t_max, out):  # type: ignore[no-untyped-def]
+    """Return the status of an answer in the row ``out``, where an arrival after the last time is none."""
+    if quantity != ARRIVAL_TIME or status != ANSWERED or is_later(t_max, out[0]):
+        return status
+    status, out[0] = NEVER_THERE if is_later(out[0], t_max) else UNDECIDED, nan
+    return status
+
+
+@Inner
+def phase_at(panels, time):  # type: ignore[no-untyped-def]
+    """Return the phase angle at a time from the first edge of panels."""
+    edges, times, slopes = panels.edges, panels.times, np.empty(DEGREE)
+    k = panel_of(times, time)
+    terms, half, passed = panels.time_terms[k], 0.5 * (edges[k + 1] - edges[k]), time - times[k]
+    derivative(terms, slopes)
+    x = place_on_panel(terms, slopes, passed, 2.0 * passed / (times[k + 1] - times[k]) - 1.0)
+    return edges[k] + half * (1.0 + x)
+
+
+@Inner
+def part_of(orbit, one, other, leaves):  # type: ignore[no-untyped-def]
+    """Return the part of an orbit between two offsets, as the orbit of a body that leaves the curve there."""
+    low, high = min(one, other), max(one, other)
+    return Orbit(False, False, orbit.direction, orbit.lam0, orbit.v2, low, high, leaves)
+
+
+@Inner
+def part_of_swing(orbit, panels, t_max):  # type: ignore[no-untyped-def]
+    """Return the part of a libration with refined ends that a body passes up to a time."""
+    v, low, high, half_period = orbit.direction, orbit.low, orbit.high, panels.times[-1]
+    start = read_off(panels.edges, panels.times, panels.time_terms, phase_of(-low, high))
+    # Times are counted from the passage of the turning point behind the launch.
+    start, ahead = (start, high) if v > 0 else (half_period - start, low)
+    time, has_turned = start + t_max, start + t_max > half_period
+    if has_turned:
+        time = 2.0 * half_period - time
+        if time >= start or time <= 0.0:
+            return part_of(orbit, 0.0, ahead, -v) if time >= start else orbit
+    phi = phase_at(panels, time if v > 0 else half_period - time)
+    below, above = (high - low) * sin(0.5 * phi) ** 2, (high - low) * cos(0.5 * phi) ** 2
+    end = low + below if below < above else high - above
+    return part_of(orbit, end, ahead, -v) if has_turned else part_of(orbit, 0.0, end, v)
+
+
+@Inner
+def part_of_way(orbit, panels, turn, end, t_max):  # type: ignore[no-untyped-def]
+    """Return the part of a way to the offset ``end`` that a body passes up to a time; it begins at a turning point
+    unless that is NaN.
+    """
+    v, turns, last, before = orbit.direction, turn == turn, panels.times[-1], 0.0
+    begin = turn if turns else 0.0
+    if turns and begin != 0.0:
+        launch = sqrt(begin / (begin - end))
+        before = read_off(panels.edges, panels.times, panels.time_terms, launch)
+    is_inwards = turns and v * (end - begin) < 0.0
+    time = t_max - before if is_inwards else t_max + before
+    if time >= last:
+        return orbit
+    if is_inwards and 0.0 <= time <= before:
+        return part_of(orbit, 0.0, begin, -v)
+    share = phase_at(panels, fabs(time))
+    offset = begin + (end - begin) * (share * share if turns else share)
+    return part_of(orbit, offset, begin, -v) if is_inwards and time > 0.0 else part_of(orbit, offset, 0.0, v)
+
+
+@Inner
+def part_until(curve, orbit, t_max, work):  # type: ignore[no-untyped-def]
+    """Return whether it is decided which part of an orbit a body passes up to a time; and that part, as the orbit of a
+    body that leaves the curve there.
+    """
+    kind, low, high, turn = REGULAR, orbit.low, orbit.high, nan
+    if orbit.leaves == 0 and not orbit.circulates:
+        orbit, kind = with_refined_ends(curve, orbit, work), TURN_TURN
+        begin, end = orbit.low, orbit.high
+    elif orbit.circulates:
+        begin, end = 0.0, orbit.direction * (high - low)
+    else:
+        begin, end = (low, high) if orbit.leaves > 0 else (high, low)
+        if orbit.v2 == 0.0 or orbit.leaves != orbit.direction:
+            begin, kind = refined_end(curve.fns, curve.p, orbit, begin, work), FROM_TURN
+            turn = begin
+    a, b = orbit.lam0 + begin, orbit.lam0 + end
+    if joints_between(curve.joints, curve.period, min(a, b), max(a, b)).size:
+        return False, orbit
+    panels = orbit_panels(curve.fns, curve.p, kind, a, b, orbit.lam0, orbit.v2, curve.joints[:0])
+    if not are_accurate(panels):
+        return False, orbit
+    part = part_of_swing(orbit, panels, t_max) if kind == TURN_TURN else part_of_way(orbit, panels, turn, end, t_max)
+    return True, part
+
+
+@Inner
+def stops_beside_turn(orbit, part):  # type: ignore[no-untyped-def]
+    """Return whether the part of an orbit that a body passes ends so near to the turning point ahead of it that the
+    speed there has lost digits.
+    """
+    if orbit.circulates or orbit.leaves == orbit.direction or part.leaves != orbit.direction:
+        return False
+    ahead = orbit.high if orbit.direction > 0 else -orbit.low
+    passed = part.high if orbit.direction > 0 else -part.low
+    return passed < ahead and ahead - passed < NEAR_TURN * ahead

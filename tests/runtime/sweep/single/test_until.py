@@ -1,0 +1,97 @@
+"""Sweeps of motions without losses up to a last time, and of motions that go on for ever."""
+
+from collections.abc import Callable
+from types import ModuleType
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
+
+ModuleOf = Callable[[str], ModuleType]
+
+# Some roundings of a place or of a time.
+ROUNDED = 2e-14
+
+
+def pendulum(start: float, t: float) -> tuple[float, float]:
+    """Return angle and speed at a time of a pendulum of length 1 m that is released at rest."""
+    k, rate = mp.sin(mp.mpf(start) / 2), mp.sqrt(mp.mpf(9.81))
+    half = k * mp.ellipfun("cd", rate * t, k=k)
+    # The sine of half the angle is k cd(rate*t, k), and V**2 is 4 rate**2 times what its square is less than k**2.
+    return float(2 * mp.asin(half)), float(2 * rate * mp.sqrt(k * k - half * half))
+
+
+def test_a_pendulum_up_to_a_time(module_of: ModuleOf) -> None:
+    """Before the bottom the speed is largest, and the track pulls most, where the body is at the last time; later the
+    extremes are those of the whole orbit. No launch is solved by itself.
+    """
+    circle, starts, last = module_of("circle"), np.array([0.4, 1.0, 2.0]), 0.3
+    with mp.workdps(30):
+        states = [pendulum(start, last) for start in starts.tolist()]
+    swept = {name: circle.sweep(name, starts, L=1, g=9.81, t_max=last) for name in ("v_max", "normal_force_max")}
+    for name, values in (
+        ("v_max", [v for _, v in states]),
+        ("normal_force_max", [9.81 * np.cos(a) + v * v for a, v in states]),
+    ):
+        assert (swept[name].route == 1).all()
+        assert swept[name].values == pytest.approx(np.array(values), rel=ROUNDED)
+    later, whole = (circle.sweep("normal_force_max", starts, L=1, g=9.81, t_max=t_max) for t_max in (1.5, None))
+    assert np.array_equal(later.values, whole.values)
+    assert (later.route == 1).all()
+
+
+def test_an_arrival_after_the_last_time_is_none(module_of: ModuleOf) -> None:
+    """What is reached in time is reached at the same time as without a last one."""
+    circle, starts = module_of("circle"), np.array([0.4, 1.0, 2.0])
+    whole = circle.sweep("time_at", starts, lam=0.1, L=1).values
+    last = float(whole[1]) + 1e-6
+    swept = circle.sweep("time_at", starts, lam=0.1, L=1, t_max=last)
+    assert np.array_equal(swept.values, np.where(whole <= last, whole, np.nan), equal_nan=True)
+    assert swept.status_counts() == {STATUS_SENTENCES[5]: int((whole > last).sum())}
+    assert (swept.route == 1).all()
+    for quantity in ("half_period", "period", "turning_points"):
+        one, other = (circle.sweep(quantity, starts, L=1, t_max=t_max).values for t_max in (0.1, None))
+        assert np.array_equal(one, other)
+
+
+def test_an_endless_slope(generated_folder: object) -> None:
+    """Down a straight line that has no end, place and speed are those of a constant acceleration."""
+    curve = gqm.Curve.parametric(x="3*u", z="-4*u", parameter="u")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="endless_slope", folder=generated_folder)
+    v0, direction, pull = np.array([0.0, 3.0, 3.0, 0.5]), np.array([1, 1, -1, -1]), 9.81 * 0.8
+    along = v0 * direction
+    swept = module.sweep("time_at", 2.0, v0, direction, lam=102.0, g=9.81)
+    assert (swept.route == 1).all()
+    assert swept.values == pytest.approx((np.sqrt(along**2 + 2 * pull * 500) - along) / pull, rel=ROUNDED)
+    for t_max in (0.01, 20.0):
+        speeds = module.sweep("v_max", 2.0, v0, direction, t_max=t_max, g=9.81)
+        assert (speeds.route == 1).all()
+        assert speeds.values == pytest.approx(np.maximum(v0, np.abs(along + pull * t_max)), rel=ROUNDED)
+        assert module.sweep("t_end", 2.0, v0, direction, t_max=t_max).values.tolist() == [t_max] * 4
+    least = module.sweep("v_min", 2.0, v0, direction, t_max=0.2, g=9.81).values
+    assert least == pytest.approx(np.where(along >= 0, v0, np.maximum(v0 - 0.2 * pull, 0.0)), rel=ROUNDED)
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize("t_max", [0.2, 0.7, 2.0, 10.0])
+def test_as_solved_motions(generated_folder: object, t_max: float) -> None:
+    """On an endless wave that descends, and on one that rises on both sides, sweeps agree with solved motions."""
+    rng = np.random.default_rng(2)
+    for name, height in (("endless_wave", "-x/2 + sin(x)/4"), ("endless_bowl", "x**2/2 + sin(3*x)/10")):
+        curve = gqm.Curve.graph(height, parameter="x")
+        module = gqm.build(gqm.derive(curve, gqm.Gravity()), name=name, folder=generated_folder)
+        starts, speeds, directions = (
+            rng.uniform(0.1, 4, 12),
+            rng.uniform(0, 3, 12),
+            np.where(rng.random(12) < 0.5, -1, 1),
+        )
+        for quantity in ("t_end", "v_min", "v_max", "normal_force_min", "normal_force_max"):
+            swept = module.sweep(quantity, starts, speeds, directions, t_max=t_max)
+            assert (swept.route == 1).sum() >= 9
+            for k, value in enumerate(swept.values.tolist()):
+                motion = module.solve(starts[k], speeds[k], int(directions[k]), t_max=t_max)
+                true = getattr(motion, quantity)
+                assert value == pytest.approx(getattr(true, "value", true), rel=1e-12, abs=1e-12)
