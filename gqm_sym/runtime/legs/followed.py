@@ -12,14 +12,14 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.legs.body import DIRECTION, MAY_END, PANEL_COUNT, STATUS, TURNS, VALUE
+from gqm_sym.runtime.legs.body import DIRECTION, MAY_END, PANEL_COUNT, PAUSES, STATUS, TURNS, VALUE
 from gqm_sym.runtime.legs.conditions import follow_first_legs
 from gqm_sym.runtime.legs.driver import Driver
 from gqm_sym.runtime.legs.inherited import InheritedErrors
 from gqm_sym.runtime.legs.layout import Layout
 from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_segments import Run, Runs
-from gqm_sym.runtime.legs.questions import MAX_TURNS, may_still_end, turns_at_this_rate
+from gqm_sym.runtime.legs.questions import MAX_PAUSES, MAX_TURNS, may_still_end, turns_at_this_rate
 from gqm_sym.runtime.legs.runs.ends import END_TURN
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import computed_once
@@ -66,6 +66,16 @@ class FollowedMotion(Tabulated, Motion):
         if self._whole is None or len(self._whole.segments) != len(self._pieces):
             self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
         return self._whole
+
+    def _up_to_turn(self, turns: int) -> Trajectory | None:
+        driver = self._driver
+        while driver.number(TURNS) < turns:
+            if driver.ending or driver.number(PAUSES) >= MAX_PAUSES:
+                return None
+            self._follow_next()
+        segments = self._trajectory(0.0).segments
+        last = [k for k, timed in enumerate(segments) if timed.end == "turn"][turns - 1]
+        return Trajectory(segments=segments[: last + 1], lap=self.problem.period)
 
     def _history(self) -> tuple[TimedSegment, ...]:
         self._look_ahead()

@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.body import (
     TARGET,
     TURNS,
     V2,
+    WIDTH_BEFORE,
 )
 from gqm_sym.runtime.legs.leg_reading import passage
 from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, HEADING, LAPS_BEFORE, START, START_V2
@@ -48,6 +49,9 @@ MAX_PAUSES = 60
 # The number of turns up to which legs are stored in search of an end of the motion, and the number of turns up to which
 # the end is searched for without storing them.
 MAX_TURNS, MOST_TURNS = 20_000, 1_000_000
+
+# The number of turns after which the extremes of the speed of a swing that dies away for ever may be known.
+TURNS_TO_SPEEDS = 3.0
 
 # If at the present rate the swings would vanish after more turns than this, no loss of energy shows in doubles.
 UNSEEN_TURNS = 2.0**50
@@ -105,7 +109,15 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
         return body[ELAPSED] < body[HORIZON]
     if question == ARRIVAL:
         return True
+    if question >= LEAST_SPEED and dies_away(body):
+        return question < LEAST_LOAD and body[TURNS] < TURNS_TO_SPEEDS
     return may_still_end(body) and (question <= REST_PLACE or body[TURNS] <= MAX_TURNS)
+
+
+@Inner
+def dies_away(body):  # type: ignore[no-untyped-def]
+    """Return whether a body swings for ever and does not come to rest."""
+    return body[TURNS] > 0.0 and body[MAY_END] == 0.0 and body[ENDING] == 0.0 and body[PAUSES] < MAX_PAUSES
 
 
 @Inner
@@ -181,7 +193,13 @@ def conclude(body, question, findings):  # type: ignore[no-untyped-def]
         return (findings.arrival, FOUND) if is_there else (np.nan, NONE)
     ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
-    if not isfinite(end):
+    if not isfinite(end) and question >= LEAST_SPEED and dies_away(body):
+        # Once a swing is within the one before, all later ones are, and the body is slower there
+        # (`motion.parts.searched`). For its loads, `solve` decides.
+        is_known = question < LEAST_LOAD and body[TURNS] >= TURNS_TO_SPEEDS and body[LAST_WIDTH] < body[WIDTH_BEFORE]
+        if not is_known:
+            return np.nan, LEFT
+    elif not isfinite(end):
         is_slow = body[TURNS] > MAX_TURNS and body[MAY_END] != 0.0 and turns_at_this_rate(body) < inf
         return np.nan, TOO_LONG if question <= REST_PLACE and is_slow else NONE
     if question == END_TIME:

@@ -88,16 +88,16 @@ class Leg(NamedTuple):
     end: str
 
 
-def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array) -> Array:
-    """Return the contact force in N at phase angles of a timed segment; in a rotating frame it depends on the direction
-    of motion.
+def contact_force_on(problem: "Problem", timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
+    """Return the contact force in N at phase angles of a timed segment, on a body with a share of the speed there; in a
+    rotating frame it depends on the direction of motion.
     """
-    return contact_force_at(problem, timed, phi, timed.segment.places(phi))
+    return contact_force_at(problem, timed, phi, timed.segment.places(phi), share)
 
 
-def contact_force_at(problem: "Problem", timed: TimedSegment, phi: Array, places: Array) -> Array:
+def contact_force_at(problem: "Problem", timed: TimedSegment, phi: Array, places: Array, share: float = 1.0) -> Array:
     """Return what `contact_force_on` does, for places that may lie a little beside those of the phase angles."""
-    v2, f = timed.segment.speeds(phi) ** 2, problem.functions
+    v2, f = (share * timed.segment.speeds(phi)) ** 2, problem.functions
     force: Array
     if problem.formulas.directed:
         force = length(path_in_space(problem.formulas, f.p, places, v2, np.full(phi.size, timed.direction))[1:])

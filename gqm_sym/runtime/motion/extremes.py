@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from math import copysign, isfinite
+from math import copysign
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
+from gqm_sym.runtime.motion.parts.searched import EQUAL_ROUNDINGS, samples, size_of, trajectory_with_extreme
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 if TYPE_CHECKING:
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 # the one before.
 GRID_POINTS, GRIDS = 129, 8
 
-# The number of samples on each panel of a segment, and the number of the largest ones near which an extreme is searched
-# for.
-SAMPLES_PER_PANEL, MAX_PEAKS = 16, 4
+# The number of the largest samples near which an extreme is searched for.
+MAX_PEAKS = 4
 
 # The number of nodes of the polynomial by which a peak is located, and the share of its last coefficients below which
 # it counts as exact.
@@ -36,9 +35,6 @@ END_SHARE = 1e-9
 
 # The share of a segment before a joint at which contact is lost in which loads are not searched.
 BEFORE_JOINT = 1e-13
-
-# The distance from a joint at which a quantity that jumps there is sampled, as a share of the segment.
-BESIDE_EDGE = 5e-10
 
 # The share of the contact force by which it must jump at a joint; the pieces of a smooth chart differ by less.
 LEAST_JUMP = 1e-11
@@ -54,9 +50,6 @@ UNBOUNDED_GROWTH = 1e6
 # At a pole of the potential the speed is infinite, and so is the contact force if it grows by this factor on the last
 # segment.
 POLE_GROWTH = 1.2
-
-# Values that differ by less than so many roundings count as equal, and the earlier one is returned.
-EQUAL_ROUNDINGS = 8
 
 
 class Peak(NamedTuple):
@@ -123,27 +116,35 @@ class Quantity(NamedTuple):
     Attributes
     ----------
     at : callable
-        ``at(timed, phi)`` gives the values at phase angles of a timed segment.
+        ``at(timed, phi, share)`` gives the values at phase angles of a timed segment, or what they would be at a share
+        of the speed.
     of_state : callable
         ``of_state(state)`` gives the value in a state.
     beside : callable, optional
         If the quantity jumps at joints of the curve, ``beside(timed, phi, places)`` gives the values at places beside
         those of the phase angles.
+    is_quadratic : bool
+        Whether the quantity is a quadratic polynomial of the speed at each place.
     """
 
-    at: Callable[[TimedSegment, Array], Array]
+    at: Callable[..., Array]
     of_state: Callable[[Any], float]
     beside: Callable[[TimedSegment, Array, Array], Array] | None = None
+    is_quadratic: bool = True
+
+
+def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
+    return share * timed.segment.speeds(phi)
 
 
 # |ds/dt| in m/s.
-SPEED = Quantity(lambda timed, phi: timed.segment.speeds(phi), lambda state: abs(state.v))
+SPEED = Quantity(_speeds, lambda state: abs(state.v))
 
 
 def force_of(problem: "Problem") -> Quantity:
     """Return the contact force in N, as a quantity along motions."""
     at, beside = partial(contact_force_on, problem), partial(contact_force_at, problem)
-    return Quantity(at, lambda state: float(state.normal_force), beside)
+    return Quantity(at, lambda state: float(state.normal_force), beside, bool(problem.formulas.signed))
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
@@ -163,12 +164,12 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     Raises
     ------
     SolutionError
-        If the motion goes on for ever without repeating.
+        If the motion goes on for ever without repeating, and it is not known that later values are less extreme.
     """
     if motion.kind == "rest" or motion._end_of_legs() == 0.0:  # the body stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
-    trajectory, end = whole_trajectory(motion)
+    trajectory, end = trajectory_with_extreme(motion, quantity, sign)
     last = trajectory.segments[-1]
     if last.end == "singular-point" and last.t_stop[0] <= end and _falls_into_pole(motion.problem, last):
         first, value = sign * quantity.at(last, np.array([last.phi_start, last.phi_stop]))
@@ -189,25 +190,6 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     return best
 
 
-def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
-    """Return the trajectory of one period, or from launch to the end, and the time in s of its end.
-
-    Raises
-    ------
-    SolutionError
-        If the motion goes on for ever without repeating.
-    """
-    repeats = motion.kind in ("libration", "circulation")
-    end = motion._end_of_legs()
-    if not repeats and not isfinite(end):
-        raise SolutionError(
-            "this motion goes on for ever, or for too many turns to search them all, and does not repeat; launch it "
-            "with a horizon, t_max, for its extremes"
-        )
-    end = min(end, motion.period) if repeats else end
-    return motion._listed_trajectory if repeats else motion._trajectory(end), end
-
-
 def _on_segment(
     timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
 ) -> tuple[float, list[Extreme]]:
@@ -218,7 +200,7 @@ def _on_segment(
         stop -= BEFORE_JOINT * (stop - start)  # the body leaves before the load beyond the joint acts
     low, high = min(start, stop), max(start, stop)
     joints, found = _limits_at_joints(timed, trajectory, quantity, low, high)
-    phi = _samples(segment, joints, low, high)
+    phi = samples(segment, joints, low, high)
 
     def signed(angles: Array) -> Array:
         values = sign * quantity.at(timed, angles)
@@ -227,9 +209,9 @@ def _on_segment(
     values = signed(phi)
     at_cusp = -1 if stop > start else 0
     ends_at_cusp = timed.end == "cusp" and timed.t_stop[0] <= end and quantity is not SPEED
-    if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * _size(np.delete(values, at_cusp)):
+    if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * size_of(np.delete(values, at_cusp)):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
-    size = _size(values)
+    size = size_of(values)
     for k in _peaks(values, size)[:MAX_PEAKS]:
         if values[k] == np.inf:
             found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
@@ -248,18 +230,6 @@ def _on_segment(
         value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))
     return size, sorted(found, key=lambda peak: peak.t)
-
-
-def _samples(segment: Any, joints: Array, low: float, high: float) -> Array:
-    """Return the phase angles between two of a segment at which a quantity is sampled, in order; places on both sides
-    of the joints, at which it jumps, are among them.
-    """
-    edges, beside = segment.edges, BESIDE_EDGE * (high - low)
-    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
-    inside = np.concatenate(
-        [(edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), joints - beside, joints + beside]
-    )
-    return np.unique([low, *inside[(inside > low) & (inside < high)], high])
 
 
 def _limits_at_joints(
@@ -345,13 +315,8 @@ def _largest(function: Callable[[Array], Array], places: list[float]) -> float:
     most carefully.
     """
     values = function(np.array(places))
-    limit = values.max() - 2.0 * ULP * _size(values)
+    limit = values.max() - 2.0 * ULP * size_of(values)
     return [place for place, value in zip(places, values, strict=True) if value >= limit][-1]
-
-
-def _size(values: Array) -> float:
-    """Return the largest absolute value among the finite values of a quantity."""
-    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:

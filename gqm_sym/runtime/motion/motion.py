@@ -117,10 +117,13 @@ class Motion(History, Derivatives):
     def v_max(self) -> Extreme:
         """The largest speed, its time and its place, over one period or over the whole motion.
 
+        A swing that dies away for ever has its extremes in its first swings.
+
         Raises
         ------
         SolutionError
-            If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
+            If the motion goes on for ever in another way, or approaches the value without reaching it; give it a
+            horizon, ``t_max``.
         """
         return extreme(self, SPEED, 1)
 

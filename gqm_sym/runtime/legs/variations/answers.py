@@ -191,9 +191,9 @@ def gradient(motion: Any, quantity: str) -> Array:
     """
     if quantity in PERIODIC_QUANTITIES:
         raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
-    changes = motion._changes
     if quantity in EXTREMES:
-        return extreme(motion, changes, quantity)
+        return extreme(motion, quantity)
+    changes = motion._changes
     if not motion._end_of_legs() < np.inf:
         raise SolutionError(
             f"gradient: this motion goes on for ever and has no {quantity}, or only after too many turns to follow its "
@@ -291,7 +291,7 @@ def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: 
     return Switch(turns[k].t_end, float(places[k]), float(margins[k]))
 
 
-def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
+def extreme(motion: Any, quantity: str) -> Array:
     """Return the derivatives of an extreme of a motion.
 
     Inside a leg the extreme changes as the quantity does at a fixed time, because the quantity is stationary there
@@ -300,9 +300,10 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     at the jump.
     """
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
+    changes = motion._changes
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
-    t_end, moved = motion._end_of_legs(), np.zeros((changes.variables, 1))
+    t_end, moved = _searched_until(motion), np.zeros((changes.variables, 1))
     at_end, at_break = abs(t_end - found.t) <= AT_END * t_end, _is_at_break(changes, found.lam)
     if at_end and not (at_break and motion.legs[-1].end == "liftoff"):
         t, moved = t_end, end(motion, changes)[1][:, None]
@@ -350,12 +351,20 @@ def forces_at_places(motion: Any, places: Array) -> Array:
     return found
 
 
+def _searched_until(motion: Any) -> float:
+    """Return the time in s up to which extremes are searched for, or of the third turn of a swing that dies away for
+    ever.
+    """
+    t_end: float = motion._end_of_legs()
+    return t_end if t_end < np.inf else float(motion._up_to_turn(3).segments[-1].t_stop[0])
+
+
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> tuple[float, bool]:
     """Return the time of an extreme inside a leg by Newton's method, and whether the quantity is stationary there.
 
     The time is left where it is not.
     """
-    t, t_end = found.t, motion._end_of_legs()
+    t, t_end = found.t, _searched_until(motion)
     for _ in range(NEWTON_STEPS):
         changed = states_at(changes, motion._march_points(np.array([t]))[0])
         law = changed.law

@@ -52,6 +52,10 @@ class Positions(ChecksArguments, ABC):
     def _trajectory(self, end_time: float) -> Trajectory:
         """Return the trajectory, computed for times up to ``end_time`` from launch at least."""
 
+    def _up_to_turn(self, _: int) -> Trajectory | None:
+        """Return the trajectory from launch to a turn, counted from 1, of a motion with losses; None if it has none."""
+        return None
+
     @property
     def _listed_trajectory(self) -> Trajectory:
         """The trajectory from which legs, events and passages are read; for a motion that repeats, one period."""

@@ -15,7 +15,8 @@ from numpy.polynomial import chebyshev
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.extremes import Quantity, phases, whole_trajectory
+from gqm_sym.runtime.motion.extremes import Quantity, phases
+from gqm_sym.runtime.motion.parts.searched import whole_trajectory
 from gqm_sym.runtime.motion.riding.loads import load_of
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 

@@ -26,9 +26,9 @@ def load_of(name: str, problem: Problem) -> Quantity:
     return Quantity(partial(_at, LOADS.index(name), problem), lambda state: float(getattr(state, f"n_{name}")))
 
 
-def _at(row: int, problem: Problem, timed: TimedSegment, phi: Array) -> Array:
+def _at(row: int, problem: Problem, timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
     segment = timed.segment
-    f, places, v2 = segment.functions, segment.places(phi), segment.speeds(phi) ** 2
+    f, places, v2 = segment.functions, segment.places(phi), (share * segment.speeds(phi)) ** 2
     force = path_and_force_at(f.addresses, f.p, places, v2)[4]
     direction = np.full(phi.size, float(timed.direction))
     found: Array = rider_loads(problem.formulas, f.p, places, v2, direction, force)[row]

@@ -324,7 +324,6 @@ def test_all_fields_over_laps() -> None:
         ({}, "turning_point", InputError, "did you mean 'turning_points'"),
         ({}, "t_end", SolutionError, "goes on for ever and has no t_end"),
         ({"t_max": 3}, "rest_position", SolutionError, "it ends with 'horizon'"),
-        ({}, "v_max", SolutionError, "give|launch it with a horizon"),
     ],
 )
 def test_what_has_no_gradient(launch: Any, quantity: str, error: type[Exception], text: str) -> None:

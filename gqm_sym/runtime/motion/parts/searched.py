@@ -1,0 +1,112 @@
+"""The part of a motion in which an extreme is searched for, and the phase angles at which quantities are sampled."""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
+
+# The number of samples on each panel of a segment.
+SAMPLES_PER_PANEL = 16
+
+# The distance from a joint at which a quantity that jumps there is sampled, as a share of the segment.
+BESIDE_EDGE = 5e-10
+
+# The numbers of turns after which it is asked whether a swing that dies away for ever has passed its extremes.
+TURNS_OF_SEARCH = (3, 4, 6, 8, 12, 16, 24, 32)
+
+# Values that differ by less than so many roundings count as equal, and the earlier one is returned.
+EQUAL_ROUNDINGS = 8
+
+
+def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
+    """Return the trajectory of one period, or from launch to the end, and the time in s of its end.
+
+    Raises
+    ------
+    SolutionError
+        If the motion goes on for ever without repeating.
+    """
+    repeats = motion.kind in ("libration", "circulation")
+    end = motion._end_of_legs()
+    if not repeats and not isfinite(end):
+        raise SolutionError(
+            "this motion goes on for ever, or for too many turns to search them all, and does not repeat; launch it "
+            "with a horizon, t_max, for its extremes"
+        )
+    end = min(end, motion.period) if repeats else end
+    return motion._listed_trajectory if repeats else motion._trajectory(end), end
+
+
+def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Trajectory, float]:
+    """Return the trajectory of a motion up to a time after which a quantity is nowhere more extreme, and that time.
+
+    A swing that dies away for ever has its extremes in its first swings, or approaches them without end. The quantity
+    is an `extremes.Quantity`.
+
+    Raises
+    ------
+    SolutionError
+        As `extreme`.
+    """
+    repeats = motion.kind in ("libration", "circulation")
+    if quantity.is_quadratic and not repeats and not isfinite(motion._end_of_legs()):
+        for turns in TURNS_OF_SEARCH:
+            trajectory = motion._up_to_turn(turns)
+            if trajectory is None:
+                break
+            segments = trajectory.segments
+            ends = [k for k, timed in enumerate(segments) if timed.end == "turn"][turns - 3 :]
+            before, across, after = (float(segments[k].segment.places(_stop(segments[k]))[0]) for k in ends)
+            is_within = min(before, across) < after < max(before, across)
+            if is_within and not _is_exceeded(quantity, sign, segments, ends[0] + 1):
+                return trajectory, segments[-1].t_stop[0]
+    return whole_trajectory(motion)
+
+
+def _stop(timed: TimedSegment) -> Array:
+    return np.array([timed.phi_stop])
+
+
+def _is_exceeded(quantity: Any, sign: int, segments: tuple[TimedSegment, ...], begin: int) -> bool:
+    """Return whether a quantity may be more extreme after a motion than during it.
+
+    Two paths of a body in the plane of place and speed do not cross. If the last two legs, which are the segments from
+    ``begin`` on, end nearer to the place where they began, all later states lie between them: at each place the body is
+    slower than it was there.
+    """
+    reached = inside = -np.inf
+    size = 0.0
+    for k, timed in enumerate(segments):
+        low, high = min(timed.phi_start, timed.phi_stop), max(timed.phi_start, timed.phi_stop)
+        phi = samples(timed.segment, np.empty(0), low, high)
+        full = sign * quantity.at(timed, phi, 1.0)
+        reached, size = max(reached, float(full.max())), max(size, size_of(full))
+        if k >= begin:
+            none, half = (sign * quantity.at(timed, phi, share) for share in (0.0, 0.5))
+            bend, rise = 2.0 * (none - 2.0 * half + full), 4.0 * half - 3.0 * none - full
+            has_top = (bend < 0.0) & (rise > 0.0) & (rise < -2.0 * bend)
+            top = none - np.divide(rise**2, 4.0 * bend, where=has_top, out=np.zeros_like(bend))
+            inside = max(inside, float(np.maximum(none, top).max()))
+    return not inside <= reached + EQUAL_ROUNDINGS * ULP * size
+
+
+def samples(segment: Any, joints: Array, low: float, high: float) -> Array:
+    """Return the phase angles between two of a segment at which a quantity is sampled, in order; places on both sides
+    of the joints, at which it jumps, are among them.
+    """
+    edges, beside = segment.edges, BESIDE_EDGE * (high - low)
+    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
+    inside = np.concatenate(
+        [(edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), joints - beside, joints + beside]
+    )
+    return np.unique([low, *inside[(inside > low) & (inside < high)], high])
+
+
+def size_of(values: Array) -> float:
+    """Return the largest absolute value among the finite values of a quantity."""
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
