@@ -26,8 +26,8 @@ UNDECIDED = (
 # the absolute values; other panels are halved, at most this many times.
 MAX_TAIL, MAX_HALVINGS = 1e-14, 40
 
-# The largest rounding error of an integral, as a share of the integral of the absolute values. If the error on the first
-# panels is this many times as large, no others are tried.
+# The largest rounding error of an integral, as a share of the integral of the absolute values. If the error on the
+# first panels is so many times as large, no others are tried.
 MAX_ROUNDING, LOST = 1e-16, 16.0
 
 
