@@ -157,13 +157,14 @@ class Chart:
         signs: Array = np.sign(after - before)
         return signs
 
-    def rounded(self) -> Array:
-        """Return copies of the block, in each of which one row of one chart, or its places, are changed.
+    def rounded(self, values: tuple[float, ...] = ()) -> Array:
+        """Return rows of values, each followed by a copy of the block in which one row of one chart, or its places, are
+        changed.
 
         The change is `MAGNIFIED` times the possible rounding error. On a closed chart whole laps are subtracted from
         places.
         """
-        blocks, begin = [], 0
+        changes, begin = [], 0
         while begin < self.block.size:
             count, first = int(self.block[begin + 1]), begin + EDGES + 3 * int(self.block[begin + 1]) + 2
             records = self.block[first : first + count * RECORD].reshape(count, RECORD)
@@ -175,13 +176,17 @@ class Chart:
                 slopes = sizes[:, :2].max(axis=1) * records[:, 1]
                 sizes[:, 2] += slopes
                 sizes[:, 3] += slopes * records[:, 1]
-            changes = [(6 + row * TERMS, ROW_ROUNDINGS * sizes[:, row]) for row in range(ROWS)]
-            for column, change in (*changes, (0, self.period)) if self.period else changes:
-                block = self.block.copy()
-                block[first + column : first + count * RECORD : RECORD] += MAGNIFIED * ULP * change
-                blocks.append(block)
+            end = first + count * RECORD
+            changes += [(first + 6 + row * TERMS, end, ROW_ROUNDINGS * sizes[:, row]) for row in range(ROWS)]
+            if self.period:
+                changes.append((first, end, self.period))
             begin += int(self.block[begin])
-        return np.array(blocks)
+        rows = np.empty((len(changes), len(values) + self.block.size))
+        rows[:, : len(values)], blocks = values, rows[:, len(values) :]
+        blocks[:] = self.block
+        for block, (start, end, change) in zip(blocks, changes, strict=True):
+            block[start:end:RECORD] += MAGNIFIED * ULP * change
+        return rows
 
     def nearest(self, x: float, z: float) -> tuple[float, float]:
         """Return the arc length of the point of the curve nearest to (x, z), and the distance to it."""

@@ -7,7 +7,7 @@ curvature is the Hessian form (F_xx F_z**2 - 2 F_xz F_x F_z + F_zz F_x**2)/|grad
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import fabs, hypot, inf, isfinite, pi, sqrt
+from math import hypot, inf, isfinite, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,21 +19,13 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic import doubledouble
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.continuation import CLOSED, FAR, MAX_PIECES, PIECE_ROWS, SINGULAR, trace_one_way
-from gqm_sym.runtime.charts.double_double.making import (
-    SAMPLES,
-    Samples,
-    TruePieces,
-    sample_places,
-    starting_context,
-)
-from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
-from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
+from gqm_sym.runtime.charts.double_double.level_samples import sample_beside, sample_level
+from gqm_sym.runtime.charts.double_double.making import Samples, TruePieces, sample_places, starting_context
+from gqm_sym.runtime.charts.evaluate import TERMS
 from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, LevelCurve, evaluate_points
-from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
-from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import VECTOR, Array
+from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.double_double.tapes import bound_by_coordinates
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 
@@ -44,9 +36,6 @@ MAX_DISTANCE = 1e-6
 # Newton steps from a start point to the foot of the perpendicular; they have converged below this share.
 MAX_STEPS = 100
 MAX_LAST_STEP = 1e-12
-
-# Newton steps from a chart to the curve in double-double arithmetic; the last one is rounding.
-SAMPLE_STEPS = 3
 
 # A start point is singular if grad F changes over less than this share of its larger coordinate.
 MIN_GRADIENT_SCALE = 1e-9
@@ -168,21 +157,35 @@ class Traced:
 
     def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces | None:
         """Return the curve in double-double arithmetic; None if F is too long a formula, or not smooth."""
-        formulas = bound_by_coordinates(self.level, p) if self.is_exact(chart) else None
+        return self._sampled(p, chart, sample_level, ())
+
+    def true_pieces_beside(self, p: Sequence[Number], chart: Chart, base: Sequence[Number]) -> TruePieces | None:
+        """Return the curve for parameters next to those of a chart, likewise. Its points are those at which the normals
+        of the curve for ``base`` meet it, so that displacements change as smoothly as the curve.
+        """
+        formulas = self._formulas(base, chart)
+        return None if formulas is None else self._sampled(p, chart, sample_beside, (formulas.operands,))
+
+    def _formulas(self, p: Sequence[Number], chart: Chart) -> BoundTape | None:
+        return bound_by_coordinates(self.level, p) if self.is_exact(chart) else None
+
+    def _sampled(
+        self, p: Sequence[Number], chart: Chart, sample: Callable[..., Samples], others: tuple[Any, ...]
+    ) -> TruePieces | None:
+        formulas, context = self._formulas(p, chart), starting_context()
         if formulas is None:
             return None
-        context = starting_context()
         x, z = Zeros(self, context, tuple(number.at(context) for number in p)).start
         if isinstance(x, context.mpc) or isinstance(z, context.mpc):
             return None
-        given = chart.block, *formulas.operands, sample_places()
+        given = chart.block, sample_places(), formulas.operands, *others
         count = chart.edges.size - 1
 
-        def sample(k: int) -> Samples:
+        def at(k: int) -> Samples:
             following = (k + 1) % count if chart.period or k + 1 < count else -1
-            return sample_level(k, following, *given)  # type: ignore[no-any-return]
+            return sample(k, following, *given)
 
-        return TruePieces(chart, sample, (*two_doubles(x), *two_doubles(z)))
+        return TruePieces(chart, at, (*two_doubles(x), *two_doubles(z)))
 
     def _domain(self, p: tuple[float, ...]) -> tuple[float, float]:
         low, high = (None, None) if self.domain is None else self.domain(FLOATS, p)
@@ -302,76 +305,6 @@ class Zeros:
             f"the curve near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to F = 0; "
             "is there a singular point?"
         )
-
-
-@Inner
-def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-def]
-    """Fill the points at which the normals of a piece of a chart meet F = 0, by Newton's method; return their error.
-
-    The first steps correct the rounding of the chart. ``places`` are rows of two doubles each; the rows that are filled
-    are x, z, their low doubles, and the derivatives of the chart's coordinates.
-    """
-    address, operations, parts, (_, place, value, by_x, by_z, _) = tape
-    start, n = EDGES + 3 * int(block[1]) + 2 + k * RECORD, places.shape[1]
-    for row in range(2):
-        for i in range(n):
-            high, low, rate = 0.0, 0.0, 0.0
-            for j in range(TERMS - 1, -1, -1):
-                rate = rate * places[0, i] + high
-                high, low = multiply(high, low, places[0, i], places[1, i])
-                high, low = add(high, low, block[start + 6 + row * TERMS + j], 0.0)
-            high, low = add(high, low, block[start + 2 + 2 * row], block[start + 3 + 2 * row])
-            out[row, i], out[2 + row, i], out[4 + row, i] = high, low, rate
-    error = 0.0
-    for _ in range(SAMPLE_STEPS):
-        for i in range(n):
-            for row in range(2):
-                at = place + row * ROW + i
-                work[at], work[at + LOW], work[at + ERROR] = out[row, i], out[2 + row, i], 0.0
-        call_interpreter(address, operations, parts[0], parts[2], work, n)
-        error = 0.0
-        for i in range(n):
-            dx, dz = out[4, i], out[5, i]
-            slope = work[by_x + i] * dz - work[by_z + i] * dx
-            step, step_low = -work[value + i] / slope, -work[value + LOW + i] / slope
-            for row, rate in ((0, dz), (1, -dx)):
-                high, low = product(step, rate)
-                out[row, i], out[2 + row, i] = add(out[row, i], out[2 + row, i], high, low + step_low * rate)
-            # The relative error of the step is at most this.
-            uncertainty = work[value + ERROR + i] + 1e-14 * fabs(work[value + i])
-            error = max(error, uncertainty / fabs(slope) * sqrt(dx * dx + dz * dz))
-    return error
-
-
-@entry(SAMPLES(INTEGER, INTEGER, VECTOR, TAPE, VECTOR, MATRIX, MATRIX))
-def sample_level(k, following, block, tape, work, p, nodes):  # type: ignore[no-untyped-def]
-    """Return the samples of a piece of a curve F = 0, the points at which the normals of the chart meet it
-    (`pieces.Samples`).
-
-    Normals at the common edge of two pieces differ by rounding. So the piece is sampled up to the beginning of the
-    ``following`` one (negative if there is none).
-    """
-    fill_parameters(tape, p, work)
-    places, out = nodes.copy(), np.empty((6, NODES_OF_PIECES))
-    if following >= 0:
-        edge, end, begin = np.zeros((2, 1)), np.empty((6, 1)), np.empty((6, 1))
-        edge[0, 0] = 1.0
-        fill_level(k, block, tape, work, edge, end)
-        edge[0, 0] = -1.0
-        fill_level(following, block, tape, work, edge, begin)
-        ahead, square = 0.0, 0.0
-        for row in range(2):
-            gap, gap_low = add(begin[row, 0], begin[2 + row, 0], -end[row, 0], -end[2 + row, 0])
-            ahead += (gap + gap_low) * end[4 + row, 0]
-            square += end[4 + row, 0] ** 2
-        for i in range(NODES_OF_PIECES):
-            beyond, beyond_low = product(0.5 * ahead / square, 1.0 + nodes[0, i])
-            places[0, i], places[1, i] = add(nodes[0, i], nodes[1, i], beyond, beyond_low)
-    error = fill_level(k, block, tape, work, places, out)
-    samples = np.empty((2, 2, NODES_OF_PIECES))
-    for row in range(2):
-        samples[row, 0], samples[row, 1] = out[row], out[2 + row]
-    return samples, error + 2.0 * UNIT * np.abs(samples).max()
 
 
 def _what(end: int) -> str:

@@ -309,6 +309,18 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
 
 
 @lru_cache(maxsize=64)
+def bend_program(source: Source) -> Program:
+    """Return the program of the second derivatives of x and z, and of y of a space curve, with respect to the place.
+
+    The inputs are the run-time parameters.
+    """
+    op, formulas = Recorder(source.parameters), source.formulas
+    coordinates = [f(op, op.place, op.values) for f in (formulas.x, formulas.z, formulas.y) if f is not None]
+    rates = [gradient(op, coordinate, [op.place])[0] for coordinate in coordinates]
+    return assemble(op, [gradient(op, rate, [op.place])[0] for rate in rates])
+
+
+@lru_cache(maxsize=64)
 def range_program(domain: Callable[..., Any], parameters: int) -> Program:
     """Return the program of both ends of the parameter's range and its period, each with its derivatives with respect
     to the run-time parameters.

@@ -1,12 +1,14 @@
 """The errors with which the legs of a motion with losses begin, each found from the errors before it."""
 
 from contextlib import suppress
+from functools import lru_cache
 from math import inf, isnan
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import END_REST
@@ -27,12 +29,17 @@ def _known(errors: tuple[float, float, float]) -> Errors:
     return Errors(*(inf if isnan(error) else error for error in errors))
 
 
+@lru_cache(maxsize=2)
+def _changed(chart: Chart, values: tuple[float, ...]) -> Array:
+    """Return values with charts that are changed by their possible errors, as rows; a chart in space may take 20 MB."""
+    return chart.rounded(values)
+
+
 def _changed_charts(problem: Problem) -> Array:
     """Return the run-time parameters with charts that are changed by their possible errors, as rows."""
     if problem.formulas.chart is None:
         return NO_CHARTS
-    charts = problem.formulas.charted(problem.p).rounded()
-    return np.hstack([np.broadcast_to(problem.p.values, (len(charts), problem.p.values.size)), charts])
+    return _changed(problem.formulas.charted(problem.p), tuple(problem.p.values.tolist()))
 
 
 def _law_of(problem: Problem) -> FormulaLaw | None:

@@ -213,12 +213,13 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
             in_batches, asked_for = partial(answer_batches, batches.addresses(), layout), found._replace(values=spans)
-            in_batches(*launches, wanted, NO_TAPE, asked_for)
+            exact = _recorded(formulas, asked.lows)
+            in_batches(*launches, wanted, False, exact, asked_for)
             left = np.flatnonzero(found.status == quantities.UNDECIDED)
-            if left.size and (exact := _recorded(formulas, asked.lows)).work.size:
+            if left.size and exact.work.size:
                 again = [line if line.size == 1 else line[left] for line in lines]
                 some = asked_for.part(left)
-                in_batches(pointers(again), formulas.monotone, wanted, exact, some)
+                in_batches(pointers(again), formulas.monotone, wanted, True, exact, some)
                 asked_for.put(left, some)
             if wanted == code and not (found.status == quantities.UNDECIDED).any():
                 continue

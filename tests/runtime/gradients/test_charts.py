@@ -246,6 +246,8 @@ def test_an_exponent_of_negative_numbers(oval: ModuleType) -> None:
             motion.gradient("half_period", wrt)
         with pytest.raises(gqm.errors.SolutionError, match="sensitivity: there is no derivative with respect to n,"):
             motion.sensitivity(0.3, wrt)
+    with pytest.raises(gqm.errors.SolutionError, match="no second derivative with respect to n, because"):
+        motion.gradient("half_period", ("a", "n"), order=2)
     a, g = motion.gradient("half_period", ("a", "g")).values()
     swept = oval.sweep("half_period", 0.9, gradient=("a", "n", "g")).gradient
     np.testing.assert_allclose(swept, [a, np.nan, g], rtol=1e-15, atol=0.0)

@@ -295,5 +295,7 @@ def test_a_train_that_leaves_a_helix(tmp_path_factory: pytest.TempPathFactory) -
 def test_what_has_no_derivatives(hoop: ModuleType) -> None:
     """There are no second derivatives by what shapes the means."""
     motion = hoop.solve("6/5", L=2, length="3/2", k=1, Omega=0)
-    with pytest.raises(SolutionError, match="second derivatives with respect to parameters that shape a curve"):
+    with pytest.raises(
+        SolutionError, match="second derivatives with respect to parameters that shape the curve of a train"
+    ):
         motion.gradient("half_period", ("L", "g"), order=2)

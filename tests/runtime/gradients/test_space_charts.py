@@ -81,15 +81,17 @@ def test_a_rail_that_parameters_shape(generated_folder: Path) -> None:
         motion.gradient("normal_force_max"),
         motion.sensitivity(2.3),
     )
-    period = motion.gradient("half_period")
+    period, seconds = motion.gradient("half_period"), motion.gradient("half_period", ("lam0", *given), order=2)
     for name, value in given.items():
 
         def answers(x: float, name: str = name) -> Any:
             moved = module.solve(2.0, 0.25, **{**given, name: x})
             state = moved.state(2.3)
             one = [moved.half_period, *moved.turning_points, moved.normal_force_max.value]
-            return np.array([*one, *(getattr(state, field) for field in FIELDS)])
+            slopes = moved.gradient("half_period", ("lam0", *given)).values()
+            return np.array([*one, *slopes, *(getattr(state, field) for field in FIELDS)])
 
         at = changes.wrt.index(name)
-        found = [period[name], *ends[name], force[name], *(getattr(changes, field)[at] for field in FIELDS)]
+        one = [period[name], *ends[name], force[name], *seconds[name].values()]
+        found = [*one, *(getattr(changes, field)[at] for field in FIELDS)]
         assert found == pytest.approx(slope(answers, value), rel=1e-9, abs=1e-9)

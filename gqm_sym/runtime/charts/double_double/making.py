@@ -160,6 +160,8 @@ class TruePieces:
         The curve with its neighbours (`gradients.charts.shaped_pieces`), by the parameters that shape it.
     beside : dict
         The step of a parameter and the neighbours for it, by the parameter.
+    around : dict
+        The neighbours for second derivatives (`gradients.charts.shaped_bends`), by parameters and numbers of steps.
     """
 
     def __init__(
@@ -186,6 +188,7 @@ class TruePieces:
         self._made, self.doubt, self._edges = np.zeros(count, dtype=bool), 0.0, chart.edges.tolist()
         self.shaped: dict[tuple[int, ...], Any] = {}
         self.beside: dict[int, tuple[float, *tuple[TruePieces, ...]]] = {}
+        self.around: dict[tuple[tuple[int, ...], tuple[int, ...]], TruePieces | None] = {}
         self.begin = min(int(np.argmin(np.abs(chart.edges))), count - 1)
 
     @cached_property

@@ -31,11 +31,8 @@ from gqm_sym.runtime.gradients.charts.programs import (
     chart_path_program,
     speed_program,
 )
-from gqm_sym.runtime.gradients.charts.second_programs import (
-    chart_circulation_seconds,
-    chart_libration_seconds,
-    chart_turn_seconds,
-)
+from gqm_sym.runtime.gradients.charts.second_durations import SecondDurations
+from gqm_sym.runtime.gradients.charts.shaped_bends import ShapedBends
 from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaped_pieces, shaping_of
 from gqm_sym.runtime.gradients.charts.space_programs import SpaceSource, space_path_program
 from gqm_sym.runtime.gradients.evaluation import fill_values, values
@@ -127,10 +124,10 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     ) -> None:
         pieces, launch = problem.true_pieces, problem.launch
         assert pieces is not None
-        self.direction, self._edges, self._passage = direction, edges, passage
+        self.direction, self._edges, self._passage, self._problem = direction, edges, passage, problem
         source = self._source_along(problem)
         self.source = source if shaping is None else source._replace(shaping=shaping)
-        self._shaped_by = set(source.shaping)
+        self._shaped_by = source.shaping
         self._shape = self._shaped(problem, pieces)
         self._found = passage.found
         numbers = [
@@ -143,6 +140,11 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         point = self._shape.coordinates(start)[:, 0].reshape(-1, 2)
         given = [(high, low, UNIT * abs(high)) for high, low in point.tolist()]
         self._inputs = np.hstack([self.variables, pairs(*given), pairs(*((s, 0.0, 0.0) for s in self._shifts))])
+
+    @property
+    def _has_neighbours(self) -> bool:
+        """Whether the curve is known for neighbouring values of the parameters that shape it."""
+        return getattr(self._problem.formulas.chart, "displacements", None) is None
 
     def _source_along(self, problem: Problem) -> ChartSource:
         return source_along(problem)
@@ -242,7 +244,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         both = self._found[[BEHIND, AHEAD], :2]
         return np.array(_sum(both[0], both[1]))
 
-    def _range(self, ends: Array | None) -> Array:
+    def _range(self, ends: Array | None = None) -> Array:
         """Return the inputs of programs by which they know the range of the phase: the length of a lap, or both turning
         points as distances from the lower one, followed by their derivatives.
         """
@@ -275,33 +277,21 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         Raises
         ------
         SolutionError
-            If one of the variables shapes the curve.
+            If one of the variables shapes the curve of a train, or there are no neighbouring curves.
         """
-        source, shape = self.source, self._shape
-        if self._shaped_by.intersection(rows):
+        shaping = tuple(k for k in self._shaped_by if k in rows)
+        if shaping and not self._has_neighbours:
             raise SolutionError(
-                "gradient: there are no second derivatives with respect to parameters that shape a curve without "
-                "formulas yet; name the others in wrt, or take differences of the first derivatives, which are right "
-                "to a few last places"
+                "gradient: there are no second derivatives with respect to parameters that shape the curve of a train, "
+                "or to heights of points; name the others in wrt, or take differences of the first derivatives, which "
+                "are right to a few last places"
             )
+        shape = ShapedBends(self._problem, self._shape.pieces, shaping)
         start = np.ascontiguousarray(self._found[[LAUNCH], :PLACE].T)
-        given = [(high, low, UNIT * abs(high)) for high, low in shape.bends(start)[:, 0].reshape(-1, 2).tolist()]
-        inputs = np.hstack([self.variables, pairs(*given)])
-
-        def along(program: Program, inputs: Array, shares: Array, places: Array) -> Array:
-            coordinates = np.ascontiguousarray(np.concatenate([shares, shape.bends(places)]))
-            found = np.empty((program.outputs.size, 3, places.shape[1]))
-            fill_values(program.operands, program.work, np.ascontiguousarray(inputs), coordinates, found)
-            return found
-
+        found = SecondDurations(self.source._replace(shaping=shaping), rows, shape, self.variables, start)
         if self.direction:
-            program, ends = chart_circulation_seconds(source, rows), None
-        else:
-            program = chart_libration_seconds(source, rows)
-            ends = along(chart_turn_seconds(source, rows), inputs, np.zeros((2, 2)), self._turns)
-        inputs = np.hstack([inputs, self._range(ends)])
-        everything = np.arange(program.outputs.size)
-        return self._resolved(lambda *places: along(program, inputs, *places), everything).integrals[1:]
+            return found.of_lap(self._range(None), self._resolved)
+        return found.of_libration(self._turns, self._width, self._range, self._resolved)
 
     @property
     def series(self) -> tuple[SeriesOf, Array]:

@@ -5,6 +5,7 @@ displacements are differences of these polynomials for neighbouring values of a 
 because the polynomials have 31. Of some curves the maker of the chart knows the displacements.
 """
 
+from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, Protocol
 
@@ -12,7 +13,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number, read_number
-from gqm_sym.runtime.arithmetic.doubledouble import two_product, two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.charts.double_double.making import TruePieces, chebyshev_fit, chebyshev_powers, sample_places
 from gqm_sym.runtime.charts.double_double.pieces import (
@@ -205,24 +206,6 @@ class ShapedPieces:
             rows.append(self._known.pairs(places).reshape(-1, places.shape[1]))
         return np.concatenate(rows)
 
-    def bends(self, places: Array) -> Array:
-        """Return the points at places, two doubles each: the coordinates, and their first two derivatives with respect
-        to u.
-        """
-        self.pieces.make(int(places[0].min()), int(places[0].max()))
-        curve, d = self.pieces.curve, self.dimension
-        high, low = curve.terms[:, ::2], curve.terms[:, 1::2]
-        # The terms of the derivatives.
-        orders = np.arange(NODES, dtype=float)
-        steeper, rounding = two_product.py_func(high, orders)
-        terms = np.zeros_like(curve.terms)
-        terms[:, ::2, :-1], terms[:, 1::2, :-1] = steeper[..., 1:], (rounding + low * orders)[..., 1:]
-        counts = np.repeat(curve.counts[:, 1:], 2, axis=1)
-        rows, rates = np.empty((2, 4 * d, places.shape[1]))
-        fill_coordinates(curve, places, rows)
-        fill_coordinates(curve._replace(terms=terms, counts=counts), places, rates)
-        return np.concatenate([rows, rates[2 * d :]])
-
     def places(self, high: Array, low: Array | float = 0.0) -> Array:
         """Return the places (PLACE rows) at arc lengths from the start point."""
         pieces, places = self.pieces, np.empty((PLACE, high.size))
@@ -334,16 +317,42 @@ def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tup
     """Return the step of a parameter, and the curve for its values one step below and above; the step alone if there
     are no such curves.
     """
-    size = abs(p[k].value) or 1.0
-    step = STEP * 2.0 ** np.floor(np.log2(size))
-    sides = []
-    for sign in (-1, 1):
+    step = step_of(p[k], STEP)
+    sides = [neighbour(maker, p, {k: sign * step}, chart) for sign in (-1, 1)]
+    found = [side for side in sides if side is not None]
+    return (step, *found) if len(found) == len(sides) else (step,)
+
+
+def step_of(number: Number, share: float) -> float:
+    """Return the step of a parameter as a share of the largest power of 2 that is not above it."""
+    step: float = share * 2.0 ** np.floor(np.log2(abs(number.value) or 1.0))
+    return step
+
+
+def neighbour(maker: ChartMaker, p: tuple[Number, ...], moves: Mapping[int, float], chart: Any) -> TruePieces | None:
+    """Return the curve for parameters that differ from those of a chart by ``moves``; None if there is no such curve.
+
+    Parameters
+    ----------
+    maker : ChartMaker
+        What has made the chart. If it has ``true_pieces_beside``, its displacements are smoother so.
+    p : tuple of Number
+        The parameters of the chart.
+    moves : dict
+        The differences, by the indices of the parameters.
+    chart : Chart
+        The chart.
+    """
+    numbers = list(p)
+    for k, move in moves.items():
         value = p[k].fraction
-        moved = Fraction(p[k].value) + Fraction(p[k].low) if value is None else value
-        numbers = list(p)
-        numbers[k] = read_number(moved + sign * Fraction(step), where="p")
-        sides.append(maker.true_pieces(tuple(numbers), chart))
-    return (step,) if None in sides else (step, *sides)
+        at = Fraction(p[k].value) + Fraction(p[k].low) if value is None else value
+        numbers[k] = read_number(at + Fraction(move), where="p")
+    beside = getattr(maker, "true_pieces_beside", None)
+    found: TruePieces | None = (
+        maker.true_pieces(tuple(numbers), chart) if beside is None else beside(tuple(numbers), chart, p)
+    )
+    return found
 
 
 def _quotient(before: Array, after: Array, step: float) -> Array:

@@ -97,12 +97,16 @@ class CurveOfTrain(ShapedPieces):
 class TrainOrbitDerivatives(ChartOrbitDerivatives):
     """A libration or circulation of a train, with derivatives with respect to all variables."""
 
+    @property
+    def _has_neighbours(self) -> bool:
+        return False
+
     def _source_along(self, problem: Problem) -> ChartSource:
         kind = TrainSource if problem.formulas.path_in_space is None else TrainSourceInSpace
         return kind(*source_along(problem))
 
     def _shaped(self, problem: Problem, pieces: TruePieces) -> ShapedPieces:
-        self._problem, shaping = problem, self.source.shaping
+        shaping = self.source.shaping
         # The changes are dear, and derivatives for a fixed shape follow from the formulas alone.
         if not shaping:
             return super()._shaped(problem, pieces)

@@ -33,6 +33,7 @@ from gqm_sym.runtime.gradients.path import (
 )
 from gqm_sym.runtime.gradients.programs import (
     Program,
+    bend_program,
     extreme_program,
     libration_program,
     range_program,
@@ -248,8 +249,16 @@ class PassageChanges:
             return self._before_turn[:, None] + np.where(has_turned, slopes, -slopes)
         # With a speed the body passes the launch later than its turning point, or comes back to it.
         at = np.array([self.launch.high])
-        half_slope, ds = self._local(at)[1, 0, 0], self._path(at)[DS, 0, 0]
-        delay = np.nan if self._starts_at_cusp else ds / abs(half_slope)
+        _, half_slope, half_bend = self._local(at)[:3, 0, 0]
+        if not self._starts_at_cusp:
+            delay = self._path(at)[DS, 0, 0] / abs(half_slope)
+        elif problem.launch.direction == self._heading:
+            # The slope of half of V**2 and ds/dlam vanish. The delay is the limit of their ratio from ahead, which is
+            # that of their derivatives: 1 over the acceleration.
+            bends = values(bend_program(self.source), self._parameters, at)[:, 0, 0]
+            delay = np.hypot.reduce(bends) / abs(half_bend)
+        else:
+            delay = np.nan  # in that direction the body would leave the curve
         slopes[self.source.parameters + 1] -= problem.launch.direction * self._heading * delay
         return slopes
 

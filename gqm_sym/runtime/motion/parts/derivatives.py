@@ -100,7 +100,8 @@ class Derivatives(Positions):
             why = (
                 "the curve does not exist for neighbouring values (an exponent of a negative number must be an integer)"
                 if charted
-                else "the body is released at rest from a cusp, about which ds and the slope of the potential vanish"
+                else "the body is released at rest from a cusp, through which it would be thrown out of the curve, or "
+                "with losses, which hide the limit of the slopes that vanish there"
             )
             raise SolutionError(
                 f"{what}: there is no derivative with respect to {', '.join(unknown)}, because {why}; name the others "

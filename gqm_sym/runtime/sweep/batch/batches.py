@@ -5,7 +5,6 @@ Orbits without proved turning points, or whose time does not converge, are left 
 """
 
 from math import inf, nan
-from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -16,7 +15,13 @@ from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
-from gqm_sym.runtime.sweep.batch.exact_ends import add_what_ends_lack, find_exact_ends, move_ends
+from gqm_sym.runtime.sweep.batch.exact_ends import (
+    add_what_ends_lack,
+    find_exact_ends,
+    keeps_ends,
+    move_ends,
+    refines_ends,
+)
 from gqm_sym.runtime.sweep.batch.known_turns import fill_axis_offsets
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
@@ -40,12 +45,13 @@ from gqm_sym.runtime.sweep.batch.rows import (
     TRIAL,
     V2_REST,
     ZERO_BEHIND,
+    OrbitKind,
     Orbits,
     Scratch,
     borrowed_orbits,
     contains,
     gather,
-    is_careful,
+    has_tape,
     partition,
     shrink,
 )
@@ -75,6 +81,7 @@ from gqm_sym.runtime.sweep.quantities import (
     SPAN_KNOWN,
     SPANS,
     TURNING_POINTS,
+    UNDECIDED,
     UPPER_END,
     Answers,
 )
@@ -86,30 +93,6 @@ from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 SHARED, FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES, MAX_PIECES = 0, 3, 2, 12, 32
 
 
-class OrbitKind(NamedTuple):
-    """The common data of the orbits of a batch.
-
-    Attributes
-    ----------
-    kind : int
-        LIBRATION, CIRCULATION, AXIS_LIBRATION or AGM_LIBRATION.
-    mirrored : bool
-        Whether each orbit is even about an axis of symmetry.
-    proved : bool
-        Whether the turning points need no further proof.
-    about_axis : bool
-        Whether each orbit is about the axis of symmetry of `Wells`.
-    shared : bool
-        Whether a proof may serve all orbits of a well.
-    """
-
-    kind: int
-    mirrored: bool
-    proved: bool
-    about_axis: bool
-    shared: bool
-
-
 @Inner
 def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-def]
     """Fill the answers to SPANS and TURNING_POINTS, or the status that circulations have no half period."""
@@ -119,14 +102,14 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
         for j in range(orbits.size):
             k, low, high = int(rows[INDEX, j]), rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j]
             out[k, 0] = low + high if circulates else low
-            out[k, 1], status[k] = choose(circulates, nan, high), SPAN_KNOWN
+            out[k, 1], status[k] = choose(circulates, nan, high), choose(low < high, SPAN_KNOWN, UNDECIDED)
     elif circulates:
         for j in range(orbits.size):
             status[int(rows[INDEX, j])] = NOT_PERIODIC
     else:
         for j in range(orbits.size):
-            k = int(rows[INDEX, j])
-            out[k, 0], out[k, 1], status[k] = rows[END_LOW, j], rows[END_HIGH, j], ANSWERED
+            k, low, high = int(rows[INDEX, j]), rows[END_LOW, j], rows[END_HIGH, j]
+            out[k, 0], out[k, 1], status[k] = low, high, choose(low < high, ANSWERED, UNDECIDED)
 
 
 @Inner
@@ -157,7 +140,6 @@ def answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers):  # 
     """
     n, count, lacks = orbits.size, scratch.param_count, scratch.ends
     shares, indices, times = lacks[4, :n], lacks[5, :n], lacks[6, :n]
-    find_exact_ends(scratch.exact, count, orbits, lacks)
     for j in range(n):
         scratch.others[j] = j
     gather(orbits, count, scratch.others, n, moved, TIME_ROWS)
@@ -175,7 +157,7 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
     """Prove orbits of one kind, and fill the answers for those that are proved; ``spares`` store the others and copies
     meanwhile.
     """
-    count, (spare, moved), careful = scratch.param_count, spares, is_careful(scratch)
+    count, (spare, moved) = scratch.param_count, spares
     for pieces in (SHARED, FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         if pieces == SHARED and not kind.shared:
             continue
@@ -192,12 +174,15 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
                 prove(fns, kind.kind, kind.mirrored, cuts, n, rows, p, scratch.work)
             proved, unproved = partition(rows[STATE, :n], scratch.chosen, scratch.others)
         waiting = gather(orbits, count, scratch.others, unproved, spare, ROWS)
-        orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if careful else TIME_ROWS)
+        refined = has_tape(scratch) and refines_ends(kind, quantity, orbits, scratch.careful)
+        orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if refined else TIME_ROWS)
+        if refined and orbits.size:
+            find_exact_ends(scratch.exact, count, keeps_ends(kind, quantity), orbits, scratch.ends)
         if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
             answer_spans(orbits, kind.kind, quantity, answers)
         elif orbits.size:
             fill_ends(orbits, kind.kind, answers)
-            if careful and kind.kind != CIRCULATION:
+            if scratch.careful and kind.kind == LIBRATION:
                 answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers)
             else:
                 answer_times(fns, kind, orbits, scratch, quantity, answers)
@@ -241,7 +226,7 @@ def find_orbits(fns, orbits, laps, domain, monotone, wells, scratch):  # type: i
 
     Circulations are copied to ``laps``. All other launches are dropped.
     """
-    count, lap_count, careful = scratch.param_count, 0, is_careful(scratch)
+    count, lap_count, careful = scratch.param_count, 0, scratch.careful
     for ahead in (True, False):
         n, rows = orbits.size, orbits.rows
         p = orbits.params[: count * n].reshape(count, n)
@@ -328,7 +313,8 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     (address, operations, parts, registers), registers_of_places, p = scratch.exact
     tape = address, borrowed(operations), parts, registers
     exact = RecordedFormulas(tape, borrowed(registers_of_places), borrowed(p))
-    scratch = Scratch(scratch.param_count, scratch.layout, chosen, others, work, borrowed(scratch.ends), exact)
+    made = scratch.param_count, scratch.layout, chosen, others, work, borrowed(scratch.ends)
+    scratch = Scratch(*made, scratch.careful, exact)
     wells = borrowed_wells(wells)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
@@ -348,19 +334,12 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
 
 @entry(
     types.void(
-        *(
-            BATCH_ADDRESSES,
-            types.UniTuple(types.int64, 3),
-            types.int64[:, ::1],
-            types.boolean,
-            types.int64,
-            EXACT,
-            ANSWERS,
-        )
+        *(BATCH_ADDRESSES, types.UniTuple(types.int64, 3), types.int64[:, ::1], types.boolean),
+        *(types.int64, types.boolean, EXACT, ANSWERS),
     ),
     nogil=True,
 )
-def answer_batches(fns, layout, columns, monotone, quantity, exact, answers):  # type: ignore[no-untyped-def]
+def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, answers):  # type: ignore[no-untyped-def]
     """Answer the launches that batches can answer; the others keep their status.
 
     Parameters
@@ -375,9 +354,12 @@ def answer_batches(fns, layout, columns, monotone, quantity, exact, answers):  #
         Whether V**2 is monotone between neighbouring axes of symmetry and ds vanishes nowhere.
     quantity : int
         HALF_PERIOD, PERIOD, TURNING_POINTS or SPANS.
+    careful : bool
+        Whether batches have left these launches before. The search for turning points then makes smaller steps, and
+        times are corrected by what turning points lack as doubles.
     exact : RecordedFormulas
-        The module's formulas as a tape for launches that batches left before; empty for others. With it the search for
-        turning points makes smaller steps, and they are found in double-double arithmetic for times.
+        The module's formulas as a tape, by which turning points are found in double-double arithmetic; empty if there
+        is none.
     answers : Answers
         Filled in: the quantity, and beside times, if there are columns for them, both turning points.
     """
@@ -385,7 +367,8 @@ def answer_batches(fns, layout, columns, monotone, quantity, exact, answers):  #
     size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    scratch = Scratch(count, layout, chosen, others, np.empty((13, BATCH)), np.empty((7, BATCH)), exact)
+    work, ends = np.empty((13, BATCH)), np.empty((7, BATCH))
+    scratch = Scratch(count, layout, chosen, others, work, ends, careful, exact)
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))

@@ -19,8 +19,9 @@ OFFSET_HIGH          offset of the upper end                                    
 END_LOW, END_HIGH    both ends as values of the curve's parameter                         time of librations
 LAUNCH_PLACE         the launch place                                                     all
 LAUNCH_V2            V**2 at launch                                                       all
-HALF_WIDTH           half the orbit's width if a closed form gives it, otherwise NaN      time about axes
-HALF_REST            what rounding took from it for bodies at rest                         time about axes
+HALF_WIDTH           half the orbit's width if it is known to more digits than its ends,   time about axes
+                     otherwise NaN
+HALF_REST            what rounding took from it                                            time about axes
 SEARCH_DIRECTION     the sign of the direction in which is searched; 0 for none           search
 SEARCH_LENGTH        how far the search goes at most                                      search
 LENGTH_BEHIND        how far it goes the other way; CLOSED on a closed curve              search
@@ -85,6 +86,30 @@ class Orbits(NamedTuple):
     params: Array
 
 
+class OrbitKind(NamedTuple):
+    """The common data of the orbits of a batch.
+
+    Attributes
+    ----------
+    kind : int
+        LIBRATION, CIRCULATION, AXIS_LIBRATION or AGM_LIBRATION.
+    mirrored : bool
+        Whether each orbit is even about an axis of symmetry.
+    proved : bool
+        Whether the turning points need no further proof.
+    about_axis : bool
+        Whether each orbit is about the axis of symmetry of `Wells`.
+    shared : bool
+        Whether a proof may serve all orbits of a well.
+    """
+
+    kind: int
+    mirrored: bool
+    proved: bool
+    about_axis: bool
+    shared: bool
+
+
 class Scratch(NamedTuple):
     """The work space of a batch.
 
@@ -101,8 +126,10 @@ class Scratch(NamedTuple):
         Rows for intermediate results.
     ends : (7, BATCH) array
         Rows for orbits whose ends are found in double-double arithmetic.
+    careful : bool
+        Whether these are launches that batches left before.
     exact : RecordedFormulas
-        The module's formulas as a tape, with which launches that batches left are tried again; empty at first.
+        The module's formulas as a tape; empty if there is none.
     """
 
     param_count: int
@@ -111,6 +138,7 @@ class Scratch(NamedTuple):
     others: NDArray[np.int64]
     work: Array
     ends: Array
+    careful: bool
     exact: Any
 
 
@@ -121,8 +149,17 @@ def borrowed_orbits(orbits):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_careful(scratch):  # type: ignore[no-untyped-def]
-    """Return whether turning points are searched carefully and known in double-double arithmetic."""
+def contains_positive(row):  # type: ignore[no-untyped-def]
+    """Return whether a number in a row is positive."""
+    found = False
+    for v in row:
+        found |= v > 0.0
+    return found
+
+
+@Inner
+def has_tape(scratch):  # type: ignore[no-untyped-def]
+    """Return whether the module's formulas are known as a tape."""
     return scratch.exact.work.size > 0
 
 

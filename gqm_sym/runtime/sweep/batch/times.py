@@ -49,7 +49,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     SUM,
     TIME_ROWS,
     VALUE,
-    is_careful,
+    has_tape,
     shrink,
 )
 from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
@@ -320,9 +320,10 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
+    if has_tape(scratch) and kind != CIRCULATION:
+        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if scratch.careful else MIN_RATIO
+        from_rest, thrown, at_turns = least, least, 0.0
     ratios = from_rest, thrown, at_turns
-    if is_careful(scratch):
-        ratios = MIN_EXACT_RATIO, MIN_LAP_RATIO if kind == CIRCULATION else MIN_EXACT_RATIO, 0.0
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
@@ -368,7 +369,7 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
     p, halves = orbits.params[: count * n].reshape(count, n), work[:2].reshape(-1)[: 2 * n]
     pair, clear, times = work[2:4].reshape(-1)[: 2 * n].reshape(2, n), work[4, :n], work[5, :n]
-    rests, from_thrown = work[6, :n], MIN_CANCELLATION_RATIO if is_careful(scratch) else MIN_AXIS_RATIO
+    rests, from_thrown = work[6, :n], MIN_CANCELLATION_RATIO if scratch.careful else MIN_AXIS_RATIO
     fill_halves(n, rows, halves[:n])
     halves[n:] = rows[HALF_REST, :n]
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)

@@ -42,7 +42,7 @@ def answered(
     answers = quantities.Answers(out, status, np.zeros_like(status))
     each = module.MODEL.batch
     layout = (each.orbit_rows, each.integrand_rows, -1)
-    answer_batches(each.addresses(), layout, pointers(lines), monotone, asked, NO_TAPE, answers)
+    answer_batches(each.addresses(), layout, pointers(lines), monotone, asked, False, NO_TAPE, answers)
     return out, status
 
 
