@@ -81,6 +81,7 @@ TESTED_THROUGH = {
     "arithmetic/divided_differences/points.py": DIFFERENCES,
     "arithmetic/divided_differences/second.py": DIFFERENCES,
     "arithmetic/matrices.py": "runtime/legs/panels/test_polynomials.py",
+    "arithmetic/power_rows.py": "runtime/charts/test_chart.py",
     "arithmetic/offsets.py": "claims/test_degenerate.py",
     "charts/arc_length.py": "runtime/charts/test_rail.py",
     "charts/continuation.py": "runtime/charts/test_tracing_ends.py",

@@ -11,17 +11,14 @@ The flat array of a chart (`chart.Chart.block`) contains, one after the other::
 """
 
 from math import fabs, floor, inf
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import carray, types
-from numba.extending import intrinsic
+from numba import carray
 
+from gqm_sym.runtime.arithmetic.power_rows import filling
 from gqm_sym.runtime.compiled.intrinsics import polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, broadcast, line_of, operation, register
-from gqm_sym.runtime.compiled.uncompiled import fma, in_python
+from gqm_sym.runtime.compiled.registers import LANES, borrowed
 
 TERMS = 16
 ROWS = 4
@@ -55,7 +52,7 @@ def _piece(chart, s):  # type: ignore[no-untyped-def]
     return below
 
 
-@Inner
+@Inlined
 def _piece_near(chart, s, k):  # type: ignore[no-untyped-def]
     """Return the piece on which an arc length within the first lap lies, which is probably ``k`` or one next to it."""
     last = int(chart[1]) - 1
@@ -110,66 +107,12 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
     return high + (low + polynomial(powers_of(chart, start, row), u))
 
 
-def _filling(count: int) -> Any:
-    """Return a function that fills so many registers' numbers of a row at a time, a term of all of them after the
-    other, so that none waits for the last operation on itself.
-
-    It is called with ``(chart, terms, places, at, out, to, first, numbers)``: the powers of u are stored at ``terms``
-    of the chart, the places from ``at`` on in ``places``, and the values from ``to`` on in ``out``. Lanes before
-    ``first`` keep their values. The ``numbers`` are the length of all laps before, the piece's middle and scale, the
-    limit of u, and two numbers that the polynomial is added to.
-    """
-
-    @intrinsic
-    def fill(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
-        def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            lines = [line_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4)]
-            powers, given, target = (builder.gep(line, [args[k]]) for line, k in zip(lines, (1, 3, 5), strict=True))
-            lap, middle, scale, limit, whole, low = (
-                broadcast(builder, builder.extract_value(args[7], k)) for k in range(6)
-            )
-            below, us = builder.fneg(limit), []
-            for k in range(count):
-                s = builder.load(register(builder, given, k * LANES), align=8)
-                u = builder.fmul(builder.fsub(builder.fsub(s, lap), middle), scale)
-                u = builder.select(builder.fcmp_ordered("<", u, below), below, u)
-                us.append(builder.select(builder.fcmp_ordered(">", u, limit), limit, u))
-            values = [ir.Constant(REGISTER, [0.0] * LANES)] * count
-            for k in range(TERMS - 1, -1, -1):
-                term = broadcast(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
-                values = [operation(builder, "fma", value, u, term) for value, u in zip(values, us, strict=True)]
-            values = [builder.fadd(whole, builder.fadd(low, value)) for value in values]
-            old = builder.load(register(builder, target, 0), align=8)
-            lane = ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
-            bound = ir.Constant(ir.VectorType(ir.IntType(64), LANES), ir.Undefined)
-            for k in range(LANES):
-                bound = builder.insert_element(bound, args[6], ir.Constant(INDEX, k))
-            values[0] = builder.select(builder.icmp_signed("<", lane, bound), old, values[0])
-            for k, value in enumerate(values):
-                builder.store(value, register(builder, target, k * LANES), align=8)
-            return context.get_dummy_value()
-
-        return types.void(chart, terms, places, at, out, to, first, numbers), lower
-
-    @in_python(fill)
-    def _fill(chart: Any, terms: int, places: Any, at: int, out: Any, to: int, first: int, numbers: Any) -> None:
-        lap, middle, scale, limit, whole, low = numbers
-        for lane in range(max(first, 0), count * LANES):
-            u = min(max(((places[at + lane] - lap) - middle) * scale, -limit), limit)
-            value = 0.0
-            for k in range(TERMS - 1, -1, -1):
-                value = fma(value, u, chart[terms + k])
-            out.reshape(-1)[to + lane] = whole + (low + value)
-
-    return fill
-
-
 # One register is filled, or several, which together take less time than one by one.
 SEVERAL = 4
-fill_lanes, fill_several = _filling(1), _filling(SEVERAL)
+fill_lanes, fill_several = filling(1, TERMS - 1), filling(SEVERAL, TERMS - 1)
 
 
-@Inner
+@Inlined
 def run_of_places(chart, places, begin, piece):  # type: ignore[no-untyped-def]
     """Return the piece on which the place number ``begin`` lies, which is probably ``piece`` or one next to it; the
     number of laps before it; and the number of the first place after it that lies elsewhere.
@@ -194,7 +137,7 @@ def fill_run(powers, terms, numbers, places, run, out, to):  # type: ignore[no-u
     powers, terms
         An array, and where in it the powers of u begin.
     numbers : (lap, middle, scale, limit, whole, low)
-        As in `_filling`.
+        As in `filling`.
     places : (n,) array
     run : (begin, end)
         The places to fill; n is at least the number of lanes.
@@ -211,38 +154,47 @@ def fill_run(powers, terms, numbers, places, run, out, to):  # type: ignore[no-u
 
 
 @Inner
-def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
-    """Fill the last rows of ``out`` with these rows of the chart at many places, of which neighbours often lie on the
-    same piece.
+def rows_of_charts(charts, rows, places, out):  # type: ignore[no-untyped-def]
+    """Fill the last rows of ``out`` with these rows of each of some charts at many places, of which neighbours often
+    lie on the same piece.
 
     Parameters
     ----------
+    charts : tuple of array
+        Charts with the same pieces, as those of the coordinates of a curve in space.
     rows : tuple of int
         As in `chart_row`, or `SIZES`.
     places : (n,) array
     out : (m, n) array
-        Has at least as many rows as ``rows`` names.
+        Has at least as many rows as ``rows`` names for all charts.
     """
+    places, out, chart, each = borrowed(places), borrowed(out), charts[0], len(rows)
     count, limit = int(chart[1]), 1.0 if chart[4] > 0.0 else inf
-    end, n, first, piece = 0, places.size, out.shape[0] - len(rows), count // 2
+    end, n, first, piece = 0, places.size, out.shape[0] - len(charts) * each, count // 2
     while end < n:
         begin = end
         piece, laps, end = run_of_places(chart, places, begin, piece)
         start = EDGES + 3 * count + 2 + piece * RECORD
         middle, scale, lap = chart[start], chart[start + 1], laps * chart[4]
-        for k in range(len(rows)):
-            row = rows[k]
+        for k in range(len(charts) * each):
+            of, row, to = charts[k // each], rows[k % each], first + k
             if row == SIZES:
-                out[first + k, begin:end] = fabs(chart[start + 4]) + 1.0 / scale
+                out[to, begin:end] = fabs(of[start + 4]) + 1.0 / scale
                 continue
-            terms, (whole, low) = start + 6 + row * TERMS, constant_of(chart, start, row, laps)
+            terms, (whole, low) = start + 6 + row * TERMS, constant_of(of, start, row, laps)
             if n < LANES:
                 for j in range(begin, end):
                     u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
-                    out[first + k, j] = whole + (low + polynomial(powers_of(chart, start, row), u))
+                    out[to, j] = whole + (low + polynomial(powers_of(of, start, row), u))
                 continue
             numbers = lap, middle, scale, limit, whole, low
-            fill_run(chart, terms, numbers, places, (begin, end), out, (first + k) * n)
+            fill_run(of, terms, numbers, places, (begin, end), out, to * n)
+
+
+@Inner
+def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
+    """Fill the last rows of ``out`` with these rows of one chart at many places (`rows_of_charts`)."""
+    rows_of_charts((chart,), rows, places, out)
 
 
 @Inner

@@ -11,7 +11,7 @@ from math import fabs, sqrt
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import cos
-from gqm_sym.runtime.charts.evaluate import chart_rows
+from gqm_sym.runtime.charts.evaluate import chart_rows, rows_of_charts
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 
@@ -74,9 +74,7 @@ def train_loads(charts, places, speeds, length, cars, g, turning, out):  # type:
     sums = np.zeros((2, n))
     for car in range(cars):
         _fill_places_of_car(places, length, cars, car, at)
-        chart_rows(charts[0], (2, 3), at, rows[:2])
-        chart_rows(charts[1], (2, 3), at, rows[:4])
-        chart_rows(charts[2], (2, 3), at, rows)
+        rows_of_charts(charts[:3], (2, 3), at, rows)
         if len(charts) > 3:
             for axis in range(3):
                 chart_rows(charts[min(3 + axis, len(charts) - 1)], (2,), at, other[: axis + 1])
@@ -105,9 +103,9 @@ def train_load_rates(charts, places, speeds, length, cars, g, turning, out):  # 
     total = np.zeros(n)
     for car in range(cars):
         _fill_places_of_car(places, length, cars, car, at)
-        for axis in range(3):  # in space x of a chart is the derivative of its curvature
-            chart_rows(charts[axis], (0, 2, 3), at, rows[: 3 * axis + 3])
-            if len(charts) > 3:
+        rows_of_charts(charts[:3], (0, 2, 3), at, rows)  # in space x of a chart is the derivative of its curvature
+        if len(charts) > 3:
+            for axis in range(3):
                 chart_rows(charts[min(3 + axis, len(charts) - 1)], (2, 3), at, other[: 2 * axis + 2])
         for i in range(n):
             w, tx, ty, tz = speeds[i], rows[1, i], rows[4, i], rows[7, i]

@@ -26,8 +26,9 @@ UNDECIDED = (
 # the absolute values; other panels are halved, at most this many times.
 MAX_TAIL, MAX_HALVINGS = 1e-14, 40
 
-# The largest rounding error of an integral, as a share of the integral of the absolute values.
-MAX_ROUNDING = 1e-16
+# The largest rounding error of an integral, as a share of the integral of the absolute values. If the error on the
+# first panels is so many times as large, no others are tried.
+MAX_ROUNDING, LOST = 1e-16, 16.0
 
 
 class Panels(NamedTuple):
@@ -130,7 +131,12 @@ def resolved(
         if not np.isfinite(high).all():
             raise SolutionError(UNDECIDED)
         here = (np.abs(got[:, 0]) @ rule[2]) * widths
-        sizes = sizes if sizes.size else here.sum(axis=1, keepdims=True)
+        if not sizes.size:
+            sizes = here.sum(axis=1, keepdims=True)
+            # More panels would not have smaller errors.
+            errors = ((got[wanted, 2] @ rule[2]) * widths).sum(axis=1)
+            if not (errors <= LOST * MAX_ROUNDING * sizes[wanted, 0]).all():
+                raise SolutionError(UNDECIDED)
         scale = (here if everywhere else sizes)[wanted]
         scale = np.where(scale > 0.0, scale, 1.0)
         tails = np.abs(high @ tail_factors).sum(axis=-1) * widths / scale

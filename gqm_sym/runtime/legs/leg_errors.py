@@ -14,7 +14,7 @@ digits only, while those that are followed back from it have all digits. The dif
 the error of the turn.
 """
 
-from math import fabs, inf
+from math import fabs, inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -202,7 +202,7 @@ def half_of_leg(forces, march, panels, v2, errors, sizes, record):  # type: igno
         contact_sign = 1 if record[at + NORMAL_LOAD + COUNT // 2] > 0.0 else -1
         panel = Panel(left, v2, contact_sign, (-inf, inf))
         begin_panel(forces, march, panel, right - left, work)
-        if not solve_panel(forces, march, panel, work) < inf:
+        if not solve_panel(forces, march, panel, nan, work) < inf:
             return RunHalf(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf, v2)
         size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], charts, work)
         fill_rates(march, panel, work)

@@ -35,6 +35,7 @@ from gqm_sym.runtime.sweep.groups import Group, groups_of, rests_on_corner
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.single.slow_places import NO_TAPE, RecordedFormulas
+from gqm_sym.runtime.sweep.single.until import ROUNDED_TIME
 from gqm_sym.runtime.sweep.tables.panel_forces import ROW
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ MIN_LAUNCHES_PER_THREAD, CHUNK = 2**11, 2**16
 # The type of a function that returns the motion of one launch with given parameters.
 Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
-# Quantities that batches compute themselves; for others they find the span of an orbit.
+# Quantities that batches compute themselves, as they do arrivals; for others they find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
 # Quantities that are found from a tape of the formulas if doubles do not suffice.
@@ -210,10 +211,11 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         launches, found = (pointers(lines), formulas.monotone), answers.part(chunk)
         spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
         if batches is not None:
-            wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
+            exact = _recorded(formulas, asked.lows)
+            arrives = code == quantities.ARRIVAL_TIME and exact.work.size and not joints.size
+            wanted = code if code in ANSWERED_BY_BATCHES or arrives else quantities.SPANS
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
             in_batches, asked_for = partial(answer_batches, batches.addresses(), layout), found._replace(values=spans)
-            exact = _recorded(formulas, asked.lows)
             in_batches(*launches, wanted, False, exact, asked_for)
             left = np.flatnonzero(found.status == quantities.UNDECIDED)
             if left.size and exact.work.size:
@@ -221,7 +223,9 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
                 some = asked_for.part(left)
                 in_batches(pointers(again), formulas.monotone, wanted, True, exact, some)
                 asked_for.put(left, some)
-            if wanted == code and not (found.status == quantities.UNDECIDED).any():
+            if arrives:
+                take_arrivals(spans[:, 0], asked.t_max, found)
+            if wanted == code and not np.isin(found.status, (quantities.UNDECIDED, quantities.SPAN_KNOWN)).any():
                 continue
         if group.table_between_ends and (found.status == quantities.UNDECIDED).any():
             table, _ = group.table_between_ends()
@@ -240,6 +244,16 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         one_by_one(code, spans, found, given)
         if code in FROM_TAPE and (found.status == quantities.UNDECIDED).any():
             one_by_one(code, spans, found, given._replace(exact=exact))
+
+
+def take_arrivals(times: Array, t_max: float, answers: Answers) -> None:
+    """Take the times of launches that batches have answered; one after the last time is none, and one close to it is
+    left to the exact problem.
+    """
+    there = answers.status == quantities.ANSWERED
+    early, late = times <= t_max * (1.0 - ROUNDED_TIME), times * (1.0 - ROUNDED_TIME) >= t_max
+    answers.values[there & early, 0] = times[there & early]
+    answers.status[there & ~early] = np.where(late, quantities.NEVER_THERE, quantities.UNDECIDED)[there & ~early]
 
 
 def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:

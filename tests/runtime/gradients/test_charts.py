@@ -13,6 +13,7 @@ from quadrature import integral
 
 import gqm_sym as gqm
 from gqm_sym.loading import load
+from gqm_sym.runtime.gradients import panels
 from gqm_sym.runtime.motion import timing
 
 ULP = 2.0**-52
@@ -163,6 +164,16 @@ def test_turning_points(ring: ModuleType) -> None:
     found = ring.solve(lam0="11/10", R="13/10", v0=2).gradient("turning_points", ("R", "g"))
     for name, end in zip(("R", "g"), ends, strict=True):
         assert found[name] == pytest.approx((float(end), -float(end)), rel=4e-16)
+
+
+def test_a_swing_that_is_too_small(ring: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives whose digits are lost on however many panels are refused after the first ones; it took 26 s."""
+    calls: list[Any] = []
+    shares_on = panels.shares_on
+    monkeypatch.setattr(panels, "shares_on", lambda *given: calls.append(given) or shares_on(*given))
+    with pytest.raises(gqm.errors.SolutionError, match="comes too near to an equilibrium"):
+        ring.solve(lam0="1/100000").gradient("half_period", "R")
+    assert len(calls) == 1
 
 
 @pytest.mark.extended

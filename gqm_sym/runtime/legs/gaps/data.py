@@ -1,7 +1,7 @@
 """The data kept of the gaps between two breaks of the curve (`passing`), and V**2 on a gap with friction in space."""
 
 from itertools import accumulate
-from math import inf, sqrt
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -418,7 +418,7 @@ def solve_on_rows(forces, v2, width, work):  # type: ignore[no-untyped-def]
     product(work, OFFSET, NODES, width)
     copy_row(work, D, OFFSET)
     march, panel = March((0.0, 0.0), forces.direction, 0.0, 1.0), Panel(0.0, v2, 1, (-inf, inf))
-    if not solve_nonlinear(forces, march, panel, work) < inf:
+    if not solve_nonlinear(forces, march, panel, nan, work) < inf:
         return False
     square_size_row(work, GRADED, AT_REST, TURNING, W)
     low = extent(work, LENGTH)[0]

@@ -246,12 +246,14 @@ def may_jump(forces, march):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
+def solve_nonlinear(forces, march, panel, slope, work):  # type: ignore[no-untyped-def]
     """Do the work of `integrate` for forces that are not linear in V**2, by Newton's method; return inf if it does not
     converge.
+
+    The first approximation is linear, with the ``slope`` of V**2 at the panel's start; NaN if that is not known.
     """
-    # The first approximation is linear, with the slope of V**2 at the panel's start.
-    linear_row(work, W, D, panel.v2, slope_at_start(forces, march, panel, work))
+    slope = max(slope, 0.0) if slope == slope else slope_at_start(forces, march, panel, work)
+    linear_row(work, W, D, panel.v2, slope)
     last_change, is_constant = 0.0, False
     for k in range(MAX_ITERATIONS):
         if forces.squared_contact != 0:
@@ -272,17 +274,17 @@ def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
+def solve_panel(forces, march, panel, slope, work):  # type: ignore[no-untyped-def]
     """Compute W on a panel prepared by `begin_panel`, and all rows that do not need W > 0.
 
-    Return q over the panel, or inf if the panel is too wide to be solved.
+    Return q over the panel, or inf if the panel is too wide to be solved. ``slope`` is as in `solve_nonlinear`.
     """
     if forces.linear:
         total = integrate(march, panel, W, work)
     elif forces.squared_contact != 0 and is_beside_zero(march, panel, work):
         total = solve_beside_zero(march, panel, work)
     else:
-        total = solve_nonlinear(forces, march, panel, work)
+        total = solve_nonlinear(forces, march, panel, slope, work)
     if not total < inf:
         return inf
     if panel.v2 == 0.0:

@@ -1,6 +1,6 @@
 """The widest panel from a given place on which polynomials resolve V**2, the forces and the time rate."""
 
-from math import fabs, inf, sqrt
+from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.jit import Inner
@@ -223,14 +223,24 @@ def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore
 
 
 @Inner
-def jump_on(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Return `first_jump` of the law on a panel; 1 and 2 where it has no kinks, or is constant but for rounding."""
-    if not may_jump(forces, march) or is_constant(work):
-        return 1.0, 2.0
+def law_at_start(forces, march, panel):  # type: ignore[no-untyped-def]
+    """Return the increase of V**2 with the distance at the start of panels where the derivative of the law with respect
+    to V**2 may jump, and that derivative; otherwise NaN.
+    """
+    if not may_jump(forces, march):
+        return nan, nan
     point = point_buffer()
     place = within(march.origin[0] + (march.direction * distance(panel.left, march) + march.origin[1]), panel.span)
     slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
-    return first_jump(point[4], work)
+    return march.direction * (point[3] - point[4] * panel.v2), point[4]
+
+
+@Inner
+def jump_on(before, work):  # type: ignore[no-untyped-def]
+    """Return `first_jump` of the law on a panel, given the derivative at its start (`law_at_start`); 1 and 2 where it
+    has no kinks, or is constant but for rounding.
+    """
+    return first_jump(before, work) if before == before and not is_constant(work) else (1.0, 2.0)
 
 
 @Inner
@@ -266,6 +276,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
     unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
     # The rest of a leg may be hardly wider than the narrowest possible panel.
     width = min(max(step, 4.0 * unit / (slope + sqrt(slope * slope + 8.0 * march.g * unit))), request.max_width)
+    steepness, before = law_at_start(forces, march, panel)
     # Rows that are known before V**2 show most panels that are too wide.
     curve_first = forces.linear and not forces.kinked
     last = Q_RATE if curve_first else P
@@ -282,7 +293,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
             if not fine:
                 width = narrower(width, growth(ratio))
                 continue
-        q = solve_panel(forces, march, panel, work)
+        q = solve_panel(forces, march, panel, steepness, work)
         if forces.kinked and not ends_at_kink and (q < inf or forces.linear):
             x = kink(work)
             to_kink = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
@@ -294,12 +305,12 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
             load_row(work, LOAD, DS, N0, KAPPA, W)
         if not q < inf:
             ends_at_kink = False
-            width, next_width = before_jump(jump_on(forces, march, panel, work), 0.5, width)
+            width, next_width = before_jump(jump_on(before, work), 0.5, width)
             continue
         largest_v2 = set_sizes(panel.v2, as_factor(panel.v2, march, panel.left), work)
         fine, worst = are_all_resolved(forces, march, panel, request, last, work)
         worst = max(worst, ratio)
-        factor, jump = growth(worst), jump_on(forces, march, panel, work)
+        factor, jump = growth(worst), jump_on(before, work)
         if fine and jump[0] == 1.0 and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
             is_tiny_part = width <= NOISE_WIDTH_RATIO * widest

@@ -1,6 +1,6 @@
 """The first place on a panel at which the body turns, or N changes its sign."""
 
-from math import fabs
+from math import fabs, nan
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -102,7 +102,7 @@ def cut_panel(forces, march, panel, width, change, run_length, work, point):  # 
         x = equilibrium_near(work, forces.direction, change.touch)
     right = panel.left + width * (0.5 * (1.0 + x))
     begin_panel(forces, march, panel, right - panel.left, work)
-    solve_panel(forces, march, panel, work)
+    solve_panel(forces, march, panel, nan, work)
     fill_rates(march, panel, work)
     if change.first == change.turn and forces.linear:
         v2, there = work[W + COUNT], distance(right, march)

@@ -121,11 +121,11 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
     if not forces.linear and panel.v2 > 0.0:
         here = march.origin[0] + march.direction * run_length
         place = within(here, panel.span)
-        at_rest = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point)
-        slower = slope_of_v2(forces, place, SLOWER_FACTOR * panel.v2, panel.contact_sign, point)
         slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
-        goes_on = at_rest > 0.0 or (at_rest >= SHARE_AT_REST * slope and slower >= SLOWER_SHARE * slope)
         if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
+            at_rest = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point)
+            slower = slope_of_v2(forces, place, SLOWER_FACTOR * panel.v2, panel.contact_sign, point)
+            goes_on = at_rest > 0.0 or (at_rest >= SHARE_AT_REST * slope and slower >= SLOWER_SHARE * slope)
             return (END_ASYMPTOTE, run_length, panel.v2) if goes_on else (END_TURN, run_length - panel.v2 / slope, 0.0)
     return END_TOO_NARROW, run_length, panel.v2
 

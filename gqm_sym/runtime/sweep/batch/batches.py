@@ -15,6 +15,7 @@ from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+from gqm_sym.runtime.sweep.batch.arrivals import answer_arrivals
 from gqm_sym.runtime.sweep.batch.exact_ends import (
     add_what_ends_lack,
     find_exact_ends,
@@ -75,6 +76,7 @@ from gqm_sym.runtime.sweep.batch.wells import (
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
+    ARRIVAL_TIME,
     LOWER_END,
     NOT_PERIODIC,
     PERIOD,
@@ -85,6 +87,7 @@ from gqm_sym.runtime.sweep.quantities import (
     UPPER_END,
     Answers,
 )
+from gqm_sym.runtime.sweep.single.arrivals import MAX_TERMS
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 
 # The numbers of pieces into which an orbit, or half of an even one, is cut for its proof: first few, then many, which
@@ -98,7 +101,7 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
     """Fill the answers to SPANS and TURNING_POINTS, or the status that circulations have no half period."""
     rows, out, status = orbits.rows, answers.values, answers.status
     circulates = kind == CIRCULATION
-    if quantity == SPANS:
+    if quantity in (SPANS, ARRIVAL_TIME):
         for j in range(orbits.size):
             k, low, high = int(rows[INDEX, j]), rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j]
             out[k, 0] = low + high if circulates else low
@@ -178,7 +181,10 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
         orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if refined else TIME_ROWS)
         if refined and orbits.size:
             find_exact_ends(scratch.exact, count, keeps_ends(kind, quantity), orbits, scratch.ends)
-        if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
+        if quantity == ARRIVAL_TIME and kind.kind != CIRCULATION:
+            if orbits.size:
+                answer_arrivals(fns, orbits, scratch, answers)
+        elif quantity in (SPANS, TURNING_POINTS, ARRIVAL_TIME) or (quantity != PERIOD and kind.kind == CIRCULATION):
             answer_spans(orbits, kind.kind, quantity, answers)
         elif orbits.size:
             fill_ends(orbits, kind.kind, answers)
@@ -314,7 +320,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     tape = address, borrowed(operations), parts, registers
     exact = RecordedFormulas(tape, borrowed(registers_of_places), borrowed(p))
     made = scratch.param_count, scratch.layout, chosen, others, work, borrowed(scratch.ends)
-    scratch = Scratch(*made, scratch.careful, exact)
+    scratch = Scratch(*made, scratch.careful, exact, columns, borrowed(scratch.rates))
     wells = borrowed_wells(wells)
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
@@ -353,7 +359,7 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
     monotone : bool
         Whether V**2 is monotone between neighbouring axes of symmetry and ds vanishes nowhere.
     quantity : int
-        HALF_PERIOD, PERIOD, TURNING_POINTS or SPANS.
+        HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME or SPANS.
     careful : bool
         Whether batches have left these launches before. The search for turning points then makes smaller steps, and
         times are corrected by what turning points lack as doubles.
@@ -361,14 +367,16 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
         The module's formulas as a tape, by which turning points are found in double-double arithmetic; empty if there
         is none.
     answers : Answers
-        Filled in: the quantity, and beside times, if there are columns for them, both turning points.
+        Filled in: the quantity, or instead of ARRIVAL_TIME that to SPANS; and beside times, if there are columns for
+        them, both turning points.
     """
     count = columns.shape[0] - PARAMETERS
     size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
     work, ends = np.empty((13, BATCH)), np.empty((7, BATCH))
-    scratch = Scratch(count, layout, chosen, others, work, ends, careful, exact)
+    rates = np.empty((MAX_TERMS + 1 if quantity == ARRIVAL_TIME else 0, BATCH))
+    scratch = Scratch(count, layout, chosen, others, work, ends, careful, exact, columns, rates)
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))

@@ -33,7 +33,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     contains_positive,
 )
 from gqm_sym.runtime.sweep.batch.times import AGM_LIBRATION
-from gqm_sym.runtime.sweep.quantities import SPANS, TURNING_POINTS, UNDECIDED
+from gqm_sym.runtime.sweep.quantities import ARRIVAL_TIME, SPANS, TURNING_POINTS, UNDECIDED
 
 # The share of an orbit's width by which its ends are moved for the derivative of its time. It is so small that the
 # trapezoidal rule converges on an even orbit of which only one half is evaluated, though it is not even then.
@@ -57,7 +57,7 @@ def keeps_ends(kind, quantity):  # type: ignore[no-untyped-def]
     """Return whether bodies released at rest turn where an axis of symmetry says, and half the width of their orbits is
     known as two doubles or not needed.
     """
-    return kind.about_axis and (kind.kind != LIBRATION or quantity in (SPANS, TURNING_POINTS))
+    return kind.about_axis and (kind.kind != LIBRATION or quantity in (SPANS, TURNING_POINTS, ARRIVAL_TIME))
 
 
 @Inner
@@ -70,7 +70,7 @@ def refines_ends(kind, quantity, orbits, careful):  # type: ignore[no-untyped-de
     if kind.kind == CIRCULATION or not keeps_ends(kind, quantity):
         return kind.kind != CIRCULATION
     thrown = contains_positive(orbits.rows[LAUNCH_V2, : orbits.size])
-    return thrown and (careful or kind.kind != AGM_LIBRATION)
+    return thrown and (careful or kind.kind != AGM_LIBRATION or quantity == ARRIVAL_TIME)
 
 
 @Inner

@@ -130,6 +130,10 @@ class Scratch(NamedTuple):
         Whether these are launches that batches left before.
     exact : RecordedFormulas
         The module's formulas as a tape; empty if there is none.
+    columns : array
+        The launches, as `strided.pointers` gives them.
+    rates : array
+        A row for each node of a series of dt/dphi; none if no arrivals are asked for.
     """
 
     param_count: int
@@ -140,6 +144,8 @@ class Scratch(NamedTuple):
     ends: Array
     careful: bool
     exact: Any
+    columns: NDArray[np.int64]
+    rates: Array
 
 
 @Inner

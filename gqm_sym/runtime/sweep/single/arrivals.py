@@ -47,11 +47,31 @@ def _cosines(n: int) -> np.ndarray:
     return matrix
 
 
-COSINES = _cosines(MAX_TERMS)
 few_cosines, more_cosines = multiply(_cosines(FEW_TERMS)), multiply(_cosines(MORE_TERMS))
+most_cosines = multiply(_cosines(MAX_TERMS))
 
 # The distances of the nodes from the lower end, as shares of the width; from the upper end they are the same reversed.
 WIDTH_SHARES = np.sin(0.5 * pi * np.arange(MAX_TERMS + 1) / MAX_TERMS) ** 2
+
+
+@Inner
+def fill_cosine_series(n, values, series):  # type: ignore[no-untyped-def]
+    """Fill the cosine series of n terms with given values at n + 1 equal steps over [0, pi]."""
+    if n == FEW_TERMS:
+        few_cosines(values, 0, series, 0)
+    elif n == MORE_TERMS:
+        more_cosines(values, 0, series, 0)
+    else:
+        most_cosines(values, 0, series, 0)
+
+
+@Inner
+def is_resolved(series, n):  # type: ignore[no-untyped-def]
+    """Return whether the last coefficients of a series are small."""
+    tail = 0.0
+    for k in range(n - TAIL_LENGTH, n + 1):
+        tail = max(tail, fabs(series[k]))
+    return tail <= TAIL_RATIO * series[0]
 
 
 @Inner
@@ -81,20 +101,8 @@ def fill_time_rate_series(fns, p, ends, n, factors, work, series):  # type: igno
         rates[first + j * every] = rows[m + j] / sqrt(2.0 * q)
     for j in range(n + 1):
         work[j] = rates[j * step]
-    if n == FEW_TERMS:
-        few_cosines(work, 0, series, 0)
-    elif n == MORE_TERMS:
-        more_cosines(work, 0, series, 0)
-    else:
-        for k in range(n + 1):
-            series[k] = 0.0
-        for j in range(n + 1):
-            for k in range(n + 1):
-                series[k] += COSINES[j, k] * work[j]
-    tail = 0.0
-    for k in range(n - TAIL_LENGTH, n + 1):
-        tail = max(tail, fabs(series[k]))
-    return tail <= TAIL_RATIO * series[0] and low > MIN_CANCELLATION_RATIO * high, (low, high)
+    fill_cosine_series(n, work, series)
+    return is_resolved(series, n) and low > MIN_CANCELLATION_RATIO * high, (low, high)
 
 
 @Inner
@@ -148,6 +156,27 @@ def phase_of(below, above):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def times_by_series(series, n, low, high, ahead):  # type: ignore[no-untyped-def]
+    """Return what `times_from_end` does, by a series that is resolved; ``low`` and ``high`` are the orbit's offsets."""
+    from_upper = -low > high
+    near, far = (high, -low) if from_upper else (-low, high)
+    to_near, to_far = (high - ahead, ahead - low) if from_upper else (ahead - low, high - ahead)
+    launch, target = phase_of(near, far), phase_of(max(to_near, 0.0), max(to_far, 0.0))
+    start, stop = times_from(series, n, launch, target, -1.0 if from_upper else 1.0)
+    return series[0] * pi, start, stop, from_upper
+
+
+@Inner
+def first_passage(times, direction, ahead):  # type: ignore[no-untyped-def]
+    """Return the first time at the offset ``ahead``, from what `times_from_end` gives and the direction at launch."""
+    half_period, start, stop, from_upper = times
+    onwards = direction * ahead > 0.0
+    if (direction > 0) == from_upper:  # the body is launched towards that end
+        return start - stop if onwards else start + stop
+    return stop - start if onwards else (half_period - start) + (half_period - stop)
+
+
+@Inner
 def arrival_on_lap(curve, orbit, ahead):  # type: ignore[no-untyped-def]
     """Return the time at which a body on a closed curve has moved by the offset ``ahead``, in the form of `arrival`."""
     lap = orbit.direction * (orbit.high - orbit.low)
@@ -181,13 +210,9 @@ def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no
     while n < MAX_TERMS and not resolved:
         n *= 2
         resolved, factors = fill_time_rate_series(curve.fns, curve.p, (a, b, width), n, factors, work, series)
-    from_upper = -low > high
     if resolved:
-        near, far = (high, -low) if from_upper else (-low, high)
-        to_near, to_far = (high - ahead, ahead - low) if from_upper else (ahead - low, high - ahead)
-        launch, target = phase_of(near, far), phase_of(max(to_near, 0.0), max(to_far, 0.0))
-        start, stop = times_from(series, n, launch, target, -1.0 if from_upper else 1.0)
-        return series[0] * pi, start, stop, from_upper
+        return times_by_series(series, n, low, high, ahead)
+    from_upper = -low > high
     panels = orbit_panels(curve.fns, curve.p, TURN_TURN, a, b, orbit.lam0, orbit.v2, joints)
     if not are_accurate(panels):
         return np.nan, np.nan, np.nan, from_upper
@@ -244,8 +269,5 @@ def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
     orbit, width = with_refined_ends(curve, orbit, work), orbit.high - orbit.low
     if not orbit.lam0 + orbit.low <= place <= orbit.lam0 + orbit.high:
         return inf
-    half_period, start, stop, from_upper = times_from_end(curve, orbit, width, ahead, work, series)
-    onwards = orbit.direction * ahead > 0.0
-    if (orbit.direction > 0) == from_upper:  # the body is launched towards that end
-        return start - stop if onwards else start + stop
-    return stop - start if onwards else (half_period - start) + (half_period - stop)
+    times = times_from_end(curve, orbit, width, ahead, work, series)
+    return first_passage(times, orbit.direction, ahead)

@@ -51,7 +51,7 @@ def test_an_arrival_after_the_last_time_is_none(module_of: ModuleOf) -> None:
     swept = circle.sweep("time_at", starts, lam=0.1, L=1, t_max=last)
     assert np.array_equal(swept.values, np.where(whole <= last, whole, np.nan), equal_nan=True)
     assert swept.status_counts() == {STATUS_SENTENCES[5]: int((whole > last).sum())}
-    assert (swept.route == 1).all()
+    assert (swept.route == 0).all()
     for quantity in ("half_period", "period", "turning_points"):
         one, other = (circle.sweep(quantity, starts, L=1, t_max=t_max).values for t_max in (0.1, None))
         assert np.array_equal(one, other)
