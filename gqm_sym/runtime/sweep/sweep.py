@@ -217,15 +217,17 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
             in_batches, asked_for = partial(answer_batches, batches.addresses(), layout), found._replace(values=spans)
             in_batches(*launches, wanted, False, exact, asked_for)
-            left = np.flatnonzero(found.status == quantities.UNDECIDED)
-            if left.size and exact.work.size:
+            undecided = found.status == quantities.UNDECIDED
+            if exact.work.size and undecided.any():
+                left = np.flatnonzero(undecided)
                 again = [line if line.size == 1 else line[left] for line in lines]
                 some = asked_for.part(left)
                 in_batches(pointers(again), formulas.monotone, wanted, True, exact, some)
                 asked_for.put(left, some)
             if arrives:
                 take_arrivals(spans[:, 0], asked.t_max, found)
-            if wanted == code and not np.isin(found.status, (quantities.UNDECIDED, quantities.SPAN_KNOWN)).any():
+            open_ones = (found.status == quantities.UNDECIDED) | (found.status == quantities.SPAN_KNOWN)
+            if wanted == code and not open_ones.any():
                 continue
         if group.table_between_ends and (found.status == quantities.UNDECIDED).any():
             table, _ = group.table_between_ends()
