@@ -319,9 +319,9 @@ def test_derivatives_of_transits(famous: FamousMotion, famous_motion: MotionOf) 
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("famous", **of_kind("transit"))
 def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> None:
-    """A compiled loop gives the same times, also for bodies that leave the curve."""
+    """Compiled loops give the same times, also for bodies that leave the curve."""
     swept = famous_module(famous.curve).sweep("time_at", lam=famous.launch["to"], **famous.start)
-    assert swept.route_counts() == {"single": 1}
+    assert set(swept.route_counts()) <= {"batch", "single"}
     expected = famous.expect["transit_time"]
     assert error(swept.values.item(), expected) <= TIME * float(expected)
 
