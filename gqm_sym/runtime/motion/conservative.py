@@ -144,7 +144,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     ends = low.multiprecision, high.multiprecision
     # A curve with many joints has as many panels, which are not needed for the half period: it is computed from the
     # true curve.
-    is_lazy = f.exact is not None and f.breaks.size > 0 and ends == (None, None)
+    is_lazy = f.breaks.size > 0 and ends == (None, None) and (f.exact is not None or problem.true_pieces is not None)
     segment = between_turns(f, low.place, high.place, ends=ends, is_lazy=is_lazy)
     return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
 

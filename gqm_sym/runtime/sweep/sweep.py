@@ -252,10 +252,11 @@ def take_arrivals(times: Array, t_max: float, answers: Answers) -> None:
     """Take the times of launches that batches have answered; one after the last time is none, and one close to it is
     left to the exact problem.
     """
-    there = answers.status == quantities.ANSWERED
-    early, late = times <= t_max * (1.0 - ROUNDED_TIME), times * (1.0 - ROUNDED_TIME) >= t_max
-    answers.values[there & early, 0] = times[there & early]
-    answers.status[there & ~early] = np.where(late, quantities.NEVER_THERE, quantities.UNDECIDED)[there & ~early]
+    there = np.flatnonzero(answers.status == quantities.ANSWERED)
+    found = times[there]
+    early, late = found <= t_max * (1.0 - ROUNDED_TIME), found * (1.0 - ROUNDED_TIME) >= t_max
+    answers.values[there[early], 0] = found[early]
+    answers.status[there[~early]] = np.where(late, quantities.NEVER_THERE, quantities.UNDECIDED)[~early]
 
 
 def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:
