@@ -75,12 +75,13 @@ def groups_of(
     the same shape.
 
     Launches whose curve cannot be made belong to no group. Curves with formulas are tabulated if bodies may lift off or
-    leave them at an end.
+    leave them at an end; the force that decides about contact on a curve in space is not.
     """
     if formulas.chart is None:
         table, later, ends = NO_TABLE, None, CURVE_ENDS
-        if only_sign and not formulas.dissipation:
-            table, ends = _tabulated_range(formulas, columns, domain, only_sign)
+        if only_sign:
+            if formulas.signed and not formulas.dissipation:
+                table, ends = _tabulated_range(formulas, columns, domain, only_sign)
         elif not formulas.dissipation and np.isfinite(domain[0]).all() and np.isfinite(domain[1]).all():
             later = partial(_tabulated_range, formulas, columns, domain, only_sign)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, table_between_ends=later, ends=ends), None

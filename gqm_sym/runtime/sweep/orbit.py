@@ -41,6 +41,8 @@ class SweptCurve(NamedTuple):
         The address of the function with the contact force as a vector; 0 for curves in a plane.
     directed : bool
         Whether that vector depends on the direction of motion.
+    rider_loads : int
+        The address of the function with the loads on riders; 0 if no roll is declared.
     """
 
     fns: Any
@@ -58,6 +60,7 @@ class SweptCurve(NamedTuple):
     signed: Any
     path_in_space: Any
     directed: Any
+    rider_loads: Any
 
 
 class Orbit(NamedTuple):

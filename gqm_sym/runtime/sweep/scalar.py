@@ -90,7 +90,7 @@ class GivenCurve(NamedTuple):
         The last time in s, infinite if there is none; END_TIME, ARRIVAL_TIME and extremes depend on it.
     exact : RecordedFormulas
         The formulas as a tape; empty at first, because few launches need it.
-    signed, path_in_space, directed : bool, int, bool
+    signed, path_in_space, directed, rider_loads : bool, int, bool, int
         As in `SweptCurve`.
     """
 
@@ -109,13 +109,14 @@ class GivenCurve(NamedTuple):
     signed: bool
     path_in_space: int
     directed: bool
+    rider_loads: int
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
 GIVEN = types.NamedTuple(
     (
         *(VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL, EXACT),
-        *(types.boolean, types.int64, types.boolean),
+        *(types.boolean, types.int64, types.boolean, types.int64),
     ),
     GivenCurve,
 )
@@ -380,7 +381,8 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         period = element(columns, DOMAIN_PERIOD, k)
         v0 = element(columns, V0, k)
         made = fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels
-        curve = SweptCurve(*made, v0, exact, given.signed, given.path_in_space, given.directed)
+        of_force = given.signed, given.path_in_space, given.directed, given.rider_loads
+        curve = SweptCurve(*made, v0, exact, *of_force)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

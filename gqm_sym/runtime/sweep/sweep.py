@@ -178,10 +178,11 @@ def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Return whether compiled loops can compute the quantity for most launches.
 
-    They cannot for motions that lose energy, and do not distinguish the sides of a space curve. Of extremes they do not
-    compare the last time with that of a loss of contact.
+    They cannot for motions that lose energy, and distinguish the sides of a space curve only if it has formulas and the
+    contact force does not depend on the direction of motion. Of extremes they do not compare the last time with that of
+    a loss of contact.
     """
-    if not formulas.signed and ONLY_SIGN[contact]:
+    if not formulas.signed and ONLY_SIGN[contact] and (formulas.chart is not None or formulas.directed):
         return False
     compares = not (ONLY_SIGN[contact] and quantity.code in EXTREMES)
     timely = t_max is None or (compares and float(as_doubles(t_max, "t_max")) > 0.0)
@@ -235,7 +236,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        of_force = formulas.signed, formulas.path_in_space.address if formulas.path_in_space else 0, formulas.directed
+        in_space, loads = (made.address if made else 0 for made in (formulas.path_in_space, formulas.rider_loads))
+        of_force = formulas.signed, in_space, formulas.directed, loads
         given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, *of_force)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE

@@ -17,6 +17,7 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     MEAN_ROUNDING,
     PEAK_MARGIN,
     REFINEMENT,
+    UPWARDS,
     find_peaks,
     frame_buffer,
     highest_top,
@@ -46,6 +47,12 @@ class Loss(NamedTuple):
 
 
 @Inner
+def force_of(curve):  # type: ignore[no-untyped-def]
+    """Return the force whose sign tells on which side of the track a body is, as a function that is searched."""
+    return (FORCE if curve.signed else UPWARDS), 0
+
+
+@Inner
 def sampled_forces(curve, way, side, begin, step, n, forces):  # type: ignore[no-untyped-def]
     """Fill N at n places of a way from the launch to its end, positive if the track pushes.
 
@@ -56,7 +63,7 @@ def sampled_forces(curve, way, side, begin, step, n, forces):  # type: ignore[no
     for i in range(n):
         share = sin(0.5 * pi * (begin + step * i)) ** 2
         shares[i] = share if outwards else 1.0 - share
-    sample_loads(curve, way, (FORCE, 0), shares, n, forces, frame, False)
+    sample_loads(curve, way, force_of(curve), shares, n, forces, frame, False)
     for i in range(n):
         forces[i] *= side
 
@@ -119,13 +126,13 @@ def loss_on_way(curve, orbit, end, side):  # type: ignore[no-untyped-def]
     """Return the offset at which a body leaves the track between its launch and the offset ``end``, as a `Loss`."""
     low, high = min(end, 0.0), max(end, 0.0)
     way = Orbit(False, False, orbit.direction, orbit.lam0, orbit.v2, low, high, 0)
-    sums, peaks, grids = sum_buffer(), peak_buffer(), 1
+    sums, peaks, grids, force = sum_buffer(), peak_buffer(), 1, force_of(curve)
     while grids <= MAX_GRIDS:
-        find_peaks(curve, way, (FORCE, 0), -side, grids, sums, peaks)
+        find_peaks(curve, way, force, -side, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, True):
             least, most = side * sums[LEAST], side * sums[LARGEST]
             if min(least, most) > 0.0:
-                top = highest_top(curve, way, (FORCE, 0), -side, grids, sums, peaks)
+                top = highest_top(curve, way, force, -side, grids, sums, peaks)
                 if top < 0.0:
                     return Loss(KEEPS, nan, False)
             else:

@@ -5,14 +5,21 @@ from math import fabs, floor, inf, pi, sqrt
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import sin
-from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_path_in_space, call_potential_divdiff1
+from gqm_sym.runtime.compiled.calls import (
+    call_path_and_contact_force,
+    call_path_in_space,
+    call_potential_divdiff1,
+    call_rider_loads,
+)
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.interface import PATH_ROWS, SPACE_ROWS
+from gqm_sym.runtime.interface import PATH_ROWS, RIDER_ROWS, SPACE_ROWS
+from gqm_sym.runtime.launch.rider import MIN_LEVEL
 
-# The functions whose extremes are searched for: V**2; the contact force, if it has a sign; and the square of its
-# length, which is smooth also where the length almost vanishes.
-V2, FORCE, FORCE_SQUARED = range(3)
+# The functions whose extremes are searched for: V**2; the contact force, if it has a sign; the square of its length,
+# which is smooth also where the length almost vanishes; and the load on riders upwards, whose sign tells on which side
+# of a track in space a body is.
+V2, FORCE, FORCE_SQUARED, UPWARDS = range(4)
 
 # The number of intervals of the first grid, in equal steps of the phase angle; the factors by which the step shrinks
 # when the best point is refined for the first time and each time after that; and the factor by which it grows if the
@@ -55,10 +62,10 @@ FUNCTIONS, COORDINATES = 4, 3
 # point of the grid, and the values before, at and after it. Peaks within the third share of the range from the highest
 # are refined, because the grid does not distinguish them.
 PEAKS, PEAK_ROW, PEAK_MARGIN = 4, 5, 0.02
-line_buffer, pair_buffer, frame_buffer, vector_buffer, point_buffer, sum_buffer, peak_buffer = (
+line_buffer, pair_buffer, frame_buffer, vector_buffer, rider_buffer, point_buffer, sum_buffer, peak_buffer = (
     on_stack(n)
     for n in (
-        *(GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, SPACE_ROWS * GRID_POINTS),
+        *(GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, SPACE_ROWS * GRID_POINTS, RIDER_ROWS * GRID_POINTS),
         *(3, 4 * FUNCTIONS, PEAKS * PEAK_ROW),
     )
 )
@@ -75,10 +82,16 @@ def fill_squares(curve, direction, n, lam, v2, out):  # type: ignore[no-untyped-
 
 @Inner
 def fill_force(curve, function, n, lam, v2, frame, out):  # type: ignore[no-untyped-def]
-    """Fill the contact force at n places, or the square of its length if that is the function that is searched, and
-    ``frame`` with the path.
+    """Fill the contact force at n places, or the square of its length or the load upwards if that is the function that
+    is searched, and ``frame`` with the path.
     """
     call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
+    if function == UPWARDS:
+        loads = rider_buffer()
+        call_rider_loads(curve.rider_loads, n, lam, v2, 1.0, 1.0, curve.p, loads)
+        for i in range(n):
+            out[i] = loads[i] if loads[11 * n + i] >= MIN_LEVEL else np.nan
+        return
     for i in range(n):
         force = frame[4 * n + i]
         out[i] = force * force if function == FORCE_SQUARED else force

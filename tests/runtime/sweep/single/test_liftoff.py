@@ -8,6 +8,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym.building import transient
 from gqm_sym.runtime.sweep.quantities import ANSWERED, NEVER_THERE, NOT_PERIODIC
 
 # The relative tolerances of elementary closed forms, and of times at which contact is lost.
@@ -94,3 +95,18 @@ def test_a_body_that_turns_before_it_leaves(generated_folder: Path) -> None:
     assert found["t_end"].values == pytest.approx([time for time, _ in truth], rel=AT_LOSS)
     assert found["v_max"].values == pytest.approx([fastest for _, fastest in truth], rel=FEW)
     assert module.sweep("v_min", start, speed, -1, b=height, contact="above").values.tolist() == [0.0] * 3
+
+
+@pytest.mark.parametrize("contact", ["above", pytest.param("below", marks=pytest.mark.extended)])
+def test_on_a_curve_in_space(contact: str) -> None:
+    """The upward direction of riders tells the side of the track; compiled loops answer as each motion does."""
+    curve = gqm.Curve.space(x="t", y="sin(2*t)/4", z="sin(t) + t**2/8", parameter="t", roll="1/10")
+    module = transient(gqm.derive(curve, gqm.Gravity()))
+    lam0, v0 = np.linspace(-2.5, 2.5, 12), np.tile([0.5, 3.0, 5.0, 6.0], 3)
+    motions = [module.solve(place, speed, contact=contact) for place, speed in zip(lam0, v0, strict=True)]
+    ends, fastest = (module.sweep(name, lam0, v0, contact=contact) for name in ("t_end", "v_max"))
+    assert ends.route_counts() == fastest.route_counts() == {"single": lam0.size}
+    wanted = np.array([motion.t_end for motion in motions])
+    np.testing.assert_allclose(ends.values, np.where(np.isfinite(wanted), wanted, np.nan), rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(fastest.values, [motion.v_max.value for motion in motions], rtol=4e-15)
+    assert 2 < np.isfinite(wanted).sum() < lam0.size + (contact == "below")
