@@ -117,13 +117,15 @@ def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-de
 
 @Inner
 def fill_ends(orbits, kind, answers):  # type: ignore[no-untyped-def]
-    """Fill the turning points beside times if there are columns for them; laps have NaN and infinity there."""
+    """Fill the turning points beside times if there are columns for them; laps have NaN and infinity there, and orbits
+    whose ends were not found NaN.
+    """
     rows, out, laps = orbits.rows, answers.values, kind == CIRCULATION
     if out.shape[1] > UPPER_END:
         for j in range(orbits.size):
-            k = int(rows[INDEX, j])
-            out[k, LOWER_END] = choose(laps, nan, rows[END_LOW, j])
-            out[k, UPPER_END] = choose(laps, inf, rows[END_HIGH, j])
+            k, low, high = int(rows[INDEX, j]), rows[END_LOW, j], rows[END_HIGH, j]
+            out[k, LOWER_END] = choose(laps | (high != high), nan, low)
+            out[k, UPPER_END] = choose(laps, inf, choose(low != low, nan, high))
 
 
 @Inner
