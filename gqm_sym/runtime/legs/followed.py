@@ -74,8 +74,10 @@ class FollowedMotion(Tabulated, Motion):
                 return None
             self._follow_next()
         segments = self._trajectory(0.0).segments
-        last = [k for k, timed in enumerate(segments) if timed.end == "turn"][turns - 1]
-        return Trajectory(segments=segments[: last + 1], lap=self.problem.period)
+        ends = [k for k, timed in enumerate(segments) if timed.end == "turn"]
+        if len(ends) < turns:
+            return None
+        return Trajectory(segments=segments[: ends[turns - 1] + 1], lap=self.problem.period)
 
     def _history(self) -> tuple[TimedSegment, ...]:
         self._look_ahead()
