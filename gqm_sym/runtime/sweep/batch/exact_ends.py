@@ -64,13 +64,18 @@ def keeps_ends(kind, quantity):  # type: ignore[no-untyped-def]
 def refines_ends(kind, quantity, orbits, careful):  # type: ignore[no-untyped-def]
     """Return whether the ends of orbits are to be found in double-double arithmetic.
 
-    To find those of bodies thrown about an axis would take longer than their times by an arithmetic-geometric mean, and
-    matters next to a hilltop only.
+    Bodies released at rest turn at their mirror images about an axis, and what rounding takes from the width of their
+    orbits matters next to a hilltop only. So it does for bodies thrown about an axis, for which it would take longer
+    than their times by an arithmetic-geometric mean.
     """
-    if kind.kind == CIRCULATION or not keeps_ends(kind, quantity):
-        return kind.kind != CIRCULATION
+    if kind.kind == CIRCULATION:
+        return False
     thrown = contains_positive(orbits.rows[LAUNCH_V2, : orbits.size])
-    return thrown and (careful or kind.kind != AGM_LIBRATION or quantity == ARRIVAL_TIME)
+    if kind.about_axis and not (thrown or careful):
+        return False
+    return not keeps_ends(kind, quantity) or (
+        thrown and (careful or kind.kind != AGM_LIBRATION or quantity == ARRIVAL_TIME)
+    )
 
 
 @Inner
