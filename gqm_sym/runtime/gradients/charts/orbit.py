@@ -244,7 +244,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         both = self._found[[BEHIND, AHEAD], :2]
         return np.array(_sum(both[0], both[1]))
 
-    def _range(self, ends: Array | None = None) -> Array:
+    def _range(self, ends: Array | None) -> Array:
         """Return the inputs of programs by which they know the range of the phase: the length of a lap, or both turning
         points as distances from the lower one, followed by their derivatives.
         """

@@ -13,7 +13,13 @@ from gqm_sym.runtime.arithmetic.doubledouble import add, two_product
 from gqm_sym.runtime.charts.double_double.making import TruePieces
 from gqm_sym.runtime.charts.double_double.pieces import NODES
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.charts.shaped_pieces import fill_arcs, fill_coordinates, neighbour, step_of
+from gqm_sym.runtime.gradients.charts.shaped_pieces import (
+    arcs_from_start,
+    fill_arcs,
+    fill_coordinates,
+    neighbour,
+    step_of,
+)
 from gqm_sym.runtime.gradients.second_programs import pairs_of
 from gqm_sym.runtime.launch.problem import Problem
 
@@ -145,15 +151,7 @@ class ShapedBends:
         """Return the derivatives of the arc length from the start point to the points at places, two doubles each: the
         first ones by all parameters, and the second ones by all pairs.
         """
-
-        def arcs(curve: TruePieces, _: Steps) -> Array:
-            curve.make(min(int(places[0].min()), curve.begin), max(int(places[0].max()), curve.begin))
-            found = np.empty((2, places.shape[1]))
-            fill_arcs(curve.curve, curve.begin, places, found)
-            start, start_low = curve.start_length
-            return np.array(add.py_func(found[0], found[1], -start, -start_low))
-
-        firsts, seconds = self._differences(arcs)
+        firsts, seconds = self._differences(lambda curve, _: arcs_from_start(curve, places))
         return np.concatenate([*firsts, *seconds]) if firsts else np.empty((0, places.shape[1]))
 
 

@@ -227,13 +227,7 @@ class ShapedPieces:
             if not sides:
                 found.append(np.full(places.shape[1], np.nan))
                 continue
-            before, after = np.empty((2, 2, places.shape[1]))
-            for side, arcs in zip(sides, (before, after), strict=True):
-                side.make(min(int(places[0].min()), side.begin), max(int(places[0].max()), side.begin))
-                fill_arcs(side.curve, side.begin, places, arcs)
-                start, start_low = side.start_length
-                total, rounding = two_sum.py_func(arcs[0], -start)
-                arcs[0], arcs[1] = total, arcs[1] + (rounding - start_low)
+            before, after = (arcs_from_start(side, places) for side in sides)
             found.append(_quotient(before, after, step)[0])
         return np.array(found).reshape(-1, places.shape[1])
 
@@ -321,6 +315,16 @@ def _beside(maker: ChartMaker, p: tuple[Number, ...], k: int, chart: Any) -> tup
     sides = [neighbour(maker, p, {k: sign * step}, chart) for sign in (-1, 1)]
     found = [side for side in sides if side is not None]
     return (step, *found) if len(found) == len(sides) else (step,)
+
+
+def arcs_from_start(pieces: TruePieces, places: Array) -> Array:
+    """Return the arc lengths, two doubles each, from the start point of a curve to places."""
+    pieces.make(min(int(places[0].min()), pieces.begin), max(int(places[0].max()), pieces.begin))
+    arcs = np.empty((2, places.shape[1]))
+    fill_arcs(pieces.curve, pieces.begin, places, arcs)
+    start, start_low = pieces.start_length
+    total, rounding = two_sum.py_func(arcs[0], -start)
+    return np.array([total, arcs[1] + (rounding - start_low)])
 
 
 def step_of(number: Number, share: float) -> float:

@@ -31,15 +31,24 @@ def whole_trajectory(motion: Any) -> tuple[Trajectory, float]:
     SolutionError
         If the motion goes on for ever without repeating.
     """
-    repeats = motion.kind in ("libration", "circulation")
-    end = motion._end_of_legs()
-    if not repeats and not isfinite(end):
+    if _is_endless(motion):
         raise SolutionError(
             "this motion goes on for ever, or for too many turns to search them all, and does not repeat; launch it "
             "with a horizon, t_max, for its extremes"
         )
-    end = min(end, motion.period) if repeats else end
-    return motion._listed_trajectory if repeats else motion._trajectory(end), end
+    end = motion._end_of_legs()
+    if _repeats(motion):
+        return motion._listed_trajectory, min(end, motion.period)
+    return motion._trajectory(end), end
+
+
+def _repeats(motion: Any) -> bool:
+    return motion.kind in ("libration", "circulation")
+
+
+def _is_endless(motion: Any) -> bool:
+    """Return whether a motion goes on for ever without repeating."""
+    return not _repeats(motion) and not isfinite(motion._end_of_legs())
 
 
 def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Trajectory, float]:
@@ -53,8 +62,7 @@ def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Traj
     SolutionError
         As `extreme`.
     """
-    repeats = motion.kind in ("libration", "circulation")
-    if quantity.is_quadratic and not repeats and not isfinite(motion._end_of_legs()):
+    if quantity.is_quadratic and _is_endless(motion):
         for turns in TURNS_OF_SEARCH:
             trajectory = motion._up_to_turn(turns)
             if trajectory is None:
