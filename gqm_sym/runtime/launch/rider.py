@@ -27,8 +27,9 @@ FIELDS = (
 # The unit of loads in m/s**2.
 STANDARD_GRAVITY = 9.80665
 
-# A tangent whose horizontal component has a smaller square is vertical to rounding.
-MIN_LEVEL = 1e-20
+# The row of the square of the tangent's horizontal component (`interface`), and the value below which the tangent is
+# vertical to rounding.
+LEVEL_ROW, MIN_LEVEL = 11, 1e-20
 
 # The number of places that are filled at a time.
 BLOCK = 256
@@ -87,7 +88,7 @@ def fill_rider_loads(address, given, rows, part, past_cache):  # type: ignore[no
         for row in range(len(FIELDS)):
             put(rows[row], first, field, (row if row < 7 else row + 1) * n, n, past_cache)
         for i in range(n):
-            if field[11 * n + i] < MIN_LEVEL:
+            if field[LEVEL_ROW * n + i] < MIN_LEVEL:
                 return first + i
     settle(rows[0])
     return -1

@@ -14,7 +14,7 @@ from gqm_sym.runtime.compiled.calls import (
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS, RIDER_ROWS, SPACE_ROWS
-from gqm_sym.runtime.launch.rider import MIN_LEVEL
+from gqm_sym.runtime.launch.rider import LEVEL_ROW, MIN_LEVEL
 
 # The functions whose extremes are searched for: V**2; the contact force, if it has a sign; the square of its length,
 # which is smooth also where the length almost vanishes; and the load on riders upwards, whose sign tells on which side
@@ -90,7 +90,7 @@ def fill_force(curve, function, n, lam, v2, frame, out):  # type: ignore[no-unty
         loads = rider_buffer()
         call_rider_loads(curve.rider_loads, n, lam, v2, 1.0, 1.0, curve.p, loads)
         for i in range(n):
-            out[i] = loads[i] if loads[11 * n + i] >= MIN_LEVEL else np.nan
+            out[i] = loads[i] if loads[LEVEL_ROW * n + i] >= MIN_LEVEL else np.nan
         return
     for i in range(n):
         force = frame[4 * n + i]
