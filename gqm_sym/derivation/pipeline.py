@@ -258,7 +258,7 @@ def _refuse_of_train(kernel: Kernel) -> None:
         ("surface_tension", kernel.resistance, "a droplet's resistance"),
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
         ("rolling: mu_static", kernel.static_friction_limit, "the friction that its wheels need"),
-        ("law", kernel.tangential_law, "a law of acceleration"),
+        ("law", kernel.tangential_law, "a law of acceleration, as that of linear drag,"),
     )
     for name, given, what in refused:
         if given:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from gqm_sym.kernels.base import Kernel
 from gqm_sym.kernels.central_force import CentralForce
 from gqm_sym.kernels.coulomb import CoulombFriction
-from gqm_sym.kernels.drag import QuadraticDrag
+from gqm_sym.kernels.drag import LinearDrag, QuadraticDrag
 from gqm_sym.kernels.gravity import Gravity
 from gqm_sym.kernels.potential import Potential
 from gqm_sym.kernels.rolling import Rolling
@@ -51,6 +51,12 @@ KERNELS: dict[str, KernelRow] = {
             make=CoulombFriction,
             arguments=("mu", "mu_static"),
             summary="sliding friction mu*|N|, and static friction up to mu_static*|N|",
+        ),
+        KernelRow(
+            name="linear_drag",
+            make=LinearDrag,
+            arguments=("c",),
+            summary="viscous drag c*V against the motion, in N",
         ),
         KernelRow(
             name="drag",
@@ -98,6 +104,7 @@ __all__ = [
     "Gravity",
     "Kernel",
     "KernelRow",
+    "LinearDrag",
     "Potential",
     "QuadraticDrag",
     "Rolling",

@@ -282,6 +282,7 @@ UNITS = {
     "mu": "1",
     "mu_static": "1",
     "b": "kg/m",
+    "c": "kg/s",
     "gamma": "N/m",
     "ell_c": "m",
 }

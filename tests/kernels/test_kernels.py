@@ -12,13 +12,14 @@ from gqm_sym.kernels import (
     CoulombFriction,
     Gravity,
     Kernel,
+    LinearDrag,
     Potential,
     QuadraticDrag,
     Rolling,
     RotatingFrame,
     SurfaceTension,
 )
-from gqm_sym.kernels.base import KAPPA, MASS, W, Y
+from gqm_sym.kernels.base import KAPPA, MASS, W, Y, units_of
 
 x, z, g, k, beta, Omega = (sp.Symbol(name, real=True) for name in ("x", "z", "g", "k", "beta", "Omega"))
 mu, b, gamma, ell_c = (sp.Symbol(name, real=True) for name in ("mu", "b", "gamma", "ell_c"))
@@ -155,6 +156,14 @@ def test_lossy_slots_add() -> None:
     assert (Gravity() + Rolling() + RotatingFrame() + CentralForce()).conservative
 
 
+def test_linear_drag_is_a_law_of_the_speed() -> None:
+    """Viscous drag is its tangential acceleration written out, with a unit and a bound for its coefficient."""
+    law = Gravity() + LinearDrag(c="1/10")
+    assert law.tangential_law == Kernel.law("-direction*c*sqrt(W)/m").tangential_law
+    assert (law.parameters, law.at_least, law.conservative) == (("g", "c"), (("c", "0"),), False)
+    assert units_of(law)["c"] == "kg/s"
+
+
 def test_static_friction_is_that_of_sliding_if_nothing_is_said() -> None:
     """If static friction is not given, both coefficients are one parameter."""
     law = CoulombFriction(mu="mu_rail")
@@ -173,6 +182,7 @@ def test_the_printed_droplet_is_signed() -> None:
         (lambda: CoulombFriction(mu=-1), r"'mu' must be at least 0, got -1"),
         (lambda: CoulombFriction(mu="0.3", mu_static="0.2"), r"'mu_static' must be at least mu = 0.3, got 0.2"),
         (lambda: QuadraticDrag(b="-1/2"), r"'b' must be at least 0"),
+        (lambda: LinearDrag(c=-1), r"'c' must be at least 0"),
         (lambda: SurfaceTension(gamma=-1), r"'gamma' must be at least 0"),
         (lambda: SurfaceTension(form="wet"), r"form: must be one of resistance, printed, got 'wet'"),
         (lambda: Rolling(beta="-0.1"), r"'beta' must be at least 0"),

@@ -139,7 +139,7 @@ class Damped:
 )
 def test_a_law_that_is_not_linear(build: Build, launch: Launch) -> None:
     """With a resistance that grows with the speed itself, states and forty turns have the right derivatives."""
-    force = gqm.Potential("k*x**2/2") + gqm.Kernel.law("-c*direction*sqrt(W)")
+    force = gqm.Potential("k*x**2/2") + gqm.LinearDrag()
     module = build("changing_damper", gqm.Curve.graph("0*x"), force)
     launch = {**launch, "k": "3", "c": "0.06"}
     motion = module.solve(**launch, t_max=80)
