@@ -1,5 +1,5 @@
 """Compiled code for gradients of many half periods, laps or turning points in double-double arithmetic, with one orbit
-in each lane.
+in each lane; and of half periods that are arithmetic-geometric means, of which only small shares are doubles.
 """
 
 from math import fabs, inf, nan
@@ -23,16 +23,24 @@ from gqm_sym.runtime.gradients.evaluation import (
     rounding_of,
 )
 from gqm_sym.runtime.gradients.lanes.evaluation import (
+    ANSWERED,
+    LANE_PROGRAM,
+    OPEN,
     WIDTH,
     fill_column,
     fill_inputs,
     fill_place,
+    fill_turns,
     rows_of,
     take_step,
 )
 
 # The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
+
+# The largest relative difference of two numbers whose arithmetic-geometric mean is their mean, as double precision
+# needs it.
+MAX_DIFFERENCE = 3e-9
 
 # The rows of the state of an orbit: the change by the last level, and whether the rule has converged (-1 if it never
 # will, because digits are lost).
@@ -220,3 +228,43 @@ def fill_turn_gradients(ends, works, launches, found):  # type: ignore[no-untype
             values = rows_of(target, (first + 2 + j) * ROW)[0]
             for i in range(size):
                 found[start + i, j] = values[i]
+
+
+@entry(
+    types.void(
+        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, INTEGER),
+        *(MATRIX, types.Tuple((MATRIX, types.int8[::1]))),
+    ),
+    nogil=True,
+)
+def fill_mean_gradients(turn, turn_work, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of half periods that are pi over an arithmetic-geometric mean.
+
+    The arguments are as for `evaluation.fill_lane_gradients`, except that the orbit's program is
+    `programs.mean_program`, and that ``inputs`` is the number of columns of the launches that are its inputs.
+    """
+    found, states = answers
+    coordinates, outputs = program[4], program[5]
+    first = outputs.size - found.shape[1]
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        some, lanes = (launches, start, size), -(-size // WIDTH) * WIDTH
+        fill_inputs(work, inputs, some, lanes)
+        fill_turns(turn, turn_work, some, lanes, inputs, work)
+        call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
+        one = rows_of(work, coordinates[0])[0]
+        one[:lanes] = 1.0
+        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, lanes)
+        known = rows_of(work, outputs[0])[0]
+        for i in range(lanes):
+            known[i] = choose(fabs(known[i]) <= MAX_DIFFERENCE, 1.0, 0.0)
+        for j in range(1, first):
+            loss = rows_of(work, outputs[j])[0]
+            for i in range(lanes):
+                known[i] = choose(loss[i] <= 0.0, known[i], 0.0)
+        for j in range(found.shape[1]):
+            values = rows_of(work, outputs[first + j])[0]
+            for i in range(size):
+                found[start + i, j] = values[i]
+        for i in range(size):
+            states[start + i] = ANSWERED if known[i] == 1.0 else OPEN

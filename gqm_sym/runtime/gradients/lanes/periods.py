@@ -31,9 +31,8 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
-from gqm_sym.runtime.gradients.lanes.means import fill_mean_gradients
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients, fill_turn_gradients
+from gqm_sym.runtime.gradients.lanes.pairs import fill_mean_gradients, fill_pair_gradients, fill_turn_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
     axis_program,
