@@ -287,7 +287,7 @@ class PassageChanges:
         path, local = self._path(lam), self._local(lam)
         count, base = self.source.parameters, self._base.moves
         # At a launch from a cusp ds, V and the slope of V**2 vanish, so that the place does not change.
-        is_at_cusp = self._starts_at_cusp & ~has_turned & (lam == self.launch.high)
+        is_at_cusp = np.logical_not(has_turned) & (lam == self.launch.high) & self._starts_at_cusp
         ds = np.where(is_at_cusp, 1.0, path[DS, 0])
         moved = base[0][:, None] - slopes * v / ds
         # Beside a turning point half of V**2 and its change at a place that moves with it are small; their ratio is
