@@ -37,9 +37,13 @@ AXIS_SPACING         distance from one axis to the next, 0 if there is only one 
 AXIS_NUMBER          how many such distances that axis is from the one that is known      search
 ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
 V2_REST              what rounding took from V**2 at launch                               search
+CHECK_LOW,           V**2's regular factor at the nodes in CHECKED from double-double      time
+CHECK_HIGH           arithmetic; NaN if that is not known
+LEVEL, LEVEL_REST    U + V**2/2, as two doubles                                           exact time
+LACK_LOW, LACK_HIGH  what OFFSET_LOW and OFFSET_HIGH lack as doubles                      exact time
 ==================== ==================================================================== ======================
 
-The quadrature needs only the rows before TIME_ROWS.
+The quadrature needs only the rows before TIME_ROWS after its first level, except in double-double arithmetic.
 """
 
 from typing import Any, NamedTuple
@@ -58,7 +62,8 @@ BATCH, LANES = 128, 8
 INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
 END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 18)
 LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(18, 23)
-ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(23, 31)
+ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST = range(23, 30)
+CHECK_LOW, CHECK_HIGH, LEVEL, LEVEL_REST, LACK_LOW, LACK_HIGH, ROWS = range(30, 37)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
@@ -124,7 +129,7 @@ class Scratch(NamedTuple):
         Lists of columns.
     work : (13, BATCH) array
         Rows for intermediate results.
-    ends : (7, BATCH) array
+    ends : (6, BATCH) array
         Rows for orbits whose ends are found in double-double arithmetic.
     careful : bool
         Whether these are launches that batches left before.
