@@ -55,7 +55,6 @@ from gqm_sym.runtime.sweep.batch.rows import (
 from gqm_sym.runtime.sweep.batch.times import (
     AGM_LIBRATION,
     AXIS_LIBRATION,
-    EXACT_LIBRATION,
     half_periods_by_agm,
     times_by_trapezoid,
 )
@@ -136,19 +135,22 @@ def answer_times(fns, kind, orbits, scratch, quantity, answers):  # type: ignore
     if kind.kind == AGM_LIBRATION:
         half_periods_by_agm(fns, orbits, scratch, quantity, answers)
     else:
-        times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
+        times_by_trapezoid(fns, kind.kind, kind.mirrored, False, orbits, scratch, quantity, answers)
 
 
 @Inner
 def answer_exact_times(fns, mirrored, orbits, block, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Fill half periods or periods in double-double arithmetic; ``block`` stores some orbits meanwhile."""
+    """Fill half periods or periods that are corrected by double-double arithmetic; ``block`` stores some orbits
+    meanwhile.
+    """
     for begin in range(0, orbits.size, BLOCK):
         size = min(BLOCK, orbits.size - begin)
         for j in range(size):
             scratch.others[j] = begin + j
         gather(orbits, scratch.param_count, scratch.others, size, block, ROWS)
         some = Orbits(size, block.rows, block.params)
-        times_by_trapezoid(fns, EXACT_LIBRATION, mirrored, some, scratch, quantity, answers)
+        leave_unchecked(some)
+        times_by_trapezoid(fns, LIBRATION, mirrored, True, some, scratch, quantity, answers)
 
 
 @Inner
@@ -363,7 +365,7 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
         HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME or SPANS.
     careful : bool
         Whether batches have left these launches before. The search for turning points then makes smaller steps, and
-        times are found in double-double arithmetic.
+        times are corrected by double-double arithmetic.
     exact : RecordedFormulas
         The module's formulas as a tape, by which turning points are found in double-double arithmetic; empty if there
         is none.

@@ -14,8 +14,6 @@ from gqm_sym.runtime.quadrature.trapezoid import MIN_INTERVALS, NODE_SHARES, OFF
 from gqm_sym.runtime.sweep.batch.rows import (
     CHECK_HIGH,
     CHECK_LOW,
-    FACTOR_HIGH,
-    FACTOR_LOW,
     LACK_HIGH,
     LACK_LOW,
     LAUNCH_PLACE,
@@ -123,16 +121,9 @@ def leave_unchecked(orbits):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_exact_integrand(exact, n, node, rows, columns, work):  # type: ignore[no-untyped-def]
-    """Fill the time integrand of each orbit at one node of the rule; they are a block at most, and are loaded.
-
-    The rows for the smallest and the largest regular factor of V**2 are updated.
-    """
-    rates, factors, low, high = work[2, :n], work[3, :n], rows[FACTOR_LOW, :n], rows[FACTOR_HIGH, :n]
-    fill_factors(exact, rows, columns, n, node, factors)
-    ds = exact.tape[3][3]
+def fill_exact_integrand(exact, node, rows, columns, rates):  # type: ignore[no-untyped-def]
+    """Fill the time integrand of each orbit at one node of the rule; they are a block at most, and are loaded."""
+    n, ds = rates.size, exact.tape[3][3]
+    fill_factors(exact, rows, columns, n, node, rates)
     for j in range(n):
-        q = factors[j]
-        rates[j] = exact.work[ds + j] / sqrt(2.0 * q)
-        low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
-    return rates
+        rates[j] = exact.work[ds + j] / sqrt(2.0 * rates[j])

@@ -44,6 +44,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     HALF_REST,
     HALF_WIDTH,
     INDEX,
+    LACKING,
     LAUNCH_PLACE,
     LAUNCH_V2,
     OFFSET_HIGH,
@@ -59,13 +60,16 @@ from gqm_sym.runtime.sweep.batch.rows import (
 from gqm_sym.runtime.sweep.batch.wide_orbits import replace_on_wide_orbits
 from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
 
-# Kinds of orbits in addition to those of `trapezoid`: librations whose V**2 is found in double-double arithmetic, and
-# two of librations about an axis of symmetry, one with a time integrand that needs no sines, the other with a half
-# period of pi over an arithmetic-geometric mean.
-EXACT_LIBRATION, AXIS_LIBRATION, AGM_LIBRATION = 2, 3, 4
+# Kinds of orbits in addition to those of `trapezoid`. Both are librations about an axis of symmetry: one with a time
+# integrand that needs no sines, the other with a half period of pi over an arithmetic-geometric mean.
+AXIS_LIBRATION, AGM_LIBRATION = 2, 3
 
 # For each kind except the last, the number of rows of a batch that the trapezoidal rule needs.
-NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, ROWS, AXIS_LIBRATION_ROWS)
+NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
+
+# The number of nodes at which the integrand is also found in double-double arithmetic. What it lacks in doubles is so
+# small that few digits of the mean of that are enough.
+EXACT_NODES = 4 * MIN_INTERVALS
 
 # Pi as two doubles.
 PI_HIGH, PI_LOW = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
@@ -78,11 +82,11 @@ CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 # from rest are exact where it starts, and both are in an even well.
 MIN_RATIO, MIN_LAP_RATIO, MIN_TURN_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.1, 0.4, 0.5, 0.9
 
-# The same for librations of which V**2 is found in double-double arithmetic; below it the rule needs many nodes.
+# The same for librations whose integrand is corrected by values from double-double arithmetic.
 MIN_EXACT_RATIO = 0.03
 
 # The largest relative error of V**2 in doubles where it is checked.
-MAX_FACTOR_ERROR = 4.0 * 2.0**-53
+MAX_FACTOR_ERROR = 3.0 * 2.0**-53
 
 # The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
 # MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
@@ -159,7 +163,7 @@ def fill_halves(n, rows, halves):  # type: ignore[no-untyped-def]
 def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
     """Append the terms that are constant along an orbit to the rows of parameters; return the new number of rows."""
     count, n, rows, params = scratch.param_count, orbits.size, orbits.rows, orbits.params
-    more = scratch.layout[0 if kind == LIBRATION else 1] if kind in (LIBRATION, AXIS_LIBRATION) else 0
+    more = 0 if kind == CIRCULATION else scratch.layout[kind // AXIS_LIBRATION]
     if more:
         p, pairs = params[: count * n].reshape(count, n), scratch.work[:2].reshape(-1)[: 2 * n]
         halves, middles, rests = pairs[:n], scratch.work[2, :n], scratch.work[3, :n]
@@ -237,10 +241,10 @@ def set_times(rows, nodes, ranges, rests, times):  # type: ignore[no-untyped-def
 
     ``ranges`` is the range of the phase angle, or 1 for laps, as two doubles.
     """
-    high, low = ranges
+    (high, low), corrected = ranges, min(nodes, EXACT_NODES)
     for j in range(times.size):
         mean = rows[VALUE, j]
-        rest = mean * (low + high * rests[j]) + high * (rows[REST, j] / nodes)
+        rest = mean * (low + high * rests[j]) + high * (rows[REST, j] / nodes + rows[LACKING, j] / corrected)
         times[j] = fma(mean, high, rest)
 
 
@@ -259,9 +263,7 @@ def answer_level(rows, times, verdict, chosen, answers):  # type: ignore[no-unty
 
 @Inner
 def fill_rates(fns, kind, n, node, rows, p, scratch):  # type: ignore[no-untyped-def]
-    """Fill the time integrand of each orbit at one node of the rule, in doubles or in double-double arithmetic."""
-    if kind == EXACT_LIBRATION:
-        return fill_exact_integrand(scratch.exact, n, node, rows, scratch.others, scratch.work)
+    """Fill the time integrand of each orbit at one node of the rule, and check it."""
     rates = fill_integrand_batch(fns, kind, n, node, rows, p, scratch.work)
     if kind == LIBRATION and node in CHECKED:
         refuse_rough_factors(n, rows, CHECK_LOW if node == CHECKED[0] else CHECK_HIGH, scratch.work[3, :n])
@@ -269,34 +271,55 @@ def fill_rates(fns, kind, n, node, rows, p, scratch):  # type: ignore[no-untyped
 
 
 @Inner
-def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+def add_what_rates_lack(rows, node, weight, rates, scratch):  # type: ignore[no-untyped-def]
+    """Add what the integrand lacks at a node to its sum; where that is not known, the smallest factor of V**2 becomes
+    negative.
+    """
+    exact, lacking, low = scratch.work[8, : rates.size], rows[LACKING, : rates.size], rows[FACTOR_LOW, : rates.size]
+    fill_exact_integrand(scratch.exact, node, rows, scratch.others, exact)
+    for j in range(rates.size):
+        known = exact[j] == exact[j]
+        lacking[j] += weight * choose(known, exact[j] - rates[j], 0.0)
+        low[j] = choose(known, low[j], -1.0)
+
+
+@Inner
+def start_sums(n, rows):  # type: ignore[no-untyped-def]
+    """Set the rows of sums and extremes over nodes to those of no nodes."""
+    for j in range(n):
+        rows[SUM, j], rows[REST, j], rows[VALUE, j], rows[CHANGE, j], rows[LACKING, j] = 0.0, 0.0, 0.0, inf, 0.0
+        rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
+        rows[FACTOR_AT_TURN, j] = inf
+
+
+@Inner
+def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Fill half periods, periods or loop times by the trapezoidal rule.
 
     The number of nodes is doubled until the rule has converged. Orbits for which it has are removed, as are those on
     which V**2 almost vanishes. On orbits that are ``mirrored`` only nodes up to the middle are evaluated.
+    Times are corrected ``exactly`` by the integrand in double-double arithmetic at the first nodes; the orbits are then
+    a block at most.
     """
     count = add_invariants(fns, kind, orbits, scratch)
     n, rows, work, chosen = orbits.size, orbits.rows, scratch.work, scratch.chosen
-    for j in range(n):
-        rows[SUM, j], rows[REST, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, 0.0, inf
-        rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
-        rows[FACTOR_AT_TURN, j] = inf
+    start_sums(n, rows)
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD else 1.0
     ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
     from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
     if has_tape(scratch) and kind != CIRCULATION:
-        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_RATIO
-        least = MIN_EXACT_RATIO if kind == EXACT_LIBRATION else least
+        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if exactly else MIN_RATIO
         from_rest, thrown, at_turns = least, least, 0.0
     ratios = from_rest, thrown, at_turns
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
         more[:] = lost[:] = 0.0
-        if kind == EXACT_LIBRATION:
-            load_block(scratch.exact, count, orbits, scratch.others)
+        corrected = exactly and nodes <= EXACT_NODES
+        if corrected:
+            load_block(scratch.exact, scratch.param_count, orbits, scratch.others)
         for node in range(begin, last + 1):
             rates = fill_rates(fns, kind, n, node, rows, p, scratch)
             if mirrored and node == 0 and begin == 0:
@@ -308,6 +331,8 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
             elif kind == LIBRATION and begin == 0 and (node == 0 or node == last):
                 keep_factor_at_turn(n, rows, OFFSET_LOW if node == 0 else OFFSET_HIGH, work[3, :n])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
+            if corrected:
+                add_what_rates_lack(rows, node, weight, rates, scratch)
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
                 total = more[j] + term
@@ -322,12 +347,12 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
         judge_level(rows, n, nodes, ratios, work[0, :n])
         if begin > 0:
             rests, times = work[1, :n], work[2, :n]
-            relative_rests(orbits.params, scratch.layout[2] if kind in (LIBRATION, AXIS_LIBRATION) else -1, rests)
+            relative_rests(orbits.params, scratch.layout[2] if kind != CIRCULATION else -1, rests)
             set_times(rows, nodes, ranges, rests, times)
             continuing = answer_level(rows, times, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:
                 return
-            orbits = shrink(orbits, count, chosen, continuing, NEEDED_ROWS[kind])
+            orbits = shrink(orbits, count, chosen, continuing, ROWS if exactly else NEEDED_ROWS[kind])
             n = orbits.size
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
 

@@ -87,7 +87,7 @@ def launches_in_right_well(c: float, bottom: float, levels: np.ndarray) -> list[
 
 @pytest.mark.parametrize(("c", "bottom", "depth"), [(1.0 / 3.0, 0.742227, 0.0119), (0.38, 0.629753, 0.000347)])
 def test_shallow_wells(c: float, bottom: float, depth: float, two_wells: ModuleType) -> None:
-    """In a well that is a hundredth or a few ten-thousandths as deep as the terms of the height are large, their roundings and
+    """In a well that is a hundredth or a thousandth as deep as the terms of the height are large, their roundings and
     those of turning points do not count: a sixth of these times were over two units in the last place off.
     """
     shares = np.random.default_rng(5).uniform(0.05, 0.9, 12)
