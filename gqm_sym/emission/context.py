@@ -8,6 +8,7 @@ from sympy import Expr, Symbol, cos, ordered, sin, tan
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.angles import with_exact_angles
+from gqm_sym.derivation.algebra.bottom_up import symbols_of, with_replaced
 from gqm_sym.emission.contact_force import Contact, Vector, contact_at, turned_parts
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
@@ -196,7 +197,7 @@ class Lowering:
         """
         check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))
-        outputs = tuple(form.xreplace(self.trigonometric) for form in outputs)
+        outputs = with_replaced(outputs, self.trigonometric)
         inside = [(symbol, value.xreplace(self.trigonometric)) for symbol, value in inside]
         used = self.used([*outputs, *(value for _, value in inside)])
         if batch:
@@ -221,5 +222,5 @@ class Lowering:
 
     def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:
         """Return the run-time parameters in some expressions with their positions in ``p``."""
-        free = {s.name for e in expressions for s in e.free_symbols}
+        free = {s.name for s in symbols_of(expressions)}
         return tuple((name, i) for name, i in self.order.items() if name in free)

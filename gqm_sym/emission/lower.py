@@ -3,6 +3,7 @@
 from sympy import Expr, Function
 
 from gqm_sym.derivation import Model
+from gqm_sym.derivation.algebra.bottom_up import with_replaced
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker, potential_by_coordinates
@@ -158,7 +159,7 @@ class _ModelLowering(Lowering):
             (places, speeds, v, nu),
             "Loads on a rider, their rates, and roll and place of the track; v = sgn(ds/dt), nu = sgn(N).",
             inside=[(self.place, at(places)), (w, at(speeds))],
-            outputs=self.accurate(row.xreplace(symbols) for row in rows),
+            outputs=self.accurate(with_replaced(rows, symbols)),
         )
         return (function,)
 

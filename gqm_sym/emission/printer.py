@@ -4,12 +4,13 @@ import re
 from collections.abc import Collection
 from typing import Any
 
-from sympy import Basic, Expr, Integer, Rational, Symbol, pi, preorder_traversal
+from sympy import Basic, Expr, Integer, Rational, Symbol, pi
 from sympy.core.function import AppliedUndef
 from sympy.core.numbers import Exp1
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
+from gqm_sym.derivation.algebra.bottom_up import parts_in_order
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import SPACE_CHARTS, TRAIN_LOADS
 
@@ -64,7 +65,7 @@ def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
     where
         The name of the form, for messages.
     """
-    for node in preorder_traversal(expr):
+    for node in parts_in_order([expr]):
         if isinstance(node, Symbol):
             if node.name not in names:
                 raise EmissionError(f"{where}: {node.name} is neither the curve's parameter nor a run-time parameter")

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 import sympy
 from sympy import Basic, Expr, Function, Integer, Pow, Rational, Symbol, ordered
 
-from gqm_sym.derivation.algebra.bottom_up import distinct_parts, from_the_leaves_up
+from gqm_sym.derivation.algebra.bottom_up import from_the_leaves_up, with_replaced
 from gqm_sym.emission.ir import Assignment
 from gqm_sym.errors import EmissionError
 
-# The largest number of operations of one function when it is expanded: a long curve has some thousands, and SymPy
-# processes 10**5 in seconds.
-MAX_SIZE = 200_000
+# The largest number of operations of one function when it is expanded: a long curve has some thousands, the path of the
+# centre of a rolling body in space some hundred thousands, and SymPy processes 10**5 in seconds.
+MAX_SIZE = 1_000_000
 
 
 def check_size(outputs: Iterable[Expr], *, where: str) -> None:
@@ -93,19 +93,29 @@ def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], lis
     while outermost := _fixed_calls(outputs, moving | {symbol for symbol, _ in named}):
         new = [(Symbol(f"_c{len(named) + i}", real=True), call) for i, call in enumerate(outermost)]
         replacement = {call: symbol for symbol, call in new}
-        outputs = [e.xreplace(replacement) for e in outputs]
+        outputs = list(with_replaced(outputs, replacement))
         named += new
     return outputs, named
 
 
 def _fixed_calls(outputs: Sequence[Expr], moving: set[Symbol]) -> list[Expr]:
     """Return the outermost calls that do not depend on the place."""
+    symbols: dict[Basic, frozenset[Basic]] = {}
+
+    def read_by(part: Basic) -> frozenset[Basic]:
+        if part not in symbols:
+            of_parts = (read_by(argument) for argument in part.args)
+            symbols[part] = frozenset([part]) if part.is_Symbol else frozenset().union(*of_parts)
+        return symbols[part]
+
+    for output in outputs:
+        read_by(output)
     calls = {
         call
-        for call in distinct_parts(outputs)
+        for call, read in symbols.items()
         if isinstance(call, Function | Pow)
-        and not call.free_symbols & moving
-        and call.free_symbols
+        and not read & moving
+        and read
         and not (call.is_Pow and isinstance(call.exp, Integer))
     }
     return [c for c in ordered(calls) if not any(c != o and o.has(c) for o in calls)]

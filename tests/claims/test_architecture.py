@@ -246,6 +246,7 @@ TESTED_THROUGH = {
     "sweep/single/arrivals.py": "runtime/sweep/test_sweep.py",
     "sweep/single/orbit_extremes.py": "runtime/sweep/test_sweep.py",
     "sweep/single/slow_places.py": "runtime/sweep/test_separatrices.py",
+    "sweep/single/values.py": "runtime/sweep/test_sweep.py",
     "sweep/tables/extremes.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/fitting.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/layout.py": "runtime/sweep/tables/test_times.py",

@@ -11,7 +11,8 @@ def of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Ex
     """Rewrite a function of a rate times the mean of some points by the numbers whose sum its argument is.
 
     Other functions are returned unchanged. Multiplied by the rate of a wave, the rounding of a place far from zero is
-    much more than that of the sine, and all nodes of an orbit have it in common.
+    much more than that of the sine, and all nodes of an orbit have it in common. So is the rounding of a rate that is
+    no double, as 2/3, which is therefore added to the place if ``sum_of`` has the place as two numbers and an offset.
     """
     argument = call.args[0]
     rates = {argument.diff(point) for point in points}
@@ -19,6 +20,10 @@ def of_sum(call: Expr, points: Sequence[Symbol], sum_of: tuple[Expr, ...]) -> Ex
         return call
     rate = rates.pop()
     phase = expand(argument - rate * sum(points))
+    if rate.is_Rational and not is_exact(rate) and len(sum_of) == 3:
+        place, rest, offset = sum_of
+        lacking = 1 - Rational(rate.p / rate.q) / rate
+        sum_of = (place, rest + lacking * (place + offset), offset)
     return Function(f"{call.func.__name__}_of_sum")(phase, len(points) * rate, *sum_of)
 
 

@@ -278,6 +278,18 @@ def combine_absolute_values(expression: sp.Expr) -> sp.Expr:
     return sp.Mul(*(base**power for base, power in powers.items()))
 
 
+def magnitude(form: sp.Expr) -> sp.Expr:
+    """Return the absolute value of a real product.
+
+    SymPy does not know that a root in it is real, and would write its absolute value by its complex conjugate.
+    """
+    return sp.Mul(*(factor if _is_even_root(factor) else sp.Abs(factor) for factor in sp.Mul.make_args(form)))
+
+
+def _is_even_root(factor: sp.Expr) -> bool:
+    return bool(factor.is_Pow and factor.exp.is_Rational and factor.exp.q % 2 == 0)
+
+
 def is_safe(signs: Signs, expression: sp.Expr) -> bool:
     """Return whether no terms of a sum can cancel."""
     return not expression.is_Add or signs.sign(expression) is not None

@@ -7,7 +7,7 @@ import sympy as sp
 
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
-from gqm_sym.derivation.algebra.rewrite import combine_absolute_values, multiplied_out, tidy, without_waves
+from gqm_sym.derivation.algebra.rewrite import combine_absolute_values, magnitude, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
 from gqm_sym.kernels.base import DIRECTION, Kernel, X, Y, Z
 
@@ -122,8 +122,8 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
         effective_potential=tidy(potential / kernel.inertia),
         effective_potential_slope=push * shape.size / kernel.inertia,
         push=combine_absolute_values(-push * shape.per_length),
-        static_normal_load=load * sp.Abs(shape.per_length),
-        pressure=load * sp.Abs(shape.size),
+        static_normal_load=load * magnitude(shape.per_length),
+        pressure=load * magnitude(shape.size),
         loads=tuple(combine_absolute_values(part * shape.per_length) for part in crossed),
         coriolis=_coriolis(kernel.spin, shape) if kernel.spin else (),
     )

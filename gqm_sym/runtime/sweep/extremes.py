@@ -1,13 +1,28 @@
 """The smallest and largest speed or contact force of one of many launches, by formulas or on the table of a curve."""
 
-from math import nan
+from math import inf, nan, sqrt
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.quantities import MAX_FORCE, MAX_SPEED, MIN_FORCE, MIN_SPEED
-from gqm_sym.runtime.sweep.single.orbit_extremes import FORCE, FORCE_SQUARED, V2, extreme
-from gqm_sym.runtime.sweep.tables.extremes import passage_extreme, stretch_of, stretch_to_turn
+from gqm_sym.runtime.sweep.single.orbit_extremes import (
+    FORCE,
+    FORCE_SQUARED,
+    V2,
+    extreme,
+    fill_force,
+    fill_squares,
+    frame_buffer,
+    point_buffer,
+)
+from gqm_sym.runtime.sweep.tables.extremes import (
+    passage_extreme,
+    stretch_after_turn,
+    stretch_before_turn,
+    stretch_of,
+)
+from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 
 EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
@@ -36,35 +51,68 @@ def extreme_by_itself(curve, orbit, quantity, max_grids):  # type: ignore[no-unt
 
 
 @Inner
-def extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
-    """Return an extreme of speed or contact force on an orbit's passage through a table, up to a loss of contact; NaN
-    if it is not accurate.
+def load_at(curve, orbit, quantity, offset, v2):  # type: ignore[no-untyped-def]
+    """Return the speed or the contact force of which an extreme is asked for, at an offset from the launch; the motion
+    has the direction of the launch.
+    """
+    (function, direction), _ = sought_for(curve, orbit, quantity)
+    places, squares, out, frame = point_buffer(), point_buffer(), point_buffer(), frame_buffer()
+    places[0], squares[0] = orbit.lam0 + offset, v2
+    if function == V2:
+        return sqrt(v2)
+    if direction != 0:
+        fill_squares(curve, direction, 1, places, squares, out)
+        return sqrt(out[0])
+    fill_force(curve, FORCE, 1, places, squares, frame, out)
+    return out[0]
 
-    If the force depends on the direction of motion, the body turns, and what it passes in each direction is searched by
+
+@Inner
+def extreme_on(curve, orbit, passage, stop, half_v2_at_edges, quantity):  # type: ignore[no-untyped-def]
+    """Return an extreme of speed or contact force on an orbit's passage through a table, up to a `Stop`; NaN if it is
+    not accurate.
+
+    If the force depends on the direction of motion and the body turns, what it passes in each direction is searched by
     itself.
     """
     (function, direction), sign = sought_for(curve, orbit, quantity)
-    stretch, way = stretch_of(curve, orbit, passage, loss), direction
-    if direction != 0 and orbit.leaves != 0:
-        way = orbit.leaves
-    value = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, way), sign)
-    if direction != 0 and orbit.leaves != direction and not orbit.circulates:
-        if orbit.leaves != 0:
-            stretch = stretch_to_turn(curve, orbit, passage)
-        other = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, -way), sign)
+    turns, passes_whole = stop.turns, stop.panel < 0
+    if passes_whole and not (orbit.circulates or orbit.leaves == orbit.direction):
+        turns = 1
+    turned_twice = turns == 2 or (passes_whole and turns == 1 and orbit.leaves == 0)
+    value = -sign * inf
+    for k in range(3 if direction != 0 else 0):
+        # At a turning point V**2 is a rounding on the table, and its root is no rounding of V.
+        if (turns > 0, turned_twice, orbit.v2 == 0.0)[k]:
+            offset = 0.0 if k == 2 else orbit.high if (direction > 0) == (k == 0) else orbit.low
+            value = sign * max(sign * value, sign * load_at(curve, orbit, quantity, offset, 0.0))
+    if direction == 0 or turns == 0:
+        stretch = stretch_of(curve, orbit, passage, stop)
+        other = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, direction), sign)
+        return sign * max(sign * value, sign * other)
+    stretch, way = stretch_after_turn(orbit, passage, stop), direction if turns == 2 else -direction
+    other = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, way), sign)
+    value = sign * max(sign * value, sign * other)
+    for turned in range(turns):
+        if turned == 1 or (passes_whole and turned_twice):
+            stretch = stretch_after_turn(orbit, passage, NO_STOP)
+        else:
+            stretch = stretch_before_turn(curve, orbit, passage)
+        way = direction if turned == 0 else -direction
+        other = passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, (function, way), sign)
         value = sign * max(sign * value, sign * other)
     return value
 
 
 @Inner
-def extreme_on_table(curve, orbit, passage, loss, edges, quantity):  # type: ignore[no-untyped-def]
+def extreme_on_table(curve, orbit, passage, stop, edges, quantity):  # type: ignore[no-untyped-def]
     """Return the result of `extreme_on`; NaN if it is a speed that has lost digits.
 
     ``edges`` contains V**2/2 at the edges of panels, and whether it keeps enough digits everywhere. The contact force
     has as many digits as the largest V**2.
     """
     half_v2_at_edges, keeps_digits = edges
-    value, peak = extreme_on(curve, orbit, passage, loss, half_v2_at_edges, quantity), 0.0
+    value, peak = extreme_on(curve, orbit, passage, stop, half_v2_at_edges, quantity), 0.0
     if not keeps_digits and quantity in (MIN_SPEED, MAX_SPEED) and value > 0.0:
         for j in range(passage.panels):
             peak = max(peak, half_v2_at_edges[j])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.errors import GQMError
+from gqm_sym.errors import GQMError, SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
 from gqm_sym.runtime.charts.double_double.parts import NO_PARTS, parts_along
@@ -16,7 +16,9 @@ from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, V0, widen
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
-from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.speed import potential_at
+from gqm_sym.runtime.motion.events import sided_force
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, NO_ENDS
 from gqm_sym.runtime.sweep.tables.layout import NO_TABLE, CurveTable
@@ -75,13 +77,12 @@ def groups_of(
     the same shape.
 
     Launches whose curve cannot be made belong to no group. Curves with formulas are tabulated if bodies may lift off or
-    leave them at an end; the force that decides about contact on a curve in space is not.
+    leave them at an end.
     """
     if formulas.chart is None:
         table, later, ends = NO_TABLE, None, CURVE_ENDS
-        if only_sign:
-            if formulas.signed and not formulas.dissipation:
-                table, ends = _tabulated_range(formulas, columns, domain, only_sign)
+        if only_sign and not formulas.dissipation:
+            table, ends = _tabulated_range(formulas, columns, domain, only_sign)
         elif not formulas.dissipation and np.isfinite(domain[0]).all() and np.isfinite(domain[1]).all():
             later = partial(_tabulated_range, formulas, columns, domain, only_sign)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, table_between_ends=later, ends=ends), None
@@ -102,7 +103,7 @@ def groups_of(
         table = NO_TABLE
         if not formulas.dissipation:
             radius = dict(zip(formulas.parameters, values, strict=False)).get(formulas.rolling_radius, 0.0)
-            made_from = _source(formulas), _exact_parts(formulas), radius, len(formulas.parameters)
+            made_from = _source(formulas, only_sign), _exact_parts(formulas), radius, len(formulas.parameters)
             table = tabulated(formulas.chart, *made_from, values)
         some, theirs = columns, factors
         if chosen is not None:
@@ -129,12 +130,15 @@ def _common_parameters(formulas: "Formulas", count: int) -> list[int]:
     return sorted({*shaped_by, *formulas.separated.held})
 
 
-def _source(formulas: "Formulas") -> Source:
+def _source(formulas: "Formulas", only_sign: int) -> Source:
     """Return the functions from which a table of the model's potential and load is made."""
     terms, mass = formulas.separated, list(formulas.parameters).index("m")
+    loads = formulas.rider_loads if only_sign and not formulas.signed else None
+    in_space = loads.address if loads else 0
     if terms is None:
-        return Source(formulas.functions.addresses(), 0, 1, 1, mass)
-    return Source(formulas.functions.addresses(), terms.function.address, terms.potentials, terms.loads, mass)
+        return Source(formulas.functions.addresses(), 0, 1, 1, mass, in_space)
+    separated = terms.function.address, terms.potentials, terms.loads
+    return Source(formulas.functions.addresses(), *separated, mass, in_space)
 
 
 def rests_on_corner(group: Group) -> NDArray[np.bool_]:
@@ -180,17 +184,43 @@ def _tabulated_range(
                 reach[side] = max(place, limit) if side == 0 else min(place, limit)
                 both = np.repeat(reach[side], 2)
                 v2 = 2.0 * (energy - potential_at(fns, p, both)[0])
-                force = path_and_force_at(fns, p, both, np.maximum(v2, 0.0))[4]  # N is linear in the energy
-                if not v2[1] > 0.0 or (only_sign * force < 0.0).all():
+                if not v2[1] > 0.0 or _is_lost(formulas, p, reach[side], np.maximum(v2, 0.0), only_sign):
                     closed += 1
                     break
                 width *= 2.0
         first, last = reach
         ends = CONTACT_ENDS if closed == 2 else NO_ENDS
-    return _tabulated_between(formulas.exact, _source(formulas), tuple(p.tolist()), first, last), ends
+    made_from = formulas.exact, _source(formulas, only_sign), tuple(p.tolist())
+    table = _tabulated_between(*made_from, first, last)
+    for _ in range(MAX_DOUBLINGS if formulas.directed and not isfinite(high.item() - low.item()) else 0):
+        if table.paths.size:
+            break
+        # Only a table tells the sides of a track if N depends on the direction of motion.
+        first, last, ends = 0.5 * (first + float(places.min())), 0.5 * (last + float(places.max())), NO_ENDS
+        table = _tabulated_between(*made_from, first, last)
+    return table, ends if table.paths.size else CURVE_ENDS
 
 
-@lru_cache(maxsize=8)
+def _is_lost(formulas: "Formulas", p: Array, place: float, v2: Array, only_sign: int) -> bool:
+    """Return whether no body keeps contact at a place, at any V**2 between two values and in either direction.
+
+    N is a polynomial of degree 2 in V, and lies between its least and its largest coefficient in Bernstein's basis.
+    """
+    low, high = np.sqrt(v2)
+    f, places = BoundFunctions(formulas.functions.addresses(), p), np.full(3, place)
+    try:
+        for direction in (1, -1):
+            first, middle, last = sided_force(
+                formulas, f, places, np.array([low, 0.5 * (low + high), high]) ** 2, direction
+            )
+            if not max(only_sign * first, only_sign * (2.0 * middle - 0.5 * (first + last)), only_sign * last) < 0.0:
+                return False
+    except SolutionError:
+        return False
+    return True
+
+
+@lru_cache(maxsize=16)
 def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
     """Return the table of a curve with formulas between two places; it is made once for the same parameters.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import (
     DOMAIN_PERIOD,
@@ -22,17 +22,9 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.quadrature.time_panels import joints_between
-from gqm_sym.runtime.quadrature.trapezoid import (
-    CIRCULATION,
-    LIBRATION,
-    time_by_panels,
-    time_by_trapezoid,
-    trapezoid_rates,
-    trapezoid_workspace,
-)
-from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on, extreme_on_table
-from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
+from gqm_sym.runtime.quadrature.trapezoid import trapezoid_rates, trapezoid_workspace
+from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on_table, load_at
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, SweptCurve
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -49,17 +41,25 @@ from gqm_sym.runtime.sweep.quantities import (
     TURNING_POINTS,
     UNDECIDED,
 )
-from gqm_sym.runtime.sweep.single.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself, until_loss
 from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS
-from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
-from gqm_sym.runtime.sweep.single.until import checked_arrival, find_for, is_later, part_until, stops_beside_turn
+from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
+from gqm_sym.runtime.sweep.single.until import (
+    checked_arrival,
+    find_for,
+    is_beside_turn,
+    is_later,
+    part_until,
+    stops_beside_turn,
+)
+from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, value_by_itself
+from gqm_sym.runtime.sweep.tables.last_places import stop_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
-from gqm_sym.runtime.sweep.tables.liftoff import KEPT, loss_of_contact
+from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP, Stop, loss_of_contact
 from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
 from gqm_sym.runtime.sweep.tables.passage import fill_half_v2_at_edges
 from gqm_sym.runtime.sweep.tables.rests import fill_at_rest, rests_on_level
-from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
+from gqm_sym.runtime.sweep.tables.times import travel_time
 
 # The quantities that only motions that repeat have.
 PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
@@ -131,108 +131,32 @@ class Buffers(NamedTuple):
 
 
 @Inner
-def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
-    """Return the half period of a libration, or the time of a circulation's lap; NaN if it is not accurate in
-    doubles.
-    """
-    kind, width = LIBRATION, orbit.high - orbit.low
-    a, b = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    if orbit.circulates:
-        kind, width = CIRCULATION, orbit.high + orbit.low  # one of them is zero
-        a, b = orbit.lam0, orbit.lam0 + width
-    joints = joints_between(curve.joints, curve.period, min(a, b), max(a, b))
-    value = nan
-    if joints.size == 0:
-        value = time_by_trapezoid(curve.fns, curve.p, kind, orbit.lam0, orbit.v2, a, b, width)
-    return value if value > 0.0 else time_by_panels(curve.fns, curve.p, kind, orbit.lam0, orbit.v2, a, b, joints)
-
-
-@Inlined
-def follows_formulas(curve):  # type: ignore[no-untyped-def]
-    """Return whether the formulas of a tabulated curve are as accurate as its table."""
-    return curve.joints.size == 0 and not curve.table.is_exact
-
-
-@Inner
-def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):  # type: ignore[no-untyped-def]
-    """Return the half period or lap time, the arrival or an extreme on a tabulated curve; NaN if it is not accurate."""
-    low, high, is_extreme = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, quantity in EXTREMES
-    stays, is_short = orbit.leaves == 0, passage.panels <= 2
-    by_itself = (stays and is_extreme) or (is_short and (stays or follows_formulas(curve)))
-    if by_itself and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
-        return nan  # computed without the table, they are more accurate than on it
-    if is_extreme:
-        value = nan
-        if orbit.leaves != 0 and follows_formulas(curve):  # one grid is faster, if it suffices
-            value = extreme_by_itself(curve, orbit, quantity, 1)
-        return value if value == value else extreme_on(curve, orbit, passage, KEPT, half_v2_at_edges, quantity)
-    return travel_time(curve, orbit, passage, half_v2_at_edges, target if quantity == ARRIVAL_TIME else nan)
-
-
-@Inner
-def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """Return the same as `value_from_table`, without a table."""
-    if quantity in (HALF_PERIOD, PERIOD):
-        return orbit_time(curve, orbit)
-    if quantity == ARRIVAL_TIME:
-        return arrival(curve, orbit, target, buffers.work, buffers.series)
-    inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
-    if inside.size:
-        return nan
-    return extreme_by_itself(curve, orbit, quantity, MAX_GRIDS)
-
-
-@Inner
-def value_in_parts(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """Return a time on an orbit on which V**2 almost vanishes; NaN if it is not accurate, or if this method does not
-    apply.
-    """
-    if curve.exact.work.size == 0 or quantity not in (HALF_PERIOD, PERIOD, ARRIVAL_TIME):
-        return nan
-    low, high = orbit.low, orbit.high
-    turns = turns_at(orbit)
-    if turns[0]:
-        low = refined_end(curve.fns, curve.p, orbit, low, buffers.work)
-    if turns[1]:
-        high = refined_end(curve.fns, curve.p, orbit, high, buffers.work)
-    better = Orbit(orbit.circulates, False, orbit.direction, orbit.lam0, orbit.v2, low, high, orbit.leaves)
-    return passing_time(curve, better, target if quantity == ARRIVAL_TIME else nan)
-
-
-@Inner
-def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # type: ignore[no-untyped-def]
-    """Return a quantity of an orbit by the first method that is accurate: on the table, without it, or in parts; NaN if
-    none is.
-    """
-    value = value_from_table(curve, orbit, passage, quantity, target, buffers.half_v2_at_edges) if tabulated else nan
-    if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
-        value = time_on_panel_of_both(curve, passage)
-    by_formulas = orbit.leaves == 0 or not passage.is_polished or follows_formulas(curve)
-    if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
-        value = value_by_itself(curve, orbit, quantity, target, buffers)
-    if value != value:
-        value = value_in_parts(curve, orbit, quantity, target, buffers)
-    return value
+def time_of_stop(curve, orbit, passage, tabulated, stop, buffers):  # type: ignore[no-untyped-def]
+    """Return the time at which a body comes to a `Stop`; NaN if it is not accurate."""
+    onwards = orbit.direction * (stop.place - orbit.lam0) > 0.0
+    if stop.turns > (0 if onwards else 1):
+        edges = buffers.half_v2_at_edges
+        return travel_time(curve, orbit, passage, edges, stop.place, True) if tabulated else nan
+    return best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, stop.place, buffers)
 
 
 @Inner
 def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a time or an extreme on an orbit; return the status.
 
-    ``asked`` is the quantity, the place for ARRIVAL_TIME, the place before which the body must arrive there (NaN if
-    there is none), and the largest value.
+    ``asked`` is the quantity, the place for ARRIVAL_TIME, and the `Stop` before which the body must arrive there.
     """
-    quantity, target, lost, limit = asked
+    quantity, target, stop = asked
     value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
     if value != value and quantity in EXTREMES and passage.panels > 0:
-        value = extreme_on_table(curve, orbit, passage, KEPT, (buffers.half_v2_at_edges, False), quantity)
+        value = extreme_on_table(curve, orbit, passage, NO_STOP, (buffers.half_v2_at_edges, False), quantity)
     if value == inf:
         return NEVER_THERE
-    if lost == lost:
-        until = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, lost, buffers)
+    if stop.place == stop.place:
+        until = time_of_stop(curve, orbit, passage, tabulated, stop, buffers)
         if not value <= until:
             return NEVER_THERE if value > until else UNDECIDED
-    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
+    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
     return ANSWERED if isfinite(value) else UNDECIDED
 
 
@@ -247,12 +171,19 @@ def passes_all(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignor
 
 
 @Inner
-def extreme_until(curve, orbit, passage, quantity, t_max, buffers):  # type: ignore[no-untyped-def]
+def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ignore[no-untyped-def]
     """Return an extreme up to the last time, before which a body does not pass its whole orbit; NaN if it is not
-    accurate, depends on the direction of motion, or the orbit is on a table.
+    accurate, or if it depends on the direction of motion and the orbit is not on a table.
+
+    ``asked`` is the quantity and the last time.
     """
-    if passage.panels > 0 or curve.directed:
-        return nan
+    (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
+    if tabulated and (passage.panels > FEW_PANELS or curve.directed):
+        decided, stop = stop_at(curve, orbit, passage, edges, t_max)
+        if decided and not (quantity == MIN_SPEED and is_beside_turn(orbit, stop.turns, stop.place - orbit.lam0)):
+            value = extreme_on_table(curve, orbit, passage, stop, (edges, tabulated), quantity)
+    if value == value or curve.directed:
+        return value
     decided, part = part_until(curve, orbit, t_max, buffers.work)
     decided = decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part))
     return value_by_itself(curve, part, quantity, nan, buffers) if decided else nan
@@ -260,32 +191,55 @@ def extreme_until(curve, orbit, passage, quantity, t_max, buffers):  # type: ign
 
 @Inner
 def loss_of(curve, orbit, passage, half_v2_at_edges, asked):  # type: ignore[no-untyped-def]
-    """Return whether it is decided if a body leaves the track, the place at which it does (NaN if it keeps contact),
-    the `Loss` on the table, and the orbit up to this place, which is found without a table.
+    """Return whether it is decided if a body leaves the track; the `Stop` at which it does, which has a place only
+    then; and the orbit up to this place, which is found without a table.
 
     ``asked`` is the side as in `GivenCurve`, and whether the orbit is on the table.
     """
     side, on_table = asked
     if side == 0:
-        return True, nan, KEPT, orbit
+        return True, NO_STOP, orbit
     if on_table:
-        loss = loss_of_contact(curve, orbit, passage, half_v2_at_edges, side)
-        return True, loss.place, loss, orbit
+        return True, loss_of_contact(curve, orbit, passage, half_v2_at_edges, side), orbit
     what, offset, has_turned = loss_by_itself(curve, orbit, side)
     if what == LEAVES:
-        return True, orbit.lam0 + offset, KEPT, until_loss(orbit, offset, has_turned)
-    return what != UNKNOWN, nan, KEPT, orbit
+        stop = Stop(orbit.lam0 + offset, -1, 0.0, 1 if has_turned else 0)
+        return True, stop, until_loss(orbit, offset, has_turned)
+    return what != UNKNOWN, NO_STOP, orbit
 
 
 @Inner
-def extreme_until_loss(curve, orbit, passage, found, edges, quantity):  # type: ignore[no-untyped-def]
-    """Return an extreme of speed or contact force up to a loss of contact, which is ``found`` on the table or without
-    it (`loss_of`).
+def fill_up_to_loss(curve, orbit, passage, tabulated, asked, buffers, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with the time of the end of a motion, or with an extreme up to a loss of contact; return the
+    status, which is SPAN_KNOWN for an extreme if the last time is over before.
+
+    ``asked`` is the quantity, the last time, and the `Stop` at which contact is lost with the orbit up to it.
     """
-    loss, left = found
-    if loss.panel >= 0:
-        return extreme_on_table(curve, orbit, passage, loss, edges, quantity)
-    return extreme_by_itself(curve, left, quantity, MAX_GRIDS)
+    quantity, t_max, stop, left = asked
+    if stop.place == stop.place:
+        time = (
+            time_of_stop(curve, orbit, passage, tabulated, stop, buffers)
+            if quantity == END_TIME or t_max < inf
+            else 0.0
+        )
+    elif orbit.leaves != 0:
+        time = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, nan, buffers)
+    else:
+        out[0] = t_max if t_max < inf else nan
+        return ANSWERED if t_max < inf else NOT_PERIODIC
+    if quantity == END_TIME:
+        out[0] = min(time, t_max)
+        return ANSWERED if isfinite(time) else UNDECIDED
+    if t_max < inf and not is_later(t_max, time):
+        return SPAN_KNOWN if is_later(time, t_max) else UNDECIDED
+    if stop.place == orbit.lam0 and stop.turns == 0:
+        out[0] = load_at(curve, orbit, quantity, 0.0, orbit.v2)
+    elif stop.panel >= 0:
+        edges = buffers.half_v2_at_edges, tabulated
+        out[0] = extreme_on_table(curve, orbit, passage, stop, edges, quantity)
+    else:
+        out[0] = extreme_by_itself(curve, left, quantity, MAX_GRIDS)
+    return ANSWERED if isfinite(out[0]) else UNDECIDED
 
 
 @Inner
@@ -294,45 +248,47 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
 
     ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side and the last time as in `GivenCurve`.
     """
-    (quantity, target, side, t_max), limit, half_v2_at_edges = asked, inf, buffers.half_v2_at_edges
-    lost = nan  # the place at which a body that is to arrive elsewhere leaves the track
+    (quantity, target, side, t_max), stop = asked, NO_STOP
     by_ends, needs_period = quantity in (TURNING_POINTS, SPANS), quantity in PERIODIC
     on_table = passage.panels > 0 and (not by_ends or side != 0)
-    tabulated = on_table and fill_half_v2_at_edges(curve, passage, half_v2_at_edges)
+    tabulated = on_table and fill_half_v2_at_edges(curve, passage, buffers.half_v2_at_edges)
     if orbit.leaves != 0 and needs_period:
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        decided, place, loss, left = loss_of(curve, orbit, passage, half_v2_at_edges, (side, on_table))
-        if not decided:
+        decided, stop, left = loss_of(curve, orbit, passage, buffers.half_v2_at_edges, (side, on_table))
+        is_lost = stop.place == stop.place
+        if not decided or (not is_lost and orbit.leaves != 0 and curve.ends == CONTACT_ENDS):
             return UNDECIDED
-        if place == place and needs_period:
+        if is_lost and needs_period:
             return NOT_PERIODIC
-        if quantity in EXTREMES and place == place:
-            out[0] = extreme_until_loss(curve, orbit, passage, (loss, left), (half_v2_at_edges, tabulated), quantity)
-            return ANSWERED if isfinite(out[0]) else UNDECIDED
-        if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
-            return UNDECIDED
-        if quantity == END_TIME and place != place and orbit.leaves == 0:
-            out[0] = t_max if t_max < inf else nan
-            return ANSWERED if t_max < inf else NOT_PERIODIC
-        if quantity == END_TIME:
-            quantity, target, limit = ARRIVAL_TIME, place, t_max
-        elif quantity == ARRIVAL_TIME:
-            lost = place
+        if quantity == END_TIME or (is_lost and quantity in EXTREMES):
+            until = quantity, t_max, stop, left
+            status = fill_up_to_loss(curve, orbit, passage, tabulated, until, buffers, out)
+            if status != SPAN_KNOWN:
+                return status
+    if by_ends or (orbit.circulates and quantity == HALF_PERIOD):
+        return fill_ends(orbit, quantity, out)
+    until_last = quantity in EXTREMES and t_max < inf
+    if until_last and stop.place != stop.place:
+        until_last = not passes_all(curve, orbit, passage, tabulated, t_max, buffers)
+    if until_last:
+        out[0] = extreme_until(curve, orbit, passage, tabulated, (quantity, t_max), buffers)
+        return ANSWERED if isfinite(out[0]) else UNDECIDED
+    return fill_value(curve, orbit, passage, tabulated, (quantity, target, stop), buffers, out)
+
+
+@Inner
+def fill_ends(orbit, quantity, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with both ends of an orbit; return the status, which is SPAN_KNOWN for SPANS."""
     if quantity == SPANS:
         out[0], out[1] = orbit.low, orbit.high
         if orbit.circulates:
             out[0], out[1] = orbit.low + orbit.high, nan
         return SPAN_KNOWN
-    if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
+    if orbit.circulates:
         return NOT_PERIODIC
-    if quantity == TURNING_POINTS:
-        out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-        return ANSWERED
-    if quantity in EXTREMES and t_max < inf and not passes_all(curve, orbit, passage, tabulated, t_max, buffers):
-        out[0] = extreme_until(curve, orbit, passage, quantity, t_max, buffers)
-        return ANSWERED if isfinite(out[0]) else UNDECIDED
-    return fill_value(curve, orbit, passage, tabulated, (quantity, target, lost, limit), buffers, out)
+    out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    return ANSWERED
 
 
 @entry(

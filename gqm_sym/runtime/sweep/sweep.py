@@ -30,7 +30,6 @@ from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.columns import as_doubles, broadcast_shape, check_launches, columns_of
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
 from gqm_sym.runtime.sweep.exact_orbits import answer_exactly
-from gqm_sym.runtime.sweep.extremes import EXTREMES
 from gqm_sym.runtime.sweep.groups import Group, groups_of, rests_on_corner
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
@@ -129,7 +128,7 @@ def sweep_with_columns(
     answers.status.fill(quantities.UNDECIDED)
     answers.route.fill(quantities.BATCH)
     asked, varies = asked_of_bodies(formulas, quantity, t_max, contact), any(array.ndim for array in given)
-    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
+    if asked is not None or has_compiled_route(formulas, found, t_max):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.liftoff_corners.size:
                 continue  # tables do not contain corners
@@ -175,17 +174,9 @@ def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:
     return found
 
 
-def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
-    """Return whether compiled loops can compute the quantity for most launches.
-
-    They cannot for motions that lose energy, and distinguish the sides of a space curve only if it has formulas and the
-    contact force does not depend on the direction of motion. Of extremes they do not compare the last time with that of
-    a loss of contact.
-    """
-    if not formulas.signed and ONLY_SIGN[contact] and (formulas.chart is not None or formulas.directed):
-        return False
-    compares = not (ONLY_SIGN[contact] and quantity.code in EXTREMES)
-    timely = t_max is None or (compares and float(as_doubles(t_max, "t_max")) > 0.0)
+def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
+    """Return whether compiled loops can compute the quantity for most launches; not for motions that lose energy."""
+    timely = t_max is None or float(as_doubles(t_max, "t_max")) > 0.0
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 

@@ -2,7 +2,13 @@
 
 import sympy as sp
 
-from gqm_sym.derivation.algebra.bottom_up import distinct_parts, from_the_leaves_up
+from gqm_sym.derivation.algebra.bottom_up import (
+    distinct_parts,
+    from_the_leaves_up,
+    parts_in_order,
+    symbols_of,
+    with_replaced,
+)
 
 X, Y = sp.symbols("x y", real=True)
 FORM = sp.sqrt(1 + sp.sin(X + sp.sin(Y)) ** 2) ** 3 / (X + sp.sin(Y)) + sp.sin(Y) * sp.cos(X * sp.sin(Y))
@@ -25,3 +31,19 @@ def test_from_the_leaves_up() -> None:
     assert first == FORM.replace(lambda part: isinstance(part, sp.sin), lambda part: 2 * sp.cos(part.args[0]))
     assert second == 2 * sp.cos(Y)
     assert len(set(seen)) == len(seen)
+
+
+def test_parts_that_occur_often_are_visited_once() -> None:
+    """A form of 2**40 parts, of which only forty are different, is searched and rewritten at once."""
+    shared = X
+    for _ in range(40):
+        shared = sp.Function("f")(shared, shared)
+    assert len(list(parts_in_order([shared]))) == 41
+    assert symbols_of([shared]) == {X}
+    assert symbols_of(with_replaced([shared], {X: Y})) == {Y}
+
+
+def test_with_replaced() -> None:
+    """The result is that of ``xreplace``, which leaves what it has put in as it is."""
+    known = {sp.sin(Y): X, X: Y, sp.sin(X + sp.sin(Y)): sp.S.One}
+    assert with_replaced([FORM, X], known) == (FORM.xreplace(known), Y)

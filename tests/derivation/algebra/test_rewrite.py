@@ -9,7 +9,7 @@ from gqm_sym.derivation.algebra.algebra import Algebra
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.generators import OverBudget
 from gqm_sym.derivation.algebra.normal_form import spell
-from gqm_sym.derivation.algebra.rewrite import product, spell_product, tidy, without_poles
+from gqm_sym.derivation.algebra.rewrite import magnitude, product, spell_product, tidy, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.geometry.geometry import geometry
 from gqm_sym.errors import DeclarationError
@@ -135,6 +135,13 @@ def test_poles_that_cancel_are_multiplied_out_and_nothing_else():
     sine = sp.sin(t)
     assert without_poles((b / sine - a) * sine) == b - a * sine
     assert without_poles((a - b) * (a + b)) == (a - b) * (a + b)
+
+
+def test_the_magnitude_of_a_product_with_a_root():
+    """A root is not negative, also where SymPy does not know that it is real; it would write a complex conjugate."""
+    root = sp.sqrt(sp.Symbol("unknown") - 1)
+    place = sp.Symbol("place", real=True)
+    assert magnitude(-2 * place / root) == 2 * sp.Abs(place) / root
 
 
 def test_tidy_takes_common_factors_out():

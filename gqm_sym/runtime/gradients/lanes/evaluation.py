@@ -33,21 +33,29 @@ MAX_VARIANCE = 4.7
 # may be larger.
 MAX_CONDITION = 4.0
 
-# The largest relative difference of two numbers whose arithmetic-geometric mean is their mean, as double precision
-# needs it.
-MAX_DIFFERENCE = 3e-9
-
 # The nodes at which the variances of rounding errors are found. A program of them with more than so many operations is
 # carried out at every other one only, where it may find variances up to a half too large.
 NOISE_NODES, MAX_NOISE_OPERATIONS = tuple(MIN_INTERVALS * k // 4 for k in range(5)), 1024
 
-# The states of an orbit.
+# The states of an orbit. To the last one the level is added from which double-double arithmetic needs only the nodes,
+# 1 for twice MIN_INTERVALS and so on; 0 if it is not known.
 OPEN, ANSWERED, LEFT = range(3)
+
+# The error of the rule with n intervals is c*r**n, and c is at least 1e-5 (`quadrature.trapezoid`). So the square of
+# the change by the last doubling, over c, is a bound on the error, which is below 1e-20 up to the first of these
+# changes; up to the second one it is after another doubling. Changes decrease by a factor at least, unless they are as
+# small as this, where roundings contribute to them.
+MAX_CHANGE, MAX_CHANGE_EARLIER = 3e-13, 1.7e-9
+MAX_SHRINK, MIN_BEFORE = 1e-3, 1e-10
+
+# The change from which on such changes are waited for, and the number of intervals up to which they are.
+MAX_NEAR, MAX_WAIT = 1e-3, 64
 
 # The rows of numbers for the orbits of a batch: the state; the changes by the last level, or -1 once the rule has
 # converged, and by this one; the number of nodes that rounding errors need; the smallest and the largest regular factor
-# of V**2; whether the orbit is a mirror image of itself; the weight of a node; whether this level has answered it.
-STATE, BEFORE, CHANGE, SPREAD, SMALLEST, LARGEST, MIRRORED, WEIGHT, NEW, ROWS = range(10)
+# of V**2; whether the orbit is a mirror image of itself; the weight of a node; whether this level has answered it; the
+# number of intervals that suffices in double-double arithmetic, 0 if it is not known.
+STATE, BEFORE, CHANGE, SPREAD, SMALLEST, LARGEST, MIRRORED, WEIGHT, NEW, ENOUGH, ROWS = range(11)
 
 # The share of orbits of a batch up to which those that are open are left to another call.
 MAX_OPEN = 0.375
@@ -235,9 +243,23 @@ def compare_levels(nodes, lanes, sums, means, variances, state):  # type: ignore
             bound = MAX_CONDITION * fabs(mean)
             bound = choose(size < bound, size, bound)
             step, ratio = fabs(mean - before[i]) / size, variance[i] / (MAX_VARIANCE * bound * bound)
-            change[i] = choose((size == 0.0) | (step <= change[i]), change[i], step)
+            # A change that is NaN remains.
+            change[i] = choose((size == 0.0) | (step <= change[i]) | (change[i] != change[i]), change[i], step)
             spread[i] = choose((size == 0.0) | (ratio <= spread[i]), spread[i], ratio)
             before[i] = mean
+
+
+@Inner
+def fill_enough(nodes, lanes, state):  # type: ignore[no-untyped-def]
+    """Fill how many intervals suffice in double-double arithmetic, once it is known.
+
+    Other orbits of the batch make no difference to it, so that it has to be known by the same level in any batch.
+    """
+    before, change, enough = state[BEFORE], state[CHANGE], state[ENOUGH]
+    for i in range(lanes):
+        is_regular = (before[i] < inf) & ((change[i] <= MAX_SHRINK * before[i]) | (fabs(before[i]) <= MIN_BEFORE))
+        number = choose(change[i] <= MAX_CHANGE, 1.0 * nodes, choose(change[i] <= MAX_CHANGE_EARLIER, 2.0 * nodes, 0.0))
+        enough[i] = choose(is_regular & (enough[i] == 0.0), number, enough[i])
 
 
 @Inner
@@ -254,7 +276,7 @@ def judge(rule, lanes, sums, means, state, found):  # type: ignore[no-untyped-de
     """
     nodes, limit, most = rule
     kinds, before, change, spread = state[STATE], state[BEFORE], state[CHANGE], state[SPREAD]
-    smallest, largest, is_new = state[SMALLEST], state[LARGEST], state[NEW]
+    smallest, largest, is_new, enough = state[SMALLEST], state[LARGEST], state[NEW], state[ENOUGH]
     some, soon = 0, 0
     for i in range(lanes):
         kind, is_clear = kinds[i], smallest[i] >= MIN_FACTOR_RATIO * largest[i]
@@ -262,11 +284,13 @@ def judge(rule, lanes, sums, means, state, found):  # type: ignore[no-untyped-de
         is_answered = (kind == OPEN) & has_settled & (spread[i] <= nodes) & is_clear
         # Means have some digits from MIN_HOPE nodes on, by which the number of nodes is known that would suffice.
         has_hope = (nodes < MIN_HOPE) | ((nodes < most) & (spread[i] <= 2.0 * most) & (smallest[i] > 0.0))
+        is_near = (enough[i] == 0.0) & (change[i] <= MAX_NEAR) & (nodes < MAX_WAIT)
+        has_hope = has_hope | is_near
         kind = choose(is_answered, 1.0 * ANSWERED, choose(has_hope | (kind != OPEN), kind, 1.0 * LEFT))
         kinds[i], is_new[i] = kind, choose(is_answered, 1.0, 0.0)
         before[i] = choose(has_settled, -1.0, change[i])
         some += kind == OPEN
-        soon += (kind == OPEN) & ((nodes < MIN_HOPE) | (spread[i] <= limit))
+        soon += (kind == OPEN) & ((nodes < MIN_HOPE) | (spread[i] <= limit) | (is_near & (limit == most)))
     for k in range(found.shape[0]):
         mean, lost, values = means[k], sums[1, k], found[k]
         for i in range(lanes):
@@ -296,6 +320,7 @@ def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type:
     fill_variances(program, is_mirrored, work, lanes, state, variances)
     sums[:, :, :], means[:, :] = 0.0, 0.0
     state[STATE, :], state[BEFORE, :], state[SMALLEST, :], state[LARGEST, :] = OPEN, inf, inf, 0.0
+    state[ENOUGH, :] = 0.0
     first, nodes = 0, MIN_INTERVALS
     while True:
         for node in range(first, nodes + 1):
@@ -308,6 +333,7 @@ def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type:
             if first == 0 and node % 2 == 0:
                 begin_means(program, work, lanes, state, means)
         compare_levels(nodes, lanes, sums, means, variances, state)
+        fill_enough(nodes, lanes, state)
         some, soon = judge((nodes, limits[0], limits[1]), lanes, sums, means, state, found)
         if some == 0 or (some <= MAX_OPEN * lanes and (nodes >= limits[0] or soon == 0)):
             return
@@ -340,7 +366,7 @@ def fill_lane_gradients(turn, turn_work, program, work, limits, launches, mirror
     mirrored : (m,) array
         Whether each orbit is a mirror image of itself.
     answers : ((m, k) array, (m,) array)
-        The derivatives, and the states: OPEN where more intervals are needed, and LEFT where digits are lost.
+        The derivatives, and the states: OPEN where more intervals are needed, and from LEFT on where digits are lost.
     """
     found, states = answers
     count, inputs, state = found.shape[1], limits[0], np.empty((ROWS, BLOCK))
@@ -358,46 +384,11 @@ def fill_lane_gradients(turn, turn_work, program, work, limits, launches, mirror
         fill_batch(program, is_mirrored, limits[1:], work, lanes, state, rows)
         values = rows[3]
         for i in range(size):
-            states[start + i] = int(state[STATE, i])
+            kind, intervals = int(state[STATE, i]), MIN_INTERVALS
+            if kind == LEFT or (kind == OPEN and limits[1] == limits[2]):
+                kind = LEFT
+                while intervals < state[ENOUGH, i]:
+                    kind, intervals = kind + 1, 2 * intervals
+            states[start + i] = kind
             for k in range(count):
                 found[start + i, k] = values[k, i]
-
-
-@entry(
-    types.void(
-        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, INTEGER),
-        *(MATRIX, types.Tuple((MATRIX, types.int8[::1]))),
-    ),
-    nogil=True,
-)
-def fill_mean_gradients(turn, turn_work, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
-    """Fill the derivatives of half periods that are pi over an arithmetic-geometric mean.
-
-    The arguments are as for `fill_lane_gradients`, except that the orbit's program is `programs.mean_program`, and that
-    ``inputs`` is the number of columns of the launches that are its inputs.
-    """
-    found, states = answers
-    coordinates, outputs = program[4], program[5]
-    first = outputs.size - found.shape[1]
-    for start in range(0, launches.shape[1], BLOCK):
-        size = min(BLOCK, launches.shape[1] - start)
-        some, lanes = (launches, start, size), -(-size // WIDTH) * WIDTH
-        fill_inputs(work, inputs, some, lanes)
-        fill_turns(turn, turn_work, some, lanes, inputs, work)
-        call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
-        one = rows_of(work, coordinates[0])[0]
-        one[:lanes] = 1.0
-        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, lanes)
-        known = rows_of(work, outputs[0])[0]
-        for i in range(lanes):
-            known[i] = choose(fabs(known[i]) <= MAX_DIFFERENCE, 1.0, 0.0)
-        for j in range(1, first):
-            loss = rows_of(work, outputs[j])[0]
-            for i in range(lanes):
-                known[i] = choose(loss[i] <= 0.0, known[i], 0.0)
-        for j in range(found.shape[1]):
-            values = rows_of(work, outputs[first + j])[0]
-            for i in range(size):
-                found[start + i, j] = values[i]
-        for i in range(size):
-            states[start + i] = ANSWERED if known[i] == 1.0 else OPEN

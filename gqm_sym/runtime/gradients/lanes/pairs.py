@@ -1,5 +1,5 @@
 """Compiled code for gradients of many half periods, laps or turning points in double-double arithmetic, with one orbit
-in each lane.
+in each lane; and of half periods that are arithmetic-geometric means, of which only small shares are doubles.
 """
 
 from math import fabs, inf, nan
@@ -23,16 +23,24 @@ from gqm_sym.runtime.gradients.evaluation import (
     rounding_of,
 )
 from gqm_sym.runtime.gradients.lanes.evaluation import (
+    ANSWERED,
+    LANE_PROGRAM,
+    OPEN,
     WIDTH,
     fill_column,
     fill_inputs,
     fill_place,
+    fill_turns,
     rows_of,
     take_step,
 )
 
 # The number of Newton steps to the turning points, starting from doubles.
 NEWTON_STEPS = 2
+
+# The largest relative difference of two numbers whose arithmetic-geometric mean is their mean, as double precision
+# needs it.
+MAX_DIFFERENCE = 3e-9
 
 # The rows of the state of an orbit: the change by the last level, and whether the rule has converged (-1 if it never
 # will, because digits are lost).
@@ -106,11 +114,11 @@ def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[n
 
 
 @Inner
-def judge_means(level, lanes, sums, means, states, most):  # type: ignore[no-untyped-def]
+def judge_means(level, is_last, lanes, sums, means, states, most):  # type: ignore[no-untyped-def]
     """Take the means of a level for orbits for which the rule has not converged; return whether there is none left.
 
     The criteria are those of `evaluation.fill_means_of`. The next change is also at most the share ``most`` of each
-    mean.
+    mean. Of a level that is the last one it is known that the rule has converged.
     """
     is_done = True
     for i in range(lanes):
@@ -133,7 +141,7 @@ def judge_means(level, lanes, sums, means, states, most):  # type: ignore[no-unt
         has_converged = has_converged and not change * change * condition > most * before
         if not rounding <= MAX_ROUNDING:
             states[DONE, i] = -1.0
-        elif level > 1 and has_converged:
+        elif is_last or (level > 1 and has_converged):
             states[DONE, i] = 1.0
         states[CHANGE, i] = change if level > 1 else 1.0
         is_done = is_done and states[DONE, i] != 0.0
@@ -143,7 +151,7 @@ def judge_means(level, lanes, sums, means, states, most):  # type: ignore[no-unt
 @entry(
     types.void(
         *(types.UniTuple(PROGRAM, 2), types.UniTuple(VECTOR, 2), PROGRAM, VECTOR),
-        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX, types.float64)),),
+        *(types.Tuple((INTEGER, types.UniTuple(types.float64, 2), MATRIX, types.float64, INTEGER)),),
         *(MATRIX, types.boolean[::1], MATRIX),
     ),
     nogil=True,
@@ -159,10 +167,11 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         (`programs.end_programs`), with their work spaces; without results where the program needs no turning points.
     program, work
         The program of an orbit, whose first result is dt/dphi, and its work space.
-    rule : (int, (float, float), (4, k) array, float)
+    rule : (int, (float, float), (4, k) array, float, int)
         The number of columns of the launches that are inputs of the program; the range of the phase, as two doubles;
-        the table of shares (`nodes.trapezoidal_nodes`); and the largest error of a derivative as a share of it, in
-        addition to the share of the mean of absolute values.
+        the table of shares (`nodes.trapezoidal_nodes`); the largest error of a derivative as a share of it, in addition
+        to the share of the mean of absolute values; and the number of nodes with which the rule has converged, or 0 if
+        it is not known.
     launches : (n, m) array
         The inputs of the program, and then turning points to the accuracy of doubles if the program needs them.
     mirrored : (m,) array
@@ -170,7 +179,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
     found : (m, k) array
         Filled with the derivatives.
     """
-    count, (inputs, phase, nodes, most), even = found.shape[1], rule, np.zeros(BLOCK)
+    count, (inputs, phase, nodes, most, enough), even = found.shape[1], rule, np.zeros(BLOCK)
     # The time itself is never zero, so that its rounding shows where all digits of derivatives are lost.
     sums, means, states = np.empty((1 + count, MEAN, BLOCK)), np.empty((1 + count, 3, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[1], BLOCK):
@@ -184,8 +193,10 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
         call_interpreter(program[0], program[1], 0, program[2], work, lanes)
         means[:, :, :], states[CHANGE, :], states[DONE, :] = 0.0, inf, 0.0
         for level in range(1, len(LEVELS) - 1):
+            if LEVELS[level] < enough:
+                continue
             add_nodes(program, work, nodes, LEVELS[level], even, lanes, sums)
-            if judge_means(level, lanes, sums, means, states, most):
+            if judge_means(level, enough > 0, lanes, sums, means, states, most):
                 break
         for i in range(size):
             for j in range(count):
@@ -217,3 +228,43 @@ def fill_turn_gradients(ends, works, launches, found):  # type: ignore[no-untype
             values = rows_of(target, (first + 2 + j) * ROW)[0]
             for i in range(size):
                 found[start + i, j] = values[i]
+
+
+@entry(
+    types.void(
+        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, INTEGER),
+        *(MATRIX, types.Tuple((MATRIX, types.int8[::1]))),
+    ),
+    nogil=True,
+)
+def fill_mean_gradients(turn, turn_work, program, work, inputs, launches, answers):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of half periods that are pi over an arithmetic-geometric mean.
+
+    The arguments are as for `evaluation.fill_lane_gradients`, except that the orbit's program is
+    `programs.mean_program`, and that ``inputs`` is the number of columns of the launches that are its inputs.
+    """
+    found, states = answers
+    coordinates, outputs = program[4], program[5]
+    first = outputs.size - found.shape[1]
+    for start in range(0, launches.shape[1], BLOCK):
+        size = min(BLOCK, launches.shape[1] - start)
+        some, lanes = (launches, start, size), -(-size // WIDTH) * WIDTH
+        fill_inputs(work, inputs, some, lanes)
+        fill_turns(turn, turn_work, some, lanes, inputs, work)
+        call_interpreter(program[0][0], program[1], 0, program[1].shape[0], work, lanes)
+        one = rows_of(work, coordinates[0])[0]
+        one[:lanes] = 1.0
+        call_interpreter(program[0][1], program[2], 0, program[2].shape[0], work, lanes)
+        known = rows_of(work, outputs[0])[0]
+        for i in range(lanes):
+            known[i] = choose(fabs(known[i]) <= MAX_DIFFERENCE, 1.0, 0.0)
+        for j in range(1, first):
+            loss = rows_of(work, outputs[j])[0]
+            for i in range(lanes):
+                known[i] = choose(loss[i] <= 0.0, known[i], 0.0)
+        for j in range(found.shape[1]):
+            values = rows_of(work, outputs[first + j])[0]
+            for i in range(size):
+                found[start + i, j] = values[i]
+        for i in range(size):
+            states[start + i] = ANSWERED if known[i] == 1.0 else OPEN

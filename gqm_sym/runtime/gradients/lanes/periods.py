@@ -27,13 +27,12 @@ from gqm_sym.runtime.gradients.lanes.evaluation import (
     OPEN,
     PASSES,
     fill_lane_gradients,
-    fill_mean_gradients,
 )
 from gqm_sym.runtime.gradients.lanes.exact_differences import exact_swing_program
 from gqm_sym.runtime.gradients.lanes.launches import ABOUT_ONE_AXIS, AROUND_AXIS, EVEN, FROM_AXIS, Launches
 from gqm_sym.runtime.gradients.lanes.machine_code import CodedProgram, coded
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder
-from gqm_sym.runtime.gradients.lanes.pairs import fill_pair_gradients, fill_turn_gradients
+from gqm_sym.runtime.gradients.lanes.pairs import fill_mean_gradients, fill_pair_gradients, fill_turn_gradients
 from gqm_sym.runtime.gradients.lanes.programs import (
     Orbits,
     axis_program,
@@ -48,7 +47,7 @@ from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
 from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE, slow_gradients
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
-from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, MIN_INTERVALS
 
 # The number of launches from which on a thread is worth starting. Machine code for a program takes up to 0.2 s, and is
 # worth making for so many launches of one call, or of all calls so far.
@@ -211,6 +210,7 @@ def fill_by_stages(
         The derivatives of all launches.
     """
     is_open, first, stop = serves.copy(), columns[0], columns[-1] + 1
+    enough = np.zeros(serves.size, dtype=np.int64)
     which: Any = slice(first, stop) if stop - first == len(columns) else list(columns)
     while is_open.any():
         stage = next(programs, None)
@@ -219,18 +219,25 @@ def fill_by_stages(
         chosen = np.flatnonzero(stage.serves & is_open)
         program = stage.make(*stage.given) if chosen.size else None
         has_levels = isinstance(program, LaneProgram) and stage.make is not mean_program
-        for most in () if program is None else PASSES if has_levels else (0,):
-            if not chosen.size:
+        if stage.make is exact_swing_program:
+            enough[:] = 0  # its errors are shares of the derivatives themselves
+        attempts = () if program is None else PASSES if has_levels else np.unique(enough[chosen]).tolist()
+        for most in attempts:
+            part = chosen if has_levels else chosen[enough[chosen] == most]
+            if not part.size:
                 break
-            out, states = carried_out(stage, program, len(columns), (chosen, launches.kinds[chosen] >= EVEN), most)
+            out, states = carried_out(stage, program, len(columns), (part, launches.kinds[part] >= EVEN), most)
             left = np.flatnonzero(states != ANSWERED)
-            out[left], is_open[chosen] = nan, False
-            if chosen.size == len(found):
+            out[left], is_open[part] = nan, False
+            if part.size == len(found):
                 found[:, which] = out
             else:
-                found[chosen if isinstance(which, slice) else chosen[:, np.newaxis], which] = out
-            is_open[chosen[left]] = True
-            chosen = chosen[left[states[left] == OPEN]]
+                found[part if isinstance(which, slice) else part[:, np.newaxis], which] = out
+            is_open[part[left]] = True
+            if has_levels:
+                levels = np.maximum(states[left].astype(np.int64) - LEFT, 0)
+                enough[part[left]] = np.where(levels > 0, MIN_INTERVALS << levels, 0)
+                chosen = part[left[states[left] == OPEN]]
 
 
 def stages(formulas: Formulas, launches: Launches, group: Group, plan: Plan) -> Iterator[Stage]:
@@ -333,7 +340,8 @@ def carried_out(
     which : pair of arrays
         The launches, and whether each orbit is a mirror image of itself.
     most : int
-        The largest number of intervals of the trapezoidal rule, for a program in double precision.
+        For a program in double precision, the largest number of intervals of the trapezoidal rule; for another one, the
+        number with which the rule has converged, or 0 if it is not known.
     """
     (chosen, mirrored), (source, moved) = which, moves_of(stage)
     launched = stage.launched if chosen.size == stage.launched.shape[1] else stage.launched[:, chosen]
@@ -356,7 +364,7 @@ def carried_out(
             fill_lane_gradients(ends[0], spaces[0], addressed, own, limits, some, mirrored[part], answers)
         else:
             max_error = MAX_SHARE if stage.make is exact_swing_program else inf
-            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind), max_error
+            rule = stage.inputs, PHASES[stage.kind], trapezoidal_nodes(stage.kind), max_error, most
             given = tuple(ends), tuple(spaces), addressed, own
             fill_pair_gradients(*given, rule, some, mirrored[part], out[part])
 

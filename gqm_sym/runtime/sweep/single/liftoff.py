@@ -153,7 +153,8 @@ def loss_by_itself(curve, orbit, side):  # type: ignore[no-untyped-def]
     side : int
         1 if the track can only push along the normal, -1 if only against it.
     """
-    if joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high).size:
+    joints = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
+    if joints.size or curve.directed:
         return Loss(UNKNOWN, nan, False)
     ahead, behind = (orbit.high, orbit.low) if orbit.direction > 0 else (orbit.low, orbit.high)
     loss = loss_on_way(curve, orbit, ahead, side) if ahead != 0.0 else Loss(KEEPS, nan, False)

@@ -184,8 +184,14 @@ def stops_beside_turn(orbit, part):  # type: ignore[no-untyped-def]
     """Return whether the part of an orbit that a body passes ends so near to the turning point ahead of it that the
     speed there has lost digits.
     """
-    if orbit.circulates or orbit.leaves == orbit.direction or part.leaves != orbit.direction:
+    return is_beside_turn(orbit, 0 if part.leaves == orbit.direction else 1, part.high + part.low)
+
+
+@Inlined
+def is_beside_turn(orbit, turns, offset):  # type: ignore[no-untyped-def]
+    """Return whether an offset to which a body moves after so many turns is that near to the turning point ahead."""
+    if turns != 0 or orbit.circulates or orbit.leaves == orbit.direction:
         return False
     ahead = orbit.high if orbit.direction > 0 else -orbit.low
-    passed = part.high if orbit.direction > 0 else -part.low
+    passed = orbit.direction * offset
     return passed < ahead and ahead - passed < NEAR_TURN * ahead

@@ -32,6 +32,7 @@ from gqm_sym.runtime.sweep.tables.layout import (
 )
 from gqm_sym.runtime.sweep.tables.liftoff import launch_on
 from gqm_sym.runtime.sweep.tables.panel_forces import AT_REST, FAR, LOAD, MOVING, NEAR, TURNING, VECTORS, prepare
+from gqm_sym.runtime.sweep.tables.passage import BOTH, LOWER, UPPER
 from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
 
 # Half the widths of the first and of the last parabola on a panel of a tabulated curve, whose width is 2, and the
@@ -69,30 +70,51 @@ class Stretch(NamedTuple):
 
 
 @Inner
-def stretch_of(curve, orbit, passage, loss):  # type: ignore[no-untyped-def]
-    """Return the `Stretch` of a body up to a loss of contact, which may be `liftoff.KEPT`."""
-    low, high, begin, lost = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0), loss.panel >= 0
-    passes_once = orbit.circulates or orbit.leaves == orbit.direction
-    passes_once = not loss.has_turned if lost else passes_once
-    upwards = orbit.direction > 0
-    if passes_once and (lost or not orbit.circulates):
-        begin = launch_on(curve, orbit, passage)
-        low, high = (begin, high) if upwards else (low, begin)
-    if lost:
-        end, onwards = (loss.panel, loss.x), upwards != loss.has_turned
-        if loss.x == (-1.0 if onwards else 1.0) and begin != end:  # the body leaves before the load beyond a joint acts
-            end = (loss.panel - 1, 1.0) if onwards else (loss.panel + 1, -1.0)
-        low, high = (low, end) if onwards else (end, high)
-    return Stretch(low, high, begin, orbit.v2 == 0.0 or not passes_once, orbit.circulates and not lost)
+def end_of(stop, onwards, begin):  # type: ignore[no-untyped-def]
+    """Return the panel of a `Stop` and the place there; the body stops before the load beyond a joint acts."""
+    end = stop.panel, stop.x
+    if stop.x == (-1.0 if onwards else 1.0) and begin != end:
+        return (stop.panel - 1, 1.0) if onwards else (stop.panel + 1, -1.0)
+    return end
 
 
 @Inner
-def stretch_to_turn(curve, orbit, passage):  # type: ignore[no-untyped-def]
+def stretch_of(curve, orbit, passage, stop):  # type: ignore[no-untyped-def]
+    """Return the `Stretch` of a body up to a `Stop`."""
+    low, high, begin, stops = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0), stop.panel >= 0
+    passes_once = orbit.circulates or orbit.leaves == orbit.direction
+    passes_once = stop.turns == 0 if stops else passes_once
+    upwards = orbit.direction > 0
+    if passes_once and (stops or not orbit.circulates):
+        begin = launch_on(curve, orbit, passage)
+        low, high = (begin, high) if upwards else (low, begin)
+    if stops and stop.turns < 2:
+        onwards = upwards == (stop.turns == 0)
+        end = end_of(stop, onwards, begin)
+        if stop.turns == 1 and upwards == (stop.place > orbit.lam0):  # it has not come back to its launch
+            end = launch_on(curve, orbit, passage)
+        low, high = (low, end) if onwards else (end, high)
+    return Stretch(low, high, begin, orbit.v2 == 0.0 or not passes_once, orbit.circulates and not stops)
+
+
+@Inner
+def stretch_before_turn(curve, orbit, passage):  # type: ignore[no-untyped-def]
     """Return the `Stretch` of a body from its launch to the turning point ahead of it."""
     launch = launch_on(curve, orbit, passage)
     low, high = (0, passage.low_x), (passage.panels - 1, passage.high_x)
     low, high = (launch, high) if orbit.direction > 0 else (low, launch)
     return Stretch(low, high, launch, True, False)
+
+
+@Inner
+def stretch_after_turn(orbit, passage, stop):  # type: ignore[no-untyped-def]
+    """Return the `Stretch` of a body from its last turning point to a `Stop`, or to the end of its orbit."""
+    low, high, none = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0)
+    if stop.panel >= 0:
+        onwards = (orbit.direction > 0) == (stop.turns != 1)
+        end = end_of(stop, onwards, none)
+        low, high = (low, end) if onwards else (end, high)
+    return Stretch(low, high, none, True, False)
 
 
 @Inlined
@@ -216,24 +238,30 @@ def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def place_at(u, ends, is_angle):  # type: ignore[no-untyped-def]
+def place_at(u, ends, turns):  # type: ignore[no-untyped-def]
     """Return the place on a panel for the variable of `refined`."""
-    return ends[0] + (ends[1] - ends[0]) * sin(0.5 * pi * u) ** 2 if is_angle else u
+    (low, high), (at_low, at_high) = ends, turns
+    if not (at_low or at_high):
+        return u
+    share = sin(0.5 * pi * u) ** 2 if at_low and at_high else u * u
+    return low + (high - low) * share if at_low else high - (high - low) * share
 
 
 @Inner
-def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[no-untyped-def]
+def refined(curve, k, level, sought, sign, x, ends, turns):  # type: ignore[no-untyped-def]
     """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by parabolas.
 
-    If one of the ends is a turning point next to which the force changes with V, the variable ``is_angle``, the phase
-    angle between the ends as a share of pi, in which V is smooth.
+    If one of the ends is a turning point next to which the force changes with V, which ``turns`` tells of both, the
+    variable is one in which V is smooth: the root of the distance from it, or the phase angle between two turning
+    points, as shares.
     """
     prepare(curve, k, NEAR)
     low, high = ends
     u, step = x, FIRST_STEP
-    if is_angle:
+    if turns[0] or turns[1]:
         share = min(max((x - low) / (high - low), 0.0), 1.0) if high > low else 0.0
-        u, low, high, step = 2.0 / pi * asin(sqrt(share)), 0.0, 1.0, 0.5 * FIRST_STEP
+        root = sqrt(share if turns[0] else 1.0 - share)
+        u, low, high, step = 2.0 / pi * asin(root) if turns[0] and turns[1] else root, 0.0, 1.0, 0.5 * FIRST_STEP
     best = load_on(curve, k, level, sought, x)
     last = LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED and sign < 0.0 else LAST_STEP
     for _ in range(MAX_PARABOLAS):
@@ -241,8 +269,7 @@ def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[n
         left, right = max(u - step, low), min(u + step, high)
         if not left < u < right:
             u = 0.5 * (left + right)
-        x0, x1 = place_at(left, ends, is_angle), place_at(u, ends, is_angle)
-        x2 = place_at(right, ends, is_angle)
+        x0, x1, x2 = place_at(left, ends, turns), place_at(u, ends, turns), place_at(right, ends, turns)
         f0, f1, f2 = loads_on(curve, k, level, sought, x0, x1, x2)
         best = sign * max(sign * best, sign * f0, sign * f1, sign * f2)
         before, after = (u - left) * (f1 - f2), (u - right) * (f1 - f0)
@@ -252,7 +279,7 @@ def refined(curve, k, level, sought, sign, x, ends, is_angle):  # type: ignore[n
         if step <= last:
             break
         step = min(step, max(step / STEP_RATIO, fabs(u - before_step)))
-    return sign * max(sign * best, sign * load_on(curve, k, level, sought, place_at(u, ends, is_angle)))
+    return sign * max(sign * best, sign * load_on(curve, k, level, sought, place_at(u, ends, turns)))
 
 
 @Inner
@@ -289,7 +316,7 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
     At a joint the values on both sides are compared.
     """
     count, last, force = curve.levels.size, passage.panels - 1, sought[0] != V2
-    is_directed, low, high = sought[1] != 0 and not orbit.circulates, stretch.low, stretch.high
+    is_directed, low, high = sought[1] != 0, stretch.low, stretch.high
     if stretch.turns and not (force or sign > 0.0):
         return 0.0
     best, best_j, best_x = best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign)
@@ -307,8 +334,10 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
         if shared:
             ends = low[1] if j == low[0] else -1.0, high[1] if j == high[0] else 1.0
             k = (passage.first + j) % count
-            level, is_angle = level_on(passage, half_v2_at_edges, j), is_directed and j in (low[0], high[0])
-            best = max(best, sign * refined(curve, k, level, sought, sign, x, ends, is_angle))
+            level, turns = level_on(passage, half_v2_at_edges, j), passage.turns
+            at_low = is_directed and turns in (BOTH, LOWER) and (j, ends[0]) == (0, passage.low_x)
+            at_high = is_directed and turns in (BOTH, UPPER) and (j, ends[1]) == (last, passage.high_x)
+            best = max(best, sign * refined(curve, k, level, sought, sign, x, ends, (at_low, at_high)))
     value = sign * best
     if sought[0] == V2:
         return sqrt(max(value, 0.0))

@@ -22,12 +22,16 @@ NODES, FEW_NODES, SAMPLES = 16, 8, 10
 ELLIPSE, FEW_ELLIPSE = 3.2, 10.0
 
 # The data of the path on a panel: weights in m at the Gauss points of both rules; coefficients of ds/dlam and kappa in
-# powers of x in [-1, 1]; kappa at the samples; whether ds may vanish; and half the panel's length in lam.
+# powers of x in [-1, 1]; kappa at the samples; whether ds may vanish; and half the panel's length in lam. Then
+# coefficients and samples of what is added to N/m for each unit of ds/dt. Of a space curve on which a body may lose
+# contact, kappa and the load belong to the component of N along the upward direction of riders.
 WEIGHTS, FEW_WEIGHTS, DS_TERMS, KAPPA_TERMS = 0, NODES, NODES + FEW_NODES, 2 * NODES + FEW_NODES
 KAPPA_SAMPLES = KAPPA_TERMS + NODES
 MAY_STOP = KAPPA_SAMPLES + SAMPLES
 HALF = MAY_STOP + 1
-PATH_ROW = HALF + 1
+CORIOLIS_TERMS = HALF + 1
+CORIOLIS_SAMPLES = CORIOLIS_TERMS + NODES
+PATH_ROW = CORIOLIS_SAMPLES + SAMPLES
 # The data of a part of the potential on a panel. These numbers suffice far from turning points: the potential at the
 # left edge relative to the reference, as two doubles; its increase from edge to edge; its mean; the largest difference
 # from the mean on the panel and in both ellipses; the size of the terms of the first number; and the potential at the

@@ -1,6 +1,6 @@
 """The first place of an orbit at which the track would have to pull, on a tabulated curve."""
 
-from math import fabs
+from math import fabs, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +8,8 @@ import numpy as np
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.motion.events import ROUNDING_SHARE
 from gqm_sym.runtime.sweep.tables.layout import (
+    CORIOLIS_SAMPLES,
+    CORIOLIS_TERMS,
     HALF,
     KAPPA_SAMPLES,
     KAPPA_TERMS,
@@ -25,55 +27,58 @@ from gqm_sym.runtime.sweep.tables.potential import potential_on, value_on
 MAX_STEPS = 80
 
 
-class Loss(NamedTuple):
-    """The place at which a body leaves the track that would have to pull it there.
+class Stop(NamedTuple):
+    """The place at which a motion ends before the body has passed its whole orbit: there it loses contact, or the last
+    time is over.
 
     Attributes
     ----------
     place : float
-        The place in lam, which is NaN if the body keeps contact up to the end of its orbit.
+        The place in lam, which is NaN if the body passes the whole orbit.
     panel : int
         The panel of the passage on which it is; -1 if there is none.
     x : float
         The place on that panel.
-    has_turned : bool
-        Whether the body has turned before.
+    turns : int
+        How often the body has turned before.
     """
 
     place: float
     panel: int
     x: float
-    has_turned: bool
+    turns: int
 
 
-KEPT = Loss(np.nan, -1, 0.0, False)
+NO_STOP = Stop(np.nan, -1, 0.0, 0)
 
 
 @Inner
-def signed_force(curve, k, slack, side, x):  # type: ignore[no-untyped-def]
-    """Return N per unit mass at a place of panel k, positive if the track pushes, and zero if it is zero within
-    rounding.
+def signed_force(curve, k, slack, side, sense, x):  # type: ignore[no-untyped-def]
+    """Return N per unit mass at a place of panel k for one direction of motion, positive if the track pushes, and zero
+    if it is zero within rounding.
     """
-    rows = curve.rows
-    inertia = 2.0 * value_on(curve.table.paths, k, KAPPA_TERMS, x) * (slack - potential_on(rows, k, x))
+    rows, v2 = curve.rows, 2.0 * (slack - potential_on(curve.rows, k, x))
+    inertia = value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2
+    if curve.directed:
+        inertia += sense * sqrt(max(v2, 0.0)) * value_on(curve.table.paths, k, CORIOLIS_TERMS, x)
     load = value_on(rows, k, LOAD_TERMS, x)
     force = inertia + load
     return side * force if fabs(force) > ROUNDING_SHARE * (fabs(inertia) + fabs(load)) else 0.0
 
 
 @Inner
-def change_between(curve, k, slack, side, before, after):  # type: ignore[no-untyped-def]
+def change_between(curve, k, slack, side, sense, before, after):  # type: ignore[no-untyped-def]
     """Return the place at which N changes its sign, between a place of panel k at which the track pushes and one at
     which it pulls.
     """
     pushes, pulls = before, after
-    f, g = signed_force(curve, k, slack, side, pushes), signed_force(curve, k, slack, side, pulls)
+    f, g = signed_force(curve, k, slack, side, sense, pushes), signed_force(curve, k, slack, side, sense, pulls)
     for step in range(MAX_STEPS):
         middle = 0.5 * (pushes + pulls)
         x = middle if step % 3 == 2 or not f > g else pushes + (pulls - pushes) * f / (f - g)
         if not min(pushes, pulls) < x < max(pushes, pulls):
             return x if fabs(pulls - pushes) > 2.0**-50 else middle
-        value = signed_force(curve, k, slack, side, x)
+        value = signed_force(curve, k, slack, side, sense, x)
         if value < 0.0:
             pulls, g = x, value
         else:
@@ -115,11 +120,13 @@ def loss_on_way(curve, passage, half_v2_at_edges, side, begin, sense):  # type: 
                 at = i if sense > 0 else SAMPLES - 1 - i
                 v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + at])
                 force = side * (paths[k, KAPPA_SAMPLES + at] * v2 + rows[k, LOAD_SAMPLES + at])
+                if curve.directed:
+                    force += side * sense * sqrt(max(v2, 0.0)) * paths[k, CORIOLIS_SAMPLES + at]
             if not whole or force < 0.0:
                 prepare(curve, k, NEAR)
-                force = signed_force(curve, k, slack, side, x)
+                force = signed_force(curve, k, slack, side, sense, x)
             if force < 0.0:
-                return j, change_between(curve, k, slack, side, before, x) if i > 0 else x
+                return j, change_between(curve, k, slack, side, sense, before, x) if i > 0 else x
             before = x
         j, start = j + sense, -float(sense)
     return -1, 0.0
@@ -137,17 +144,28 @@ def launch_on(curve, orbit, passage):  # type: ignore[no-untyped-def]
 
 @Inner
 def loss_of_contact(curve, orbit, passage, half_v2_at_edges, side):  # type: ignore[no-untyped-def]
-    """Return where a body leaves the track before it reaches an end of it, as a `Loss`."""
-    begin = launch_on(curve, orbit, passage)
+    """Return where a body leaves the track before it reaches an end of it, as a `Stop`.
+
+    A body that turns passes places once more in the other direction. There N differs only if it depends on that.
+    """
+    launch = begin = launch_on(curve, orbit, passage)
     if orbit.direction < 0 and begin[0] > 0 and begin[1] == -1.0:  # from an edge the body moves to the panel before
-        begin = begin[0] - 1, 1.0
-    for passes in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
-        sense = orbit.direction if passes == 0 else -orbit.direction
+        launch = begin = begin[0] - 1, 1.0
+    passes = 1 if orbit.circulates or orbit.leaves == orbit.direction else 2
+    for turns in range(passes + (1 if curve.directed and passes == 2 and orbit.leaves == 0 else 0)):
+        sense = orbit.direction if turns != 1 else -orbit.direction
+        if curve.directed and turns > 0:
+            begin = (0, passage.low_x) if sense > 0 else (passage.panels - 1, passage.high_x)
         j, x = loss_on_way(curve, passage, half_v2_at_edges, side, begin, sense)
-        if passes == 0 and (j, x) == begin:
-            return Loss(orbit.lam0, j, x, False)
+        if turns == 0 and (j, x) == launch:
+            return Stop(orbit.lam0, j, x, 0)
         if j >= 0:
-            k = (passage.first + j) % curve.levels.size
-            place = edge_place(curve.table, curve.period, passage.first + j) + curve.table.paths[k, HALF] * (1.0 + x)
-            return Loss(place, j, x, passes == 1)
-    return KEPT
+            return Stop(place_in_lam(curve, passage, j, x), j, x, turns)
+    return NO_STOP
+
+
+@Inner
+def place_in_lam(curve, passage, j, x):  # type: ignore[no-untyped-def]
+    """Return the place in lam of a place on panel j of a passage."""
+    k = (passage.first + j) % curve.levels.size
+    return edge_place(curve.table, curve.period, passage.first + j) + curve.table.paths[k, HALF] * (1.0 + x)

@@ -15,6 +15,7 @@ from gqm_sym.runtime.sweep.quantities import (
     NOT_PERIODIC,
     UNDECIDED,
 )
+from gqm_sym.runtime.sweep.single.liftoff import force_of
 from gqm_sym.runtime.sweep.single.orbit_extremes import FORCE, fill_force, frame_buffer, point_buffer
 from gqm_sym.runtime.sweep.tables.layout import BASE_SIZE, SPREAD
 from gqm_sym.runtime.sweep.tables.panel_forces import FAR, prepare
@@ -53,9 +54,11 @@ def fill_at_rest(curve, lam0, asked, out):  # type: ignore[no-untyped-def]
     quantity, target, side, t_max = asked
     places, v2, force, frame = point_buffer(), point_buffer(), point_buffer(), frame_buffer()
     places[0], v2[0], value = lam0, 0.0, nan
+    if side != 0:
+        fill_force(curve, force_of(curve)[0], 1, places, v2, frame, force)
+        if not side * force[0] > 0.0:
+            return UNDECIDED
     fill_force(curve, FORCE, 1, places, v2, frame, force)
-    if side != 0 and not side * force[0] > 0.0:
-        return UNDECIDED
     if quantity == ARRIVAL_TIME and target != lam0:
         return UNDECIDED if curve.period > 0.0 else NEVER_THERE
     if quantity in (ARRIVAL_TIME, MIN_SPEED, MAX_SPEED):

@@ -13,17 +13,25 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import add
 from gqm_sym.runtime.charts.double_double.parts import TRUE_PARTS, fill_differences
-from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1, call_separated_terms
+from gqm_sym.runtime.compiled.calls import (
+    call_path_and_contact_force,
+    call_potential_divdiff1,
+    call_rider_loads,
+    call_separated_terms,
+)
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import multiply as multiply_pairs
 from gqm_sym.runtime.double_double.quadrature import fill_parameters
-from gqm_sym.runtime.interface import PATH_ROWS
+from gqm_sym.runtime.interface import PATH_ROWS, RIDER_ROWS
+from gqm_sym.runtime.launch.rider import LEVEL_ROW, MIN_LEVEL, STANDARD_GRAVITY
 from gqm_sym.runtime.sweep.tables.fitting import MAX_TRUE_TAIL_RATIO, fill_terms, fill_true_terms, fit, move_terms
 from gqm_sym.runtime.sweep.tables.layout import (
     BASE,
     BASE_LOW,
     BASE_SIZE,
+    CORIOLIS_SAMPLES,
+    CORIOLIS_TERMS,
     DS_TERMS,
     FEW_GAUSS_WEIGHTS,
     FEW_GROWTH,
@@ -76,6 +84,9 @@ NEGLIGIBLE = 1e-2
 # The largest mean number of panels into which a piece of the curve is cut.
 MAX_PARTS = 4
 
+# The V**2 in m2/s2 at which the load at rest is less than the rounding of a load.
+FAST = 2.0**64
+
 
 class Source(NamedTuple):
     """The functions from which a table is made.
@@ -90,6 +101,9 @@ class Source(NamedTuple):
         The numbers of their parts.
     mass : int
         The index of the mass of the body among the run-time parameters.
+    rider_loads : int
+        The address of the function of that name, if the force that shows on which side of a space curve a body is shall
+        be tabulated; otherwise 0.
     """
 
     fns: Any
@@ -97,14 +111,31 @@ class Source(NamedTuple):
     potentials: int
     loads: int
     mass: int
+    rider_loads: int
 
 
-SOURCE = types.NamedTuple((ADDRESSES, types.int64, types.int64, types.int64, types.int64), Source)
+SOURCE = types.NamedTuple((ADDRESSES, *(types.int64,) * 5), Source)
+
+
+@Inner
+def fill_upright_force(source, p, n, places, out):  # type: ignore[no-untyped-def]
+    """Fill kappa and n0 of the component of N/m along the upward direction of riders, and what is added to it for each
+    unit of ds/dt; NaN where that direction is not known.
+    """
+    loads = np.empty((5, RIDER_ROWS, n))
+    for k, w, v in ((0, 0.0, 1.0), (1, 1.0, 1.0), (2, 1.0, -1.0), (3, FAST, 1.0), (4, FAST, -1.0)):
+        call_rider_loads(source.rider_loads, n, places, np.full(n, w), v, 1.0, p, loads[k])
+    for i in range(n):
+        unit = STANDARD_GRAVITY if loads[0, LEVEL_ROW, i] >= MIN_LEVEL else np.nan
+        out[0, i] = unit * 0.5 * (loads[3, 0, i] + loads[4, 0, i]) / FAST
+        out[1, i] = unit * loads[0, 0, i]
+        out[2, i] = unit * 0.5 * (loads[1, 0, i] - loads[2, 0, i])
 
 
 @Inner
 def fill_terms_at(source, p, n, a, places, offsets, out):  # type: ignore[no-untyped-def]
-    """Fill the rows of ``separated_terms`` at n places."""
+    """Fill the rows of ``separated_terms`` at n places, and what is added to N/m for each unit of ds/dt."""
+    out[-1] = 0.0
     if source.separated_terms != 0:
         call_separated_terms(source.separated_terms, n, a, places, offsets, p, out)
         return
@@ -113,12 +144,14 @@ def fill_terms_at(source, p, n, a, places, offsets, out):  # type: ignore[no-unt
     call_path_and_contact_force(source.fns.path_and_contact_force, n, places, np.zeros(n), p, frame)
     for i in range(n):
         out[2, i], out[3, i] = frame[3, i], frame[4, i] / p[source.mass]
+    if source.rider_loads != 0:
+        fill_upright_force(source, p, n, places, out[2:])
 
 
 @Inner
-def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
-    """Fill the data of the path on a panel from ds/dlam and kappa at the Gauss points; return whether it is
-    resolved.
+def fill_path(half, ds, kappa, coriolis, size, row):  # type: ignore[no-untyped-def]
+    """Fill the data of the path on a panel from ds/dlam, kappa and what is added to N/m for each unit of ds/dt at the
+    Gauss points; return whether it is resolved. ``size`` is the size of the latter elsewhere on the curve.
     """
     work, one = np.empty(NODES), row.reshape(1, PATH_ROW)
     resolved = fill_terms(ds, work, row, DS_TERMS, 0.0)
@@ -128,8 +161,10 @@ def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
         row[WEIGHTS + j] = half * GAUSS_WEIGHTS[j] * ds[j]
     row[MAY_STOP], row[HALF] = 0.0 if least_ds > 0.0 else 1.0, half
     resolved &= fill_terms(kappa, work, row, KAPPA_TERMS, NEGLIGIBLE / row[WEIGHTS])
+    resolved &= fill_terms(coriolis, work, row, CORIOLIS_TERMS, NEGLIGIBLE * size)
     for j in range(SAMPLES):
         row[KAPPA_SAMPLES + j] = value_on(one, 0, KAPPA_TERMS, SAMPLE_POINTS[j])
+        row[CORIOLIS_SAMPLES + j] = value_on(one, 0, CORIOLIS_TERMS, SAMPLE_POINTS[j])
     for j in range(FEW_NODES):
         row[FEW_WEIGHTS + j] = half * FEW_GAUSS_WEIGHTS[j] * value_on(one, 0, DS_TERMS, FEW_POINTS[j])
     return resolved
@@ -215,15 +250,16 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
     panel : (left, right, piece, span)
         The places of its edges, the piece on which it lies, and its beginning and end as shares of the piece.
     scales : array
-        The slopes of the parts of the potential elsewhere on the curve, and the sizes of the parts of the load.
+        The slopes of the parts of the potential elsewhere on the curve, the sizes of the parts of the load, and that of
+        what is added to N/m for each unit of ds/dt.
     path, parts : arrays
         Filled.
     """
     left, right, piece, span = panel
-    half, potentials = 0.5 * (right - left), source.potentials
+    half, potentials, count = 0.5 * (right - left), source.potentials, source.potentials + source.loads
     places, gaps, rests, work = np.empty(NODES), np.empty(NODES), np.empty(NODES), np.empty(NODES)
     shares = np.empty(NODES)
-    from_left, from_right = np.empty((scales.size + 2, NODES)), np.empty((scales.size + 2, NODES))
+    from_left, from_right = np.empty((count + 3, NODES)), np.empty((count + 3, NODES))
     differences, ends, is_exact = (
         np.empty((2, potentials, 2, NODES)),
         np.empty((potentials, 2, 2)),
@@ -241,14 +277,15 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
         fill_terms_at(source, p, NODES, right, places, rests, from_right)
         for i in range(potentials):
             differences[0, i, 0], differences[1, i, 0] = from_left[i], from_right[i]
-    resolved = fill_path(half, from_left[potentials], from_left[potentials + 1], path)
+    of_path = from_left[potentials], from_left[potentials + 1], from_left[count + 2]
+    resolved = fill_path(half, *of_path, scales[count], path)
     for i in range(potentials):
         part = parts[i * POTENTIAL_ROW : (i + 1) * POTENTIAL_ROW]
         resolved &= fill_potential(half, differences[:, i], is_exact, scales[i], part)
         if is_exact:
             part[BASE], part[BASE_LOW] = ends[i, 0, 0], ends[i, 1, 0]
             part[INCREASE] = add(ends[i, 0, 1], ends[i, 1, 1], -ends[i, 0, 0], -ends[i, 1, 0])[0]
-    for i in range(potentials, scales.size):
+    for i in range(potentials, count):
         at = potentials * POTENTIAL_ROW + (i - potentials) * LOAD_ROW
         part = parts[at : at + LOAD_ROW]
         resolved &= fill_terms(from_left[i + 2], work, part, 0, NEGLIGIBLE * scales[i])
@@ -260,9 +297,9 @@ def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-
 @Inner
 def scales_of(source, p, pieces):  # type: ignore[no-untyped-def]
     """Return the largest slopes of the parts of the potential at the edges of pieces, and the largest values of the
-    parts of the load.
+    parts of the load and of what is added to N/m for each unit of ds/dt.
     """
-    scales, offset = np.zeros(source.potentials + source.loads), np.zeros(1)
+    scales, offset = np.zeros(source.potentials + source.loads + 1), np.zeros(1)
     out = np.empty((scales.size + 2, 1))
     for k in range(pieces.size):
         fill_terms_at(source, p, 1, pieces[k], pieces[k : k + 1], offset, out)

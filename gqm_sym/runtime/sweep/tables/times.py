@@ -281,11 +281,35 @@ def time_between(curve, passage, half_v2_at_edges, lower, upper):  # type: ignor
 
 
 @Inner
-def travel_time(curve, orbit, passage, half_v2_at_edges, place):  # type: ignore[no-untyped-def]
+def time_along(curve, passage, half_v2_at_edges, ends, turns):  # type: ignore[no-untyped-def]
+    """Return the time that a body takes from one place of its orbit to another, with so many turns on its way; NaN if
+    it is not accurate.
+
+    Parameters
+    ----------
+    ends : (here, there, ahead)
+        The distances of both places from both ends of the orbit, and those of the end towards which it moves first.
+    turns : int
+        0 if it moves on to the other place, 1 if it turns at the end ahead before, 2 if also at the other end.
+    """
+    here, there, ahead = ends
+    time, behind = 0.0, (ahead[1], ahead[0])
+    for k in range(turns + 1):
+        first, last = here if k == 0 else behind, there if k == turns else ahead
+        if k % 2 == 1:
+            first, last = ahead, there if k == turns else behind
+        lower, upper = (first, last) if first[0] < last[0] else (last, first)
+        time += time_between(curve, passage, half_v2_at_edges, lower, upper)
+    return time
+
+
+@Inner
+def travel_time(curve, orbit, passage, half_v2_at_edges, place, again):  # type: ignore[no-untyped-def]
     """Return the first time at which a body is at a place or, if that is NaN, the time of half a period, of a lap or
     until it leaves.
 
-    It is NaN if it is not accurate, and inf if the body never reaches the place.
+    It is NaN if it is not accurate, and inf if the body never reaches the place. If a body that turns comes to the
+    place ``again``, it is the time at which it passes it in the other direction.
     """
     width, laps, onwards = passage.width, 0.0, True
     here, there, start, end = (0.0, width), (width, 0.0), (0.0, width), (width, 0.0)
@@ -303,16 +327,8 @@ def travel_time(curve, orbit, passage, half_v2_at_edges, place):  # type: ignore
         onwards = orbit.direction * ahead >= 0.0
         if not onwards and orbit.leaves == orbit.direction:
             return np.inf
-    turn = end if orbit.direction > 0 else start
-    time = 0.0
-    # The time is that to the place, or to the end ahead and back to the place; the time of all laps before is added.
-    for part_number in range(1 if onwards and laps == 0.0 else 2):
-        first, last = here, there
-        if not onwards:
-            first, last = (here if part_number == 0 else there), turn
-        elif part_number == 1:
-            first, last = start, end
-        lower, upper = (first, last) if first[0] < last[0] else (last, first)
-        part = time_between(curve, passage, half_v2_at_edges, lower, upper)
-        time += laps * part if onwards and part_number == 1 else part
+    ends = here, there, end if orbit.direction > 0 else start
+    time = time_along(curve, passage, half_v2_at_edges, ends, (0 if onwards else 1) + (1 if again else 0))
+    if laps != 0.0:
+        time += laps * time_between(curve, passage, half_v2_at_edges, start, end)
     return time

@@ -15,6 +15,7 @@ from paths import ROOT
 from gqm_sym.loading import load
 from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.lanes import periods
+from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
 from gqm_sym.runtime.gradients.lanes.evaluation import ANSWERED
 from gqm_sym.runtime.gradients.lanes.machine_code import coded
 from gqm_sym.runtime.gradients.programs import turning_point_program
@@ -143,6 +144,29 @@ def test_turning_points_and_extremes_in_any_company(quantity: str, monkeypatch: 
     for k in (0, 70, 149):
         alone = module.sweep(quantity, lam0=lam0[order[k]], v0=v0[order[k]], gradient=names).gradient
         np.testing.assert_array_equal(alone, found[0][k])
+
+
+@pytest.mark.parametrize("name", ["parabola", pytest.param("double_well", marks=pytest.mark.extended)])
+def test_known_numbers_of_intervals(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where double precision tells how many intervals suffice, double-double arithmetic takes no others, and has the
+    same bits as where it finds that by itself, in any company.
+    """
+    module, random = generated(name), np.random.default_rng(3)
+    lam0, names, carried_out = random.uniform(0.1, 2.0, 200), (*module.PARAMETERS, "lam0"), periods.carried_out
+    numbers = set[int]()
+
+    def by_itself(stage: periods.Stage, program: Any, count: int, which: Any, most: int) -> Any:
+        if not isinstance(program, LaneProgram):
+            numbers.add(most)
+            most = 0
+        return carried_out(stage, program, count, which, most)
+
+    found = module.sweep("half_period", lam0=lam0, gradient=names).gradient
+    alone = [module.sweep("half_period", lam0=place, gradient=names).gradient for place in lam0[:20]]
+    np.testing.assert_array_equal(alone, found[:20])
+    monkeypatch.setattr(periods, "carried_out", by_itself)
+    np.testing.assert_array_equal(found, module.sweep("half_period", lam0=lam0, gradient=names).gradient)
+    assert max(numbers) > 0
 
 
 def test_machine_code_for_many_short_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import pytest
 from railed import built
 
 import gqm_sym as gqm
+from gqm_sym.building import transient
 
 G = 9.81
 
@@ -112,3 +113,41 @@ def test_a_body_that_leaves_shortly_before_a_joint(tmp_path: Path) -> None:
     found = _found(module, 0.1)
     assert found["v_max"] == pytest.approx(speed, rel=FEW)
     assert found["normal_force_min"] == pytest.approx(0.0, abs=AT_LOSS)
+
+
+TURNS = np.linspace(-3.0, 3.0, 41)
+BANKED = {
+    "points": lambda: gqm.Curve.sampled(
+        np.column_stack([TURNS, np.sin(2.0 * TURNS) / 4.0, np.sin(TURNS) + TURNS**2 / 8.0]),
+        roll=np.full(TURNS.size, 0.1),
+    ),
+    "formulas": lambda: gqm.Curve.space(x="t", y="sin(2*t)/4", z="sin(t) + t**2/8", parameter="t", roll="1/10"),
+}
+
+
+@pytest.mark.parametrize(
+    ("curve", "spin"),
+    [
+        ("points", 0.0),
+        pytest.param("points", 0.7, marks=pytest.mark.extended),
+        pytest.param("formulas", 0.7, marks=pytest.mark.extended),
+    ],
+)
+def test_on_a_banked_track_in_space(curve: str, spin: float) -> None:
+    """Compiled loops answer as each motion does, also in a rotating frame, where a body loses contact moving one way.
+
+    Each launch was solved by itself.
+    """
+    law = gqm.Gravity() + gqm.RotatingFrame(Omega=spin) if spin else gqm.Gravity()
+    module = transient(gqm.derive(BANKED[curve](), law))
+    first, last = (0.5, 7.5) if curve == "points" else (-2.5, 2.5)
+    lam0, v0, sense = np.linspace(first, last, 12), np.tile([0.5, 3.0, 5.0, 6.0], 3), np.tile([1, -1, -1, 1], 3)
+    for asked in [{"contact": "above", "t_max": 1.0}] + [{"contact": "below"}, {"contact": "above"}] * (spin != 0.0):
+        motions = [module.solve(*launch, **asked) for launch in zip(lam0, v0, sense, strict=True)]
+        ends, *extremes = (module.sweep(name, lam0, v0, sense, **asked) for name in ("t_end", *EXTREMES[:1:-1]))
+        assert all("solve" not in swept.route_counts() for swept in (ends, *extremes))
+        wanted = np.array([motion.t_end for motion in motions])
+        np.testing.assert_allclose(ends.values, np.where(np.isfinite(wanted), wanted, np.nan), rtol=1e-13, atol=1e-14)
+        for name, swept in zip(EXTREMES[:1:-1], extremes, strict=True):
+            loads = np.array([getattr(motion, name).value for motion in motions])
+            np.testing.assert_allclose(swept.values, loads, rtol=2e-14, atol=1e-12)
