@@ -219,6 +219,26 @@ def test_a_slow_launch_from_a_bottom(v0: float, g: Any, module_of: Callable[[str
         assert motion.state(quarter / 3.0).v2 <= v0 * v0
 
 
+@pytest.mark.parametrize("size", [1e-45, pytest.param(1e-80, marks=pytest.mark.extended), 1e-100, 1e-200])
+def test_the_smallest_swings(size: float, module_of: Callable[[str], ModuleType]) -> None:
+    """A swing to 1e-200 has the half period and the places of small swings, as in a sweep. It counted as rest, and
+    smaller ones than 1e-80, and throws of 1e-30 m/s, were refused or counted as asymptotic.
+    """
+    circle, catenary = module_of("circle"), module_of("catenary")
+    with mp.workdps(40):
+        half = mp.pi / mp.sqrt(mpf("9.81"))
+        there = float(size * mp.cos(mp.sqrt(mpf("9.81")) * mpf(0.3)))
+        end = float(mpf(size) / mp.sqrt(mpf("9.81") / 2))
+    motion = circle.solve(size, L=1, g="9.81")
+    assert ulps(motion.half_period, half) <= MOST_ULPS
+    assert ulps(circle.sweep("half_period", size, L=1, g=9.81).values.item(), half) <= MOST_ULPS
+    assert motion.turning_points == (size, -size)
+    assert motion.lam(0.3) == pytest.approx(there, rel=1e-13, abs=0.0)
+    if size > 1e-150:  # V**2 is a double
+        thrown = catenary.solve(0, size, c=2, g="9.81")
+        assert thrown.turning_points == pytest.approx((end, -end), rel=1e-15, abs=0.0)
+
+
 @pytest.mark.parametrize("v0", [1e-2, 1e-5, 1e-7, 1e-10])
 def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], ModuleType]) -> None:
     """Although the launch and its turning point are the same place in doubles, the time between them is right:

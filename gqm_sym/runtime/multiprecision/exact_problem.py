@@ -7,6 +7,7 @@ mpmath, for exactly the numbers that the user gave. mpmath is imported when it i
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,11 @@ NOWHERE: Array = np.empty(0)
 # The numbers of decimal digits with which a sign is determined, tried in turn; a value that is zero with the last one
 # counts as zero.
 PRECISIONS = (40, 80, 210)
+
+# A launch at a place or with a speed below this takes more digits than are asked for, four for each power of ten: in
+# V**2 those of its square cancel against the potential, and Newton's steps to a turning point end where half of all
+# digits are right.
+MIN_LAUNCH, DIGITS_OF_TINY = 1e-20, 4
 
 # The number of digits that rounding and cancellation may cost.
 GUARD_DIGITS = 15
@@ -80,9 +86,14 @@ class ExactProblem:
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":
-        """Return the problem at a working precision of this number of decimal digits."""
+        """Return the problem at a working precision of this number of decimal digits, or more of them for a tiny
+        launch.
+        """
         if digits not in self._scales:
-            self._scales[digits] = Arithmetic(self, digits)
+            sizes = [abs(number.value) for number in (self.lam0, self.v0) if number.value != 0.0]
+            smallest = min(sizes, default=1.0)
+            more = 0 if smallest >= MIN_LAUNCH else -DIGITS_OF_TINY * floor(log10(smallest))
+            self._scales[digits] = Arithmetic(self, digits + more)
         return self._scales[digits]
 
     def slope_sign(self) -> int:
@@ -90,7 +101,7 @@ class ExactProblem:
         for digits in PRECISIONS:
             a = self.at(digits)
             slope = a.effective_potential_slope(a.lam0)
-            if abs(slope) > a.mpf(10) ** (GUARD_DIGITS - digits) * (a.mpf(0.5) + abs(a.effective_potential(a.lam0))):
+            if abs(slope) > a.mpf(10) ** (GUARD_DIGITS - a.digits) * (a.mpf(0.5) + abs(a.effective_potential(a.lam0))):
                 return 1 if slope > 0 else -1
         return 0
 

@@ -285,7 +285,10 @@ class PassageChanges:
         """Return the derivatives of lam, s, x, z, v, N and y at fixed times: of shape (7, variables, times)."""
         slopes, arcs = self.arrivals(lam, has_turned)
         path, local = self._path(lam), self._local(lam)
-        count, ds, base = self.source.parameters, path[DS, 0], self._base.moves
+        count, base = self.source.parameters, self._base.moves
+        # At a launch from a cusp ds, V and the slope of V**2 vanish, so that the place does not change.
+        is_at_cusp = np.logical_not(has_turned) & (lam == self.launch.high) & self._starts_at_cusp
+        ds = np.where(is_at_cusp, 1.0, path[DS, 0])
         moved = base[0][:, None] - slopes * v / ds
         # Beside a turning point half of V**2 and its change at a place that moves with it are small; their ratio is
         # smooth.
@@ -296,6 +299,7 @@ class PassageChanges:
         change = total + (error + (rest + partials[:, 1]))
         ratio = np.divide(change, 2.0 * half, where=half > 0.0, out=np.zeros_like(change))
         faster = v * ratio - local[1, 0] / ds * slopes
+        faster[count + 1] += is_at_cusp
 
         def whole(row: int) -> Array:
             found: Array = path[row, -1] * moved

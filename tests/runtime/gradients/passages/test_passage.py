@@ -201,7 +201,8 @@ def test_lifted_off_at_once(generated_folder: Path) -> None:
 def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None:
     """Along a cycloid released from its cusp, the angle of the wheel is sqrt(g/R) times the time, and does not
     change with the launch place in first order. With a launch speed v0 the body is earlier by v0/g. With losses, or for
-    a launch out of the curve, that derivative is refused; it was NaN, and that by the launch place wrong.
+    a launch out of the curve, that derivative is refused; it was NaN, and that by the launch place wrong. At the launch
+    itself place and speed change by the launch speed alone; all of this was refused.
     """
     wheel = {"x": "R*(u - sin(u))", "z": "R*(cos(u) - 1)", "parameter": "u", "domain": (0, 3)}
     curve = gqm.Curve.parametric(**wheel, parameters={"R": "1/2"})
@@ -219,6 +220,9 @@ def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None
         np.testing.assert_allclose(swept[:, 3], -1.0 / given[1], rtol=1e-15)
         rate = np.sqrt(given[1] / given[0])
         assert motion.sensitivity([0.1, 0.2], "v0").lam == pytest.approx(rate / given[1], rel=1e-14)
+        at_launch = motion.sensitivity(0.0, (*names, "v0"))
+        np.testing.assert_array_equal([at_launch.lam, at_launch.x, at_launch.z], 0.0)
+        assert at_launch.v.tolist() == [0.0, 0.0, 0.0, 1.0]
         motion = module.solve(0, 0, -1)
     else:
         assert np.isnan(swept[:, 3]).all()
