@@ -52,7 +52,7 @@ from gqm_sym.runtime.sweep.single.until import (
     part_until,
     stops_beside_turn,
 )
-from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, value_by_itself
+from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, follows_formulas, value_by_itself
 from gqm_sym.runtime.sweep.tables.last_places import stop_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP, Stop, loss_of_contact
@@ -178,15 +178,16 @@ def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ig
     ``asked`` is the quantity and the last time.
     """
     (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
-    if tabulated and (passage.panels > FEW_PANELS or curve.directed):
+    by_formulas = not curve.directed and (passage.panels <= FEW_PANELS or follows_formulas(curve))
+    if by_formulas:  # beside hilltops they have more digits than the table
+        decided, part = part_until(curve, orbit, t_max, buffers.work)
+        if decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
+            value = value_by_itself(curve, part, quantity, nan, buffers)
+    if value != value and tabulated and (passage.panels > FEW_PANELS or curve.directed):
         decided, stop = stop_at(curve, orbit, passage, edges, t_max)
         if decided and not (quantity == MIN_SPEED and is_beside_turn(orbit, stop.turns, stop.place - orbit.lam0)):
             value = extreme_on_table(curve, orbit, passage, stop, (edges, tabulated), quantity)
-    if value == value or curve.directed:
-        return value
-    decided, part = part_until(curve, orbit, t_max, buffers.work)
-    decided = decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part))
-    return value_by_itself(curve, part, quantity, nan, buffers) if decided else nan
+    return value
 
 
 @Inner

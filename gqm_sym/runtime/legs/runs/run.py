@@ -37,7 +37,7 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent
 from gqm_sym.runtime.legs.panels.resolution import first_change_of, size_at
-from gqm_sym.runtime.legs.panels.widest import ALWAYS, HIGH_V2_RATIO, MAX_PANELS, MAYBE, NEVER, PanelRequest, next_panel
+from gqm_sym.runtime.legs.panels.widest import ALWAYS, HIGH_V2_RATIO, MAX_PANELS, MAYBE, NEVER, PanelRequest
 from gqm_sym.runtime.legs.runs.changes import changes_at_once, cut_panel, first_changes
 from gqm_sym.runtime.legs.runs.ends import (
     END_NONE,
@@ -46,13 +46,13 @@ from gqm_sym.runtime.legs.runs.ends import (
     End,
     LastTimed,
     conclude,
-    end_at_once,
     may_pause,
     turn_below_noise,
     what_after,
     what_before,
 )
 from gqm_sym.runtime.legs.runs.route import CurveAhead, begin, limited, pass_break
+from gqm_sym.runtime.legs.runs.turn_ahead import panel_or_end
 
 # The number of panels after which a run pauses.
 PANELS_PER_RUN = 512
@@ -153,15 +153,11 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
-        width, step, is_timed = next_panel(
-            forces,
-            march,
-            panel,
-            PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True, route.reading.length),
-            work,
+        request = PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True, route.reading.length)
+        width, step, is_timed, (what, run_length, v2) = panel_or_end(
+            forces, march, panel, request, start, (run_length, stop), work, point
         )
         if width == 0.0:
-            what, run_length, v2 = end_at_once(forces, march, panel, run_length, point)
             break
         load_change, sign, _ = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * work[size_at(LOAD)])
         if nu == 0 and sign != 0:

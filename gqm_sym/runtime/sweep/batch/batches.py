@@ -14,15 +14,11 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
+from gqm_sym.runtime.double_double.interpreter import BLOCK
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 from gqm_sym.runtime.sweep.batch.arrivals import answer_arrivals
-from gqm_sym.runtime.sweep.batch.exact_ends import (
-    add_what_ends_lack,
-    find_exact_ends,
-    keeps_ends,
-    move_ends,
-    refines_ends,
-)
+from gqm_sym.runtime.sweep.batch.exact_ends import find_exact_ends, keeps_ends, refines_ends
+from gqm_sym.runtime.sweep.batch.exact_nodes import fill_checks, leave_unchecked
 from gqm_sym.runtime.sweep.batch.known_turns import fill_axis_offsets
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
@@ -56,7 +52,12 @@ from gqm_sym.runtime.sweep.batch.rows import (
     partition,
     shrink,
 )
-from gqm_sym.runtime.sweep.batch.times import AGM_LIBRATION, AXIS_LIBRATION, half_periods_by_agm, times_by_trapezoid
+from gqm_sym.runtime.sweep.batch.times import (
+    AGM_LIBRATION,
+    AXIS_LIBRATION,
+    half_periods_by_agm,
+    times_by_trapezoid,
+)
 from gqm_sym.runtime.sweep.batch.turning_points import (
     classify,
     prove,
@@ -134,27 +135,22 @@ def answer_times(fns, kind, orbits, scratch, quantity, answers):  # type: ignore
     if kind.kind == AGM_LIBRATION:
         half_periods_by_agm(fns, orbits, scratch, quantity, answers)
     else:
-        times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
+        times_by_trapezoid(fns, kind.kind, kind.mirrored, False, orbits, scratch, quantity, answers)
 
 
 @Inner
-def answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Fill half periods or periods of orbits whose ends are found in double-double arithmetic.
-
-    ``moved`` stores the orbits with moved ends meanwhile.
+def answer_exact_times(fns, mirrored, orbits, block, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Fill half periods or periods that are corrected by double-double arithmetic; ``block`` stores some orbits
+    meanwhile.
     """
-    n, count, lacks = orbits.size, scratch.param_count, scratch.ends
-    shares, indices, times = lacks[4, :n], lacks[5, :n], lacks[6, :n]
-    for j in range(n):
-        scratch.others[j] = j
-    gather(orbits, count, scratch.others, n, moved, TIME_ROWS)
-    others = Orbits(n, moved.rows, moved.params)
-    move_ends(n, others.rows, lacks, shares, indices)
-    answer_times(fns, kind, others, scratch, quantity, answers)
-    for j in range(n):
-        times[j] = answers.values[int(indices[j]), 0]
-    answer_times(fns, kind, orbits, scratch, quantity, answers)
-    add_what_ends_lack(n, shares, indices, times, answers)
+    for begin in range(0, orbits.size, BLOCK):
+        size = min(BLOCK, orbits.size - begin)
+        for j in range(size):
+            scratch.others[j] = begin + j
+        gather(orbits, scratch.param_count, scratch.others, size, block, ROWS)
+        some = Orbits(size, block.rows, block.params)
+        leave_unchecked(some)
+        times_by_trapezoid(fns, LIBRATION, mirrored, True, some, scratch, quantity, answers)
 
 
 @Inner
@@ -162,7 +158,7 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
     """Prove orbits of one kind, and fill the answers for those that are proved; ``spares`` store the others and copies
     meanwhile.
     """
-    count, (spare, moved) = scratch.param_count, spares
+    count, (spare, block) = scratch.param_count, spares
     for pieces in (SHARED, FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         if pieces == SHARED and not kind.shared:
             continue
@@ -182,7 +178,8 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
         refined = has_tape(scratch) and refines_ends(kind, quantity, orbits, scratch.careful)
         orbits = shrink(orbits, count, scratch.chosen, proved, ROWS if refined else TIME_ROWS)
         if refined and orbits.size:
-            find_exact_ends(scratch.exact, count, keeps_ends(kind, quantity), orbits, scratch.ends)
+            kept = keeps_ends(kind, quantity)
+            find_exact_ends(scratch.exact, count, kept, orbits, scratch.ends, scratch.others)
         if quantity == ARRIVAL_TIME and kind.kind != CIRCULATION:
             if orbits.size:
                 answer_arrivals(fns, orbits, scratch, answers)
@@ -190,9 +187,13 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
             answer_spans(orbits, kind.kind, quantity, answers)
         elif orbits.size:
             fill_ends(orbits, kind.kind, answers)
-            if scratch.careful and kind.kind == LIBRATION:
-                answer_exact_ends(fns, kind, orbits, moved, scratch, quantity, answers)
+            if kind.kind == LIBRATION and scratch.careful:
+                answer_exact_times(fns, kind.mirrored, orbits, block, scratch, quantity, answers)
             else:
+                if refined:
+                    fill_checks(scratch.exact, count, orbits, scratch.ends, scratch.others)
+                else:
+                    leave_unchecked(orbits)
                 answer_times(fns, kind, orbits, scratch, quantity, answers)
         if unproved == 0:
             return
@@ -364,7 +365,7 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
         HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME or SPANS.
     careful : bool
         Whether batches have left these launches before. The search for turning points then makes smaller steps, and
-        times are corrected by what turning points lack as doubles.
+        times are corrected by double-double arithmetic.
     exact : RecordedFormulas
         The module's formulas as a tape, by which turning points are found in double-double arithmetic; empty if there
         is none.
@@ -376,7 +377,7 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
     size = (count + max(layout[0], layout[1])) * BATCH
     domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    work, ends = np.empty((13, BATCH)), np.empty((7, BATCH))
+    work, ends = np.empty((13, BATCH)), np.empty((6, BATCH))
     rates = np.empty((MAX_TERMS + 1 if quantity == ARRIVAL_TIME else 0, BATCH))
     scratch = Scratch(count, layout, chosen, others, work, ends, careful, exact, columns, rates)
     first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))

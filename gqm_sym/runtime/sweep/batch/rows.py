@@ -11,6 +11,8 @@ SUM                  sum of the time integrand over all nodes so far            
 REST                 what rounding took from that sum                                     time
 VALUE                the mean of the time integrand by the last level of nodes            time
 CHANGE               relative change of the time by that level                            time
+LACKING              what that sum lacks at the first nodes by values of the integrand in  time
+                     double-double arithmetic
 FACTOR_LOW           smallest value of V**2's regular factor at the nodes                 time
 FACTOR_HIGH          its largest value                                                    time
 FACTOR_AT_TURN       its smallest value at turning points that are rounded                 time
@@ -37,9 +39,13 @@ AXIS_SPACING         distance from one axis to the next, 0 if there is only one 
 AXIS_NUMBER          how many such distances that axis is from the one that is known      search
 ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
 V2_REST              what rounding took from V**2 at launch                               search
+CHECK_LOW,           V**2's regular factor at the nodes in CHECKED from double-double      time
+CHECK_HIGH           arithmetic; NaN if that is not known
+LEVEL, LEVEL_REST    U + V**2/2, as two doubles                                           exact time
+LACK_LOW, LACK_HIGH  what OFFSET_LOW and OFFSET_HIGH lack as doubles                      exact time
 ==================== ==================================================================== ======================
 
-The quadrature needs only the rows before TIME_ROWS.
+After its first two levels the quadrature in doubles needs only the rows before TIME_ROWS.
 """
 
 from typing import Any, NamedTuple
@@ -55,10 +61,11 @@ from gqm_sym.runtime.compiled.types import Array
 # a register.
 BATCH, LANES = 128, 8
 
-INDEX, SUM, REST, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(10)
-END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(10, 18)
-LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(18, 23)
-ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST, ROWS = range(23, 31)
+INDEX, SUM, REST, VALUE, CHANGE, LACKING, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(11)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(11, 19)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(19, 24)
+ZERO, AXIS_OFFSET, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, V2_REST = range(24, 31)
+CHECK_LOW, CHECK_HIGH, LEVEL, LEVEL_REST, LACK_LOW, LACK_HIGH, ROWS = range(31, 38)
 TIME_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
@@ -124,7 +131,7 @@ class Scratch(NamedTuple):
         Lists of columns.
     work : (13, BATCH) array
         Rows for intermediate results.
-    ends : (7, BATCH) array
+    ends : (6, BATCH) array
         Rows for orbits whose ends are found in double-double arithmetic.
     careful : bool
         Whether these are launches that batches left before.

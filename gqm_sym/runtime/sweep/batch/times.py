@@ -30,9 +30,12 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     SINES_SQUARED,
     has_converged,
 )
+from gqm_sym.runtime.sweep.batch.exact_nodes import CHECKED, fill_exact_integrand, load_block
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_LIBRATION_ROWS,
     CHANGE,
+    CHECK_HIGH,
+    CHECK_LOW,
     END_HIGH,
     END_LOW,
     FACTOR_AT_TURN,
@@ -41,17 +44,20 @@ from gqm_sym.runtime.sweep.batch.rows import (
     HALF_REST,
     HALF_WIDTH,
     INDEX,
+    LACKING,
     LAUNCH_PLACE,
     LAUNCH_V2,
     OFFSET_HIGH,
     OFFSET_LOW,
     REST,
+    ROWS,
     SUM,
     TIME_ROWS,
     VALUE,
     has_tape,
     shrink,
 )
+from gqm_sym.runtime.sweep.batch.wide_orbits import replace_on_wide_orbits
 from gqm_sym.runtime.sweep.quantities import ANSWERED, PERIOD, UNDECIDED
 
 # Kinds of orbits in addition to those of `trapezoid`. Both are librations about an axis of symmetry: one with a time
@@ -60,6 +66,10 @@ AXIS_LIBRATION, AGM_LIBRATION = 2, 3
 
 # For each kind except the last, the number of rows of a batch that the trapezoidal rule needs.
 NEEDED_ROWS = (TIME_ROWS, TIME_ROWS, AXIS_LIBRATION_ROWS)
+
+# The number of nodes at which the integrand is also found in double-double arithmetic. What it lacks in doubles is so
+# small that few digits of the mean of that are enough.
+EXACT_NODES = 4 * MIN_INTERVALS
 
 # Pi as two doubles.
 PI_HIGH, PI_LOW = 2.0 * HALF_PI[0], 2.0 * HALF_PI[1]
@@ -72,15 +82,11 @@ CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 # from rest are exact where it starts, and both are in an even well.
 MIN_RATIO, MIN_LAP_RATIO, MIN_TURN_RATIO, MIN_EVEN_RATIO, MIN_AXIS_RATIO = 0.15, 0.1, 0.4, 0.5, 0.9
 
-# The same for all librations whose turning points are known to more digits than a double has.
+# The same for librations whose integrand is corrected by values from double-double arithmetic.
 MIN_EXACT_RATIO = 0.03
 
-# The distance of an end from zero, in widths of the orbit, from which on its rounding counts, because it is more than
-# that of the width.
-FAR = 1.0
-
-# The share of an orbit over which the slope of the potential changes in proportion to the distance from an end.
-NEAR = 2.0**-20
+# The largest relative error of V**2 in doubles where it is checked.
+MAX_FACTOR_ERROR = 3.0 * 2.0**-53
 
 # The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
 # MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
@@ -98,64 +104,8 @@ def contains_nan(row):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_end_roundings(fns, n, from_below, rows, p, work):  # type: ignore[no-untyped-def]
-    """Fill the roundings of one end of each orbit, and dU/dlam there if any of them counts; return whether any does.
-
-    They count as 0 where the end is nearer to zero than the width of the orbit.
-    """
-    ends = rows[END_LOW if from_below else END_HIGH, :n]
-    offset_low, offset_high, start = rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n], rows[LAUNCH_PLACE, :n]
-    roundings, slopes, offsets = work[2, :n], work[5, :n], work[9, :n]
-    out, any_far = work[10:13].reshape(-1)[: 3 * n].reshape(3, n), False
-    for j in range(n):
-        end, rounding = two_sum(start[j], offset_low[j] if from_below else offset_high[j])
-        far = fabs(ends[j]) > FAR * (offset_high[j] - offset_low[j])
-        roundings[j] = choose(far, (end - ends[j]) + rounding, 0.0)
-        any_far |= far
-    slopes[:] = 0.0
-    if any_far:
-        offsets[:] = 0.0
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, ends, offsets, p, out)
-        slopes[:] = out[2]
-    return any_far
-
-
-@Inner
-def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no-untyped-def]
-    """Replace NaN in the results of `potential_divdiff2` for orbits that are too wide for its closed forms.
-
-    V**2 is computed from U[a, x] or U[b, x] with the nearer turning point, which loses no digits on a wide orbit. If
-    that turning point is far from zero, its rounding is taken into account.
-    """
-    from_below = NODE_SHARES[node] <= 0.5
-    any_far = fill_end_roundings(fns, n, from_below, rows, p, work)
-    ends = rows[END_LOW if from_below else END_HIGH, :n]
-    da, db, places, offsets = work[0, :n], work[1, :n], work[8, :n], work[9, :n]
-    roundings, slopes = work[2, :n], work[5, :n]
-    out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    at_end = any_far and (OFFSETS_FROM_A[node] if from_below else OFFSETS_TO_B[node]) == 0.0
-    share = NEAR if at_end else 0.0
-    for j in range(n):
-        offsets[j] = da[j] + share * db[j] if from_below else -(db[j] + share * da[j])
-        places[j] = ends[j] + offsets[j]
-    call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, places, offsets, p, out)
-    if any_far:
-        for j in range(n):
-            roundings[j] = choose(roundings[j] == 0.0, 0.0, roundings[j] * (out[2, j] - slopes[j]) / offsets[j])
-    if at_end:
-        offsets[:] = 0.0
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, ends, offsets, p, out)
-    for j in range(n):
-        wide = two[0, j] != two[0, j]
-        first = out[0, j] + roundings[j]
-        q = -first / db[j] if from_below else first / da[j]
-        two[0, j] = choose(wide, q, two[0, j])
-        two[1, j] = choose(two[1, j] == two[1, j], two[1, j], out[1, j])
-
-
-@Inner
 def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-untyped-def]
-    """Fill the time integrand of each orbit at one node of the rule.
+    """Fill the time integrand of each orbit at one node of the rule, in doubles.
 
     The rows for the smallest and the largest regular factor of V**2 are updated.
     """
@@ -245,6 +195,15 @@ def keep_factor_at_turn(n, rows, offset, factors):  # type: ignore[no-untyped-de
 
 
 @Inner
+def refuse_rough_factors(n, rows, check, factors):  # type: ignore[no-untyped-def]
+    """Let the smallest factor of V**2 be negative where a factor differs from that in the row ``check``."""
+    low, exact = rows[FACTOR_LOW, :n], rows[check, :n]
+    for j in range(n):
+        rough = fabs(factors[j] - exact[j]) > MAX_FACTOR_ERROR * exact[j]  # false for NaN
+        low[j] = choose(rough, -1.0, low[j])
+
+
+@Inner
 def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def]
     """Set the mean of each orbit's integrand by a level of the rule, and the verdict on it.
 
@@ -282,10 +241,10 @@ def set_times(rows, nodes, ranges, rests, times):  # type: ignore[no-untyped-def
 
     ``ranges`` is the range of the phase angle, or 1 for laps, as two doubles.
     """
-    high, low = ranges
+    (high, low), corrected = ranges, min(nodes, EXACT_NODES)
     for j in range(times.size):
         mean = rows[VALUE, j]
-        rest = mean * (low + high * rests[j]) + high * (rows[REST, j] / nodes)
+        rest = mean * (low + high * rests[j]) + high * (rows[REST, j] / nodes + rows[LACKING, j] / corrected)
         times[j] = fma(mean, high, rest)
 
 
@@ -303,33 +262,66 @@ def answer_level(rows, times, verdict, chosen, answers):  # type: ignore[no-unty
 
 
 @Inner
-def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+def fill_rates(fns, kind, n, node, rows, p, scratch):  # type: ignore[no-untyped-def]
+    """Fill the time integrand of each orbit at one node of the rule, and check it."""
+    rates = fill_integrand_batch(fns, kind, n, node, rows, p, scratch.work)
+    if kind == LIBRATION and node in CHECKED:
+        refuse_rough_factors(n, rows, CHECK_LOW if node == CHECKED[0] else CHECK_HIGH, scratch.work[3, :n])
+    return rates
+
+
+@Inner
+def add_what_rates_lack(rows, node, weight, rates, scratch):  # type: ignore[no-untyped-def]
+    """Add what the integrand lacks at a node to its sum; where that is not known, the smallest factor of V**2 becomes
+    negative.
+    """
+    exact, lacking, low = scratch.work[8, : rates.size], rows[LACKING, : rates.size], rows[FACTOR_LOW, : rates.size]
+    fill_exact_integrand(scratch.exact, node, rows, scratch.others, exact)
+    for j in range(rates.size):
+        known = exact[j] == exact[j]
+        lacking[j] += weight * choose(known, exact[j] - rates[j], 0.0)
+        low[j] = choose(known, low[j], -1.0)
+
+
+@Inner
+def start_sums(n, rows):  # type: ignore[no-untyped-def]
+    """Set the rows of sums and extremes over nodes to those of no nodes."""
+    for j in range(n):
+        rows[SUM, j], rows[REST, j], rows[VALUE, j], rows[CHANGE, j], rows[LACKING, j] = 0.0, 0.0, 0.0, inf, 0.0
+        rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
+        rows[FACTOR_AT_TURN, j] = inf
+
+
+@Inner
+def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Fill half periods, periods or loop times by the trapezoidal rule.
 
     The number of nodes is doubled until the rule has converged. Orbits for which it has are removed, as are those on
     which V**2 almost vanishes. On orbits that are ``mirrored`` only nodes up to the middle are evaluated.
+    Times are corrected ``exactly`` by the integrand in double-double arithmetic at the first nodes; the orbits are then
+    a block at most.
     """
     count = add_invariants(fns, kind, orbits, scratch)
     n, rows, work, chosen = orbits.size, orbits.rows, scratch.work, scratch.chosen
-    for j in range(n):
-        rows[SUM, j], rows[REST, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, 0.0, inf
-        rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
-        rows[FACTOR_AT_TURN, j] = inf
+    start_sums(n, rows)
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD else 1.0
     ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
     from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
     thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
     if has_tape(scratch) and kind != CIRCULATION:
-        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if scratch.careful else MIN_RATIO
+        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if exactly else MIN_RATIO
         from_rest, thrown, at_turns = least, least, 0.0
     ratios = from_rest, thrown, at_turns
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
         more[:] = lost[:] = 0.0
+        corrected = exactly and nodes <= EXACT_NODES
+        if corrected:
+            load_block(scratch.exact, scratch.param_count, orbits, scratch.others)
         for node in range(begin, last + 1):
-            rates = fill_integrand_batch(fns, kind, n, node, rows, p, work)
+            rates = fill_rates(fns, kind, n, node, rows, p, scratch)
             if mirrored and node == 0 and begin == 0:
                 for j in range(n):
                     rest, offset = rows[LAUNCH_V2, j] == 0.0, rows[OFFSET_LOW, j] + rows[OFFSET_HIGH, j]
@@ -339,6 +331,8 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
             elif kind == LIBRATION and begin == 0 and (node == 0 or node == last):
                 keep_factor_at_turn(n, rows, OFFSET_LOW if node == 0 else OFFSET_HIGH, work[3, :n])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
+            if corrected:
+                add_what_rates_lack(rows, node, weight, rates, scratch)
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
                 total = more[j] + term
@@ -353,12 +347,12 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
         judge_level(rows, n, nodes, ratios, work[0, :n])
         if begin > 0:
             rests, times = work[1, :n], work[2, :n]
-            relative_rests(orbits.params, -1 if kind == CIRCULATION else scratch.layout[2], rests)
+            relative_rests(orbits.params, scratch.layout[2] if kind != CIRCULATION else -1, rests)
             set_times(rows, nodes, ranges, rests, times)
             continuing = answer_level(rows, times, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:
                 return
-            orbits = shrink(orbits, count, chosen, continuing, NEEDED_ROWS[kind])
+            orbits = shrink(orbits, count, chosen, continuing, ROWS if exactly else NEEDED_ROWS[kind])
             n = orbits.size
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
 
