@@ -29,7 +29,7 @@ def check_size(outputs: Iterable[Expr], *, where: str) -> None:
             sizes[node] = 1 + sum(size(part) for part in node.args)
         return sizes[node]
 
-    largest = max(map(size, outputs))
+    largest = max(map(size, outputs), default=0)
     if largest > MAX_SIZE:
         raise EmissionError(
             f"{where}: a formula of {largest} operations, and at most {MAX_SIZE} are emitted; "
