@@ -16,6 +16,10 @@ SAMPLES_PER_PANEL = 16
 # The distance from a joint at which a quantity that jumps there is sampled, as a share of the segment.
 BESIDE_EDGE = 5e-10
 
+# The least distance of a sample from both ends, as a share of the segment. The end of one may be a panel's edge to a
+# rounding, and two samples there would hide a peak beside them.
+LEAST_DISTANCE = 1e-12
+
 # The numbers of turns after which it is asked whether a swing that dies away for ever has passed its extremes.
 TURNS_OF_SEARCH = (3, 4, 6, 8, 12, 16, 24, 32)
 
@@ -112,7 +116,8 @@ def samples(segment: Any, joints: Array, low: float, high: float) -> Array:
     inside = np.concatenate(
         [(edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), joints - beside, joints + beside]
     )
-    return np.unique([low, *inside[(inside > low) & (inside < high)], high])
+    close = LEAST_DISTANCE * (high - low)
+    return np.unique([low, *inside[(inside > low + close) & (inside < high - close)], high])
 
 
 def size_of(values: Array) -> float:

@@ -1,6 +1,7 @@
 """Swings that die away for ever have the extremes of their first swings, or approach them without end."""
 
 from math import cos, exp, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
+from gqm_sym.runtime.motion.parts.searched import samples
 
 NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
 
@@ -44,3 +46,31 @@ def test_a_load_that_is_approached_without_end() -> None:
     with pytest.raises(SolutionError, match=r"goes on for ever.*t_max"):
         _ = motion.normal_force_min
     assert np.isnan(module.sweep("normal_force_min", [0.5]).values).all()
+
+
+def test_samples_are_apart() -> None:
+    """A segment that begins or ends at a panel's edge to a rounding has one sample there."""
+
+    class Panels:
+        edges = np.array([0.0, 0.25, 0.75, 1.0])
+
+    for low, high in ((np.nextafter(0.25, 0.0), 1.0), (0.1, np.nextafter(0.75, 1.0)), (0.25, 0.75)):
+        phi = samples(Panels, np.empty(0), float(low), float(high))
+        assert phi[0] == low
+        assert phi[-1] == high
+        assert np.diff(phi).min() > 1e-3
+
+
+@pytest.mark.extended
+def test_a_peak_just_behind_a_change_of_contact(tmp_path: Path) -> None:
+    """The largest speed is found a few milliseconds after N changes its sign, at the end of a panel (it was missed by
+    5e-5, because two samples were a rounding apart).
+    """
+    curve = gqm.Curve.graph("sqrt(1+x**2)-exp(-x**2)", parameter="x")
+    force = gqm.Potential("4*x**2+exp(z)") + gqm.RotatingFrame() + gqm.QuadraticDrag()
+    module = gqm.build(gqm.derive(curve, force), name="peak_behind_change", folder=tmp_path)
+    for b in (0.99, 0.9999, 0.99999):
+        motion = module.solve(0.8764613586840031, 0, -1, t_max=4, Omega=0.3, b=b)
+        speeds = np.abs(motion.state(np.linspace(0.59, 0.62, 3001)).v)
+        assert motion.v_max.value == pytest.approx(speeds.max(), rel=1e-8)
+        assert motion.v_max.value >= speeds.max() * (1 - 1e-14)
