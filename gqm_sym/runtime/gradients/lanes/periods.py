@@ -221,18 +221,21 @@ def fill_by_stages(
         has_levels = isinstance(program, LaneProgram) and stage.make is not mean_program
         if stage.make is exact_swing_program:
             enough[:] = 0  # its errors are shares of the derivatives themselves
-        attempts = () if program is None else PASSES if has_levels else np.unique(enough[chosen]).tolist()
+        numbers = enough[chosen]
+        known = np.unique(numbers).tolist() if numbers.any() else [0]  # what is sorted takes long
+        attempts = () if program is None else PASSES if has_levels else known
         for most in attempts:
-            part = chosen if has_levels else chosen[enough[chosen] == most]
+            part = chosen if has_levels or len(known) == 1 else chosen[numbers == most]
             if not part.size:
                 break
             out, states = carried_out(stage, program, len(columns), (part, launches.kinds[part] >= EVEN), most)
             left = np.flatnonzero(states != ANSWERED)
-            out[left], is_open[part] = nan, False
+            out[left] = nan
             if part.size == len(found):
-                found[:, which] = out
+                found[:, which], is_open[:] = out, False
             else:
                 found[part if isinstance(which, slice) else part[:, np.newaxis], which] = out
+                is_open[part] = False
             is_open[part[left]] = True
             if has_levels:
                 levels = np.maximum(states[left].astype(np.int64) - LEFT, 0)

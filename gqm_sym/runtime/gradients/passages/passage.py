@@ -299,7 +299,7 @@ class PassageChanges:
         change = total + (error + (rest + partials[:, 1]))
         ratio = np.divide(change, 2.0 * half, where=half > 0.0, out=np.zeros_like(change))
         faster = v * ratio - local[1, 0] / ds * slopes
-        faster[count + 1] += is_at_cusp
+        faster[count + 1] += self._problem.launch.direction * is_at_cusp
 
         def whole(row: int) -> Array:
             found: Array = path[row, -1] * moved

@@ -114,18 +114,20 @@ def launched(moves, thrown, heading, ds, ds_ahead, force, origin):  # type: igno
     """Fill the change of the launch, given ds/dlam there and ahead, and dW/dlam; ``moves`` is that of the launch place.
 
     A body at rest that is thrown the other way comes back with little less speed. At a cusp, where ds/dlam and dW/dlam
-    vanish, times after a release at rest do not change with the place; the change with the speed does not follow from
-    the former, and is NaN.
+    have the limit of their ratio from ahead (`formula_changes.take_from_ahead`), times after a release at rest do not
+    change with the place; a body that is thrown the other way leaves the curve, and the change with the speed is NaN.
     """
     (v0, direction, other_force), last = thrown, moves.size - 1
     origin[:, :] = 0.0
     for i in range(moves.size):
         origin[SIGMA, i], origin[ARC, i] = moves[i], -(ds * moves[i])
     origin[Y, last] = 2.0 * v0
-    if v0 == 0.0 and ds <= CUSP_SHARE * ds_ahead:
-        origin[SIGMA, last - 1], origin[DELAY, last] = 0.0, nan
-    elif v0 == 0.0:
-        origin[DELAY, last] = -2.0 * ds / fabs(force) if direction == heading else 2.0 * ds / fabs(other_force)
+    if v0 == 0.0:
+        starts_at_cusp = ds <= CUSP_SHARE * ds_ahead
+        if starts_at_cusp:
+            origin[SIGMA, last - 1], origin[ARC, last - 1] = 0.0, 0.0
+        turned = nan if starts_at_cusp else 2.0 * ds / fabs(other_force)
+        origin[DELAY, last] = -2.0 * ds / fabs(force) if direction == heading else turned
 
 
 @Inner
@@ -294,7 +296,7 @@ def fill_along(laid, series, origins, halves, points, rows, found, states):  # t
 
 @entry(types.void(CUBE, MATRIX, CUBE, VECTOR, CUBE), checked=False)
 def fill_states(along, law, path, v, found):  # type: ignore[no-untyped-def]
-    """Fill the changes of states at given times.
+    """Fill the changes of states at given times; at a release from a cusp, where ds/dlam vanishes, nothing moves.
 
     Parameters
     ----------
@@ -313,7 +315,8 @@ def fill_states(along, law, path, v, found):  # type: ignore[no-untyped-def]
         lam, s, faster = found[LAM, j], found[S, j], found[SPEED_ROW, j]
         found[ARC_ROW, j] = arc
         for i in range(v.size):
-            lam[i] = sigma[i] - v[i] / ds[i] * delay[i]
+            rate = 1.0 if v[i] == 0.0 and ds[i] == 0.0 else ds[i]
+            lam[i] = sigma[i] - v[i] / rate * delay[i]
             s[i] = (ds[i] * sigma[i] + arc[i]) - v[i] * delay[i]
-            faster[i] = 0.5 * v[i] * share[i] - 0.5 * force[i] / ds[i] * delay[i]
+            faster[i] = 0.5 * v[i] * share[i] - 0.5 * force[i] / rate * delay[i]
     path_changes(path, v, found[LAM], found[X : Y_ROW + 1])

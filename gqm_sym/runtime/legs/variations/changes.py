@@ -13,7 +13,7 @@ from gqm_sym.runtime.legs.leg_record import END, HEADING, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
-from gqm_sym.runtime.legs.variations.chain import ORIGIN_ROWS, STATE_ROWS, fill_along, fill_states
+from gqm_sym.runtime.legs.variations.chain import ORIGIN_ROWS, SPEED_ROW, STATE_ROWS, fill_along, fill_states
 from gqm_sym.runtime.legs.variations.chart_law import law_of
 from gqm_sym.runtime.legs.variations.equation import CONTACT_SIGN, end_speed
 from gqm_sym.runtime.legs.variations.law import FormulaLaw, states_of
@@ -165,4 +165,9 @@ class Changes:
         path = self.law.path(*along.states[:2])
         found = np.empty((STATE_ROWS, self.variables, v.size))
         fill_states(along.changes, law, path.rows, v, found)
+        launch = self._problem.launch
+        at_cusp = (law[0] == 0.0) & (v == 0.0) & (along.states[0] == launch.lam0.value)
+        # The change of the speed does not follow from ds/dlam and dW/dlam, which vanish there.
+        found[SPEED_ROW, :, at_cusp] = 0.0
+        found[SPEED_ROW, -1, at_cusp] = launch.direction
         return found

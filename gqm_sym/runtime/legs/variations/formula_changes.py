@@ -4,7 +4,7 @@ The law at the nodes of panels is evaluated in doubles, whose roundings average 
 is evaluated in double-double arithmetic, because it may be a small difference there.
 """
 
-from math import inf
+from math import fabs, inf
 
 import numpy as np
 from numba import types
@@ -15,11 +15,12 @@ from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM, fill_signed_values_of
 from gqm_sym.runtime.gradients.lanes.evaluation import LANE_PROGRAM
-from gqm_sym.runtime.legs.leg_record import HEADING
+from gqm_sym.runtime.legs.leg_record import END, HEADING, START
 from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT
 from gqm_sym.runtime.legs.runs.whole_panels import with_panels
-from gqm_sym.runtime.legs.variations.chain import FOLLOWED, SIGMA, follow
+from gqm_sym.runtime.legs.variations.chain import CUSP_SHARE, FOLLOWED, SIGMA, follow
 from gqm_sym.runtime.legs.variations.divided import MAX_DIVISIONS, divided, joined_law, states_of_parts
 from gqm_sym.runtime.legs.variations.equation import (
     MARKS,
@@ -35,6 +36,9 @@ from gqm_sym.runtime.legs.variations.equation import (
 # The largest distance of a motion from the zero of the curve's parameter, in its width, for which places in doubles
 # suffice at the nodes of panels.
 MAX_DISTANCE = 10.0
+
+# How far from a cusp, as a share of the leg, the ratio of ds/dlam to dW/dlam is its limit, within as large a share.
+AHEAD_SHARE = 2.0**-53
 
 # The programs of the law in doubles, of the law in double-double arithmetic, and of ds/dlam and dW/dlam alone, each
 # with its work space.
@@ -117,6 +121,18 @@ def law_on_panels(programs, inputs, states, marks, far):  # type: ignore[no-unty
 
 
 @Inner
+def take_from_ahead(programs, inputs, record, states, law):  # type: ignore[no-untyped-def]
+    """Replace ds/dlam and dW/dlam at a launch from a cusp, where both vanish, by those a little ahead, whose ratio is
+    the limit of theirs.
+    """
+    parameters = inputs.shape[1] - 2
+    ahead = states[:, :1].copy()
+    ahead[PLACE_LOW, 0] += record[HEADING] * AHEAD_SHARE * fabs(record[END] - record[START])
+    both = exact_values(programs[4], programs[5], inputs, ahead)
+    law[0, 0], law[parameters + 2, 0] = both[0, 0], both[1, 0]
+
+
+@Inner
 def panelled(records, begins):  # type: ignore[no-untyped-def]
     """Return the records of runs with panels in place of rows of whole legs, and the indices at which they begin."""
     runs, is_whole = begins.size, False
@@ -153,7 +169,9 @@ def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed)
         if of_parts.size == 0:
             break
         law = joined_law(law, marks, law_on_panels(programs, inputs, of_parts, 0, far), before)
-    if v0 == 0.0 and direction != heading:
+    if timed and v0 == 0.0 and law[0, 0] <= CUSP_SHARE * law[0, marks + COUNT // 2]:
+        take_from_ahead(programs, inputs, records[begins[0] :], states, law)
+    elif v0 == 0.0 and direction != heading:
         turned = states[:, :1].copy()
         turned[STATE_HEADING, 0], turned[W, 0] = -heading, 0.0
         other_force = exact_values(programs[4], programs[5], inputs, turned)[1, 0]

@@ -85,7 +85,7 @@ class Derivatives(Positions):
 
     def _check_known(self, what: str, names: Iterable[str], values: Iterable[Any]) -> None:
         """Refuse derivatives along a charted curve with respect to parameters near which there is no such curve, and
-        with respect to the launch of a body that is released at rest from a cusp.
+        with respect to the speed of a body at rest at a cusp, through which it would be thrown out of the curve.
 
         Raises
         ------
@@ -100,8 +100,7 @@ class Derivatives(Positions):
             why = (
                 "the curve does not exist for neighbouring values (an exponent of a negative number must be an integer)"
                 if charted
-                else "the body is released at rest from a cusp, through which it would be thrown out of the curve, or "
-                "with losses, which hide the limit of the slopes that vanish there"
+                else "the body is released at rest from a cusp, through which it would be thrown out of the curve"
             )
             raise SolutionError(
                 f"{what}: there is no derivative with respect to {', '.join(unknown)}, because {why}; name the others "

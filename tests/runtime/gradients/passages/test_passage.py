@@ -200,9 +200,9 @@ def test_lifted_off_at_once(generated_folder: Path) -> None:
 )
 def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None:
     """Along a cycloid released from its cusp, the angle of the wheel is sqrt(g/R) times the time, and does not
-    change with the launch place in first order. With a launch speed v0 the body is earlier by v0/g. With losses, or for
-    a launch out of the curve, that derivative is refused; it was NaN, and that by the launch place wrong. At the launch
-    itself place and speed change by the launch speed alone; all of this was refused.
+    change with the launch place in first order. With a launch speed v0 the body is earlier by v0/g. At the launch
+    itself place and speed change by the launch speed alone. With losses the derivatives with respect to the launch
+    speed were refused, and at the launch all of them. A launch out of the curve is refused.
     """
     wheel = {"x": "R*(u - sin(u))", "z": "R*(cos(u) - 1)", "parameter": "u", "domain": (0, 3)}
     curve = gqm.Curve.parametric(**wheel, parameters={"R": "1/2"})
@@ -214,18 +214,36 @@ def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None
     names, wanted = ("R", "g", "lam0"), [0.5 * time / given[0], -0.5 * time / given[1], 0.0]
     assert list(motion.gradient("time_at", names, lam=2).values()) == pytest.approx(wanted, rel=1e-14, abs=1e-15)
     swept = module.sweep("time_at", lam0=[0.0, 0.0], lam=2.0, gradient=(*names, "v0")).gradient
-    np.testing.assert_allclose(swept[:, :3], [wanted, wanted], rtol=1e-14, atol=1e-15)
-    if force is not RUBBING:
-        assert motion.gradient("time_at", "v0", lam=2)["v0"] == pytest.approx(-1.0 / given[1], rel=1e-15)
-        np.testing.assert_allclose(swept[:, 3], -1.0 / given[1], rtol=1e-15)
-        rate = np.sqrt(given[1] / given[0])
-        assert motion.sensitivity([0.1, 0.2], "v0").lam == pytest.approx(rate / given[1], rel=1e-14)
-        at_launch = motion.sensitivity(0.0, (*names, "v0"))
-        np.testing.assert_array_equal([at_launch.lam, at_launch.x, at_launch.z], 0.0)
-        assert at_launch.v.tolist() == [0.0, 0.0, 0.0, 1.0]
-        motion = module.solve(0, 0, -1)
-    else:
-        assert np.isnan(swept[:, 3]).all()
+    np.testing.assert_allclose(swept, [[*wanted, -1.0 / given[1]]] * 2, rtol=1e-14, atol=1e-15)
+    assert motion.gradient("time_at", "v0", lam=2)["v0"] == pytest.approx(-1.0 / given[1], rel=1e-15)
+    rate = np.sqrt(given[1] / given[0])
+    assert motion.sensitivity([0.1, 0.2], "v0").lam == pytest.approx(rate / given[1], rel=1e-14)
+    at_launch = motion.sensitivity(0.0, (*names, "v0"))
+    np.testing.assert_array_equal([at_launch.lam, at_launch.x, at_launch.z], 0.0)
+    assert at_launch.v.tolist() == [0.0, 0.0, 0.0, 1.0]
+    motion = module.solve(0, 0, -1)
     for ask in (lambda: motion.gradient("time_at", lam=2), lambda: motion.sensitivity([0.1, 0.2])):
         with pytest.raises(SolutionError, match="respect to v0, because the body is released at rest from a cusp"):
             ask()
+
+
+@pytest.mark.parametrize(
+    ("mu", "b"),
+    [(0, 0), pytest.param(0.2, 0, marks=pytest.mark.extended), pytest.param(0.2, 0.5, marks=pytest.mark.extended)],
+)
+def test_released_backwards_from_a_slanted_cusp(mu: float, b: float, generated_folder: Path) -> None:
+    """With a launch speed v0 the body is earlier by v0 over the acceleration at the cusp, which friction diminishes by
+    the share mu where the track falls by 45 degrees. Without losses, the derivative of the velocity at the launch had
+    the wrong sign for a body that moves backwards; with losses all of this was refused.
+    """
+    force = gqm.Gravity()
+    for loss, is_there in ((gqm.CoulombFriction(mu=mu), mu), (gqm.QuadraticDrag(b=b), b)):
+        force = force + loss if is_there else force
+    curve = gqm.Curve.parametric(x="u**2", z="u**3/2 - u**2", parameter="u", domain=(-1, 0))
+    name = f"slanted_cusp_{mu > 0}_{b > 0}"
+    module = gqm.build(gqm.derive(curve, force), name=name, folder=generated_folder)
+    motion, delay = module.solve(0, 0, -1), -np.sqrt(2.0) / (9.81 * (1.0 - mu))
+    assert motion.gradient("time_at", "v0", lam=-0.8)["v0"] == pytest.approx(delay, rel=1e-14)
+    at_launch = motion.sensitivity(0.0, ("g", "lam0", "v0"))
+    found, wanted = [at_launch.lam, at_launch.s, at_launch.v], [[0, 0, 0], [0, 0, 0], [0, 0, -1]]
+    np.testing.assert_allclose(found, wanted, atol=1e-15)
