@@ -21,8 +21,8 @@ NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
     [(1.0, 0.0), *(pytest.param(*launch, marks=pytest.mark.extended) for launch in [(0.3, 2.0), (0.0, 12.0)])],
 )
 def test_a_swing_that_dies_away_for_ever(lam0: float, v0: float) -> None:
-    """Its extremes are those of its first swings, in sweeps too, which compiled code answers, and so are their derivatives; the largest speed from
-    rest is that of the closed form.
+    """Its extremes are those of its first swings, in sweeps too, which compiled code answers, and so are their
+    derivatives; the largest speed from rest is that of the closed form.
     """
     module = load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag")
     motion, whole = module.solve(lam0, v0), module.solve(lam0, v0, t_max=60)
