@@ -72,7 +72,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     question = QUESTIONS[quantity]
     if quantity.startswith("normal_force") and not formulas.signed:
         # The rows of a leg hold the length of the contact force, or the module has its square.
-        if loss.squared_contact is None and (loss.linear or formulas.sided or formulas.directed):
+        if loss.squared_contact is None and (loss.linear or formulas.sided):
             return None
         question = questions.LEAST_LENGTH if question == questions.LEAST_LOAD else questions.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from scipy.integrate import solve_ivp
+from scipy.optimize import minimize_scalar
 
 import gqm_sym as gqm
 from gqm_sym.errors import GQMError, SolutionError
@@ -100,6 +102,48 @@ def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
         assert swept.values == pytest.approx([float(value)] * 2, rel=FEW)
     assert module.sweep("t_end", [start], c=c, t_max=30.0).values == 30.0
     assert module.sweep("t_end", [start], c=c).status == quantities.NOT_PERIODIC
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize("quantity", ["normal_force_max", "normal_force_min"])
+def test_the_contact_force_with_friction_in_a_rotating_frame(quantity: str, build: Build) -> None:
+    """On a space curve N contains the Coriolis force, so it is not linear in V**2 and depends on the direction of
+    motion. Newton's equations in the rotating frame are integrated beside, up to before the first turn.
+    """
+    curve = gqm.Curve.space(x="u", y="u**2/3", z="u**2/2 + sin(2*u)/10", parameter="u")
+    module = build("rubbed_in_a_rotating_frame", curve, gqm.RotatingFrame(Omega="0.5") + gqm.CoulombFriction(mu="0.2"))
+    starts, end, axis = np.array([-1.2, -0.7, 0.9]), 0.9, np.array([0.0, 0.0, 0.5])
+    swept = module.sweep(quantity, starts, t_max=end)
+    assert swept.route_counts() == {"single": 3}
+
+    def contact(u: float, rate: float) -> tuple[float, float]:
+        """Return u'' without friction, and N/m."""
+        place = np.array([u, u * u / 3, 0.5 * u * u + 0.1 * math.sin(2 * u)])
+        first = np.array([1.0, 2 * u / 3, u + 0.2 * math.cos(2 * u)])
+        second = np.array([0.0, 2 / 3, 1.0 - 0.4 * math.sin(2 * u)])
+        spin = np.cross(axis, np.cross(axis, place)) + 2 * np.cross(axis, rate * first)
+        pull = np.array([0.0, 0.0, -G]) - spin - rate * rate * second
+        along = float(pull @ first) / float(first @ first)
+        return along, float(np.linalg.norm(pull - along * first))
+
+    def moving(_: float, state: Any, way: float) -> list[float]:
+        u, rate = state
+        along, load = contact(u, rate)
+        return [rate, along - way * 0.2 * load / math.hypot(1.0, 2 * u / 3, u + 0.2 * math.cos(2 * u))]
+
+    sign, times = 1.0 if quantity.endswith("max") else -1.0, np.linspace(0.0, end, 400)
+    for start, value in zip(starts.tolist(), swept.values.tolist(), strict=True):
+        given: dict[str, Any] = {"rtol": 1e-13, "atol": 1e-15, "args": (-math.copysign(1.0, start),)}
+        along = solve_ivp(moving, (0.0, end), [start, 0.0], "DOP853", dense_output=True, **given).sol
+        loads = [sign * contact(*along(t))[1] for t in times]
+        top = int(np.argmax(loads))
+        found = minimize_scalar(
+            lambda t, along=along: -sign * contact(*along(t))[1],
+            bounds=(times[max(top - 1, 0)], times[min(top + 1, 399)]),
+            method="bounded",
+            options={"xatol": 1e-10},
+        )
+        assert value == pytest.approx(sign * max(*loads, -float(found.fun)), rel=1e-11)
 
 
 @pytest.mark.extended
