@@ -60,6 +60,7 @@ from gqm_sym.runtime.legs.questions import (
     conclude_at_rest,
     force_is_unbounded,
     goes_on,
+    has_passed,
     sought_extreme,
 )
 from gqm_sym.runtime.legs.runs.ends import END_LIMIT, END_RECORD_FULL, END_TOO_MANY_PANELS, END_TOO_NARROW, END_TURN
@@ -132,11 +133,13 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
         findings = after_leg(dissipation, p, body, question, findings, record)
         if findings.arrival != findings.arrival or findings.peak != findings.peak:
             break
-        if not goes_on(body, question, findings.arrival):
+        passed = question >= LEAST_SPEED and body[HORIZON] == inf
+        passed = passed and has_passed(dissipation, p, joints.breaks, body, question, findings.peak, record)
+        if not goes_on(body, question, findings.arrival, passed):
             is_at_limit = question >= LEAST_LOAD and body[ENDING] == END_LIMIT
             if is_at_limit and force_is_unbounded(dissipation, p, body, findings.peak):
                 break
-            return conclude(body, question, findings)
+            return conclude(body, question, findings, passed)
         if what == END_TURN and question < LEAST_LOAD and question != ARRIVAL:
             predicted, place, agrees = predicted_rest(dissipation, p, joints, body, before, predicted, record)
             agreements = agreements + 1 if agrees else 0

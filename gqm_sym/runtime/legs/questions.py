@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.calls import call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
@@ -28,7 +29,17 @@ from gqm_sym.runtime.legs.body import (
     WIDTH_BEFORE,
 )
 from gqm_sym.runtime.legs.leg_reading import passage
-from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, HEADING, LAPS_BEFORE, START, START_V2
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    BEGIN,
+    BEGIN_LOW,
+    END,
+    HEADING,
+    LAPS_BEFORE,
+    START,
+    START_V2,
+)
 from gqm_sym.runtime.legs.panels.equation import forces_on
 from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load, slope_of_v2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
@@ -50,8 +61,12 @@ MAX_PAUSES = 60
 # the end is searched for without storing them.
 MAX_TURNS, MOST_TURNS = 20_000, 1_000_000
 
-# The number of turns after which the extremes of the speed of a swing that dies away for ever may be known.
-TURNS_TO_SPEEDS = 3.0
+# The numbers of turns between which the extremes of a swing that dies away for ever may become known.
+FEWEST_TURNS, MOST_SWINGS = 3.0, 32.0
+
+# The number of places, and the number of them for each panel and each break, at which the contact force on a body at
+# rest is compared with an extreme; and the number of roundings up to which it is not beyond that.
+PLACES, PLACES_PER_PANEL, PLACES_PER_BREAK, EQUAL_ROUNDINGS = 64, 16, 4, 8.0
 
 # If at the present rate the swings would vanish after more turns than this, no loss of energy shows in doubles.
 UNSEEN_TURNS = 2.0**50
@@ -98,8 +113,43 @@ def may_still_end(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
-    """Return whether the next leg has to be followed too."""
+def has_passed(dissipation, p, breaks, body, question, peak, record):  # type: ignore[no-untyped-def]
+    """Return whether a swing that dies away for ever has passed its extreme ``peak``, given the record of its last leg.
+
+    Once a swing is within the one before, all later ones are, and the body is slower there
+    (`motion.parts.searched`). Its load at a place then is between that at rest and one that it has had. The square of
+    the length of a contact force is a parabola in V**2: it is largest at an end, and nowhere below its vertex.
+    """
+    is_within = 0.0 < body[LAST_WIDTH] < body[WIDTH_BEFORE]
+    if not (dies_away(body) and is_within and body[TURNS] >= FEWEST_TURNS):
+        return False
+    if question < LEAST_LOAD:
+        return True
+    is_length, sign, point = question >= LEAST_LENGTH, sought_extreme(question)[1], point_buffer()
+    if is_length and dissipation.squared_contact == 0:
+        return False
+    forces = forces_on(dissipation, p, 1)
+    count = PLACES + PLACES_PER_PANEL * int(record[AHEAD] + record[BACK]) + PLACES_PER_BREAK * breaks.size
+    for k in range(count):
+        place = record[START] + k / (count - 1.0) * (record[END] - record[START])
+        if is_length:
+            point[0] = place
+            call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])
+            square = point[2]
+            if sign < 0.0 and point[3] < 0.0 < point[4]:
+                square -= 0.25 * point[3] ** 2 / point[4]
+            load = sqrt(max(square, 0.0))
+        else:
+            slope_of_v2(forces, place, 0.0, 0, point)
+            load = point[5]
+        if not sign * load <= peak + EQUAL_ROUNDINGS * ULP * max(fabs(peak), fabs(load)):
+            return False
+    return True
+
+
+@Inner
+def goes_on(body, question, arrival, passed):  # type: ignore[no-untyped-def]
+    """Return whether the next leg has to be followed too; ``passed`` is what `has_passed` returns."""
     if body[ENDING] != 0.0 or arrival < inf:
         return False
     # A body that has turned at two points reaches no place outside of them any more.
@@ -110,7 +160,7 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
     if question == ARRIVAL:
         return True
     if question >= LEAST_SPEED and dies_away(body):
-        return question < LEAST_LOAD and body[TURNS] < TURNS_TO_SPEEDS
+        return not passed and body[TURNS] < MOST_SWINGS
     return may_still_end(body) and (question <= REST_PLACE or body[TURNS] <= MAX_TURNS)
 
 
@@ -186,18 +236,17 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def conclude(body, question, findings):  # type: ignore[no-untyped-def]
-    """Return the answer for a body that has been followed long enough, and its status."""
+def conclude(body, question, findings, passed):  # type: ignore[no-untyped-def]
+    """Return the answer for a body that has been followed long enough, and its status; ``passed`` is what `has_passed`
+    returns.
+    """
     if question == ARRIVAL:
         is_there = findings.arrival < inf and findings.arrival <= body[HORIZON]
         return (findings.arrival, FOUND) if is_there else (np.nan, NONE)
     ends = body[ENDING] != 0.0 and body[ENDING] != END_ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
     if not isfinite(end) and question >= LEAST_SPEED and dies_away(body):
-        # Once a swing is within the one before, all later ones are, and the body is slower there
-        # (`motion.parts.searched`). For its loads, `solve` decides.
-        is_known = question < LEAST_LOAD and body[TURNS] >= TURNS_TO_SPEEDS and body[LAST_WIDTH] < body[WIDTH_BEFORE]
-        if not is_known:
+        if not passed:
             return np.nan, LEFT
     elif not isfinite(end):
         is_slow = body[TURNS] > MAX_TURNS and body[MAY_END] != 0.0 and turns_at_this_rate(body) < inf

@@ -125,12 +125,15 @@ class Quantity(NamedTuple):
         those of the phase angles.
     is_quadratic : bool
         Whether the quantity is a quadratic polynomial of the speed at each place.
+    is_length : bool
+        Whether its square is a quadratic polynomial of V**2 at each place, as that of a contact force in space.
     """
 
     at: Callable[..., Array]
     of_state: Callable[[Any], float]
     beside: Callable[[TimedSegment, Array, Array], Array] | None = None
     is_quadratic: bool = True
+    is_length: bool = False
 
 
 def _speeds(timed: TimedSegment, phi: Array, share: float = 1.0) -> Array:
@@ -144,7 +147,8 @@ SPEED = Quantity(_speeds, lambda state: abs(state.v))
 def force_of(problem: "Problem") -> Quantity:
     """Return the contact force in N, as a quantity along motions."""
     at, beside = partial(contact_force_on, problem), partial(contact_force_at, problem)
-    return Quantity(at, lambda state: float(state.normal_force), beside, bool(problem.formulas.signed))
+    signed, directed = bool(problem.formulas.signed), bool(problem.formulas.directed)
+    return Quantity(at, lambda state: float(state.normal_force), beside, signed, not (signed or directed))
 
 
 def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:

@@ -1,6 +1,6 @@
 """The smallest and largest speed or contact force of one of many launches, by formulas or on the table of a curve."""
 
-from math import inf, nan, sqrt
+from math import fabs, inf, nan, sqrt
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
@@ -10,11 +10,13 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     FORCE,
     FORCE_SQUARED,
     V2,
+    WHOLE,
     extreme,
     fill_force,
     fill_squares,
     frame_buffer,
     point_buffer,
+    sample_loads,
 )
 from gqm_sym.runtime.sweep.tables.extremes import (
     passage_extreme,
@@ -24,25 +26,33 @@ from gqm_sym.runtime.sweep.tables.extremes import (
 )
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 
+# The share up to which an extreme is taken for the value at the end of a motion.
+STOP_SHARE = 1e-3
+
 EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
 
 @Inner
-def sought_for(curve, orbit, quantity):  # type: ignore[no-untyped-def]
-    """Return the function whose extreme a quantity is with the direction of launch if it depends on that, as
-    `orbit_extremes.is_loop` takes them; and 1 for the largest value, -1 for the smallest.
+def sought_for(curve, orbit, quantity, shares):  # type: ignore[no-untyped-def]
+    """Return the function whose extreme a quantity is, with the direction of launch if it depends on that and the
+    shares of the period between which it is sought, as `orbit_extremes.is_loop` takes them; and 1 for the largest
+    value, -1 for the smallest.
     """
     force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
     function = V2 if not force else FORCE if curve.signed else FORCE_SQUARED
-    return (function, orbit.direction if function == FORCE_SQUARED and curve.directed else 0), sign
+    direction = orbit.direction if function == FORCE_SQUARED and curve.directed else 0
+    return (function, direction, *shares), sign
 
 
 @Inner
-def extreme_by_itself(curve, orbit, quantity, max_grids):  # type: ignore[no-untyped-def]
+def extreme_by_itself(curve, orbit, quantity, shares, max_grids):  # type: ignore[no-untyped-def]
     """Return an extreme of speed or contact force on an orbit without a table, from up to ``max_grids`` grids; NaN if
     it is not accurate.
+
+    ``shares`` of the period are the ends of what is passed of a libration, if the force depends on the direction of
+    motion (`orbit_extremes.WHOLE`).
     """
-    sought, sign = sought_for(curve, orbit, quantity)
+    sought, sign = sought_for(curve, orbit, quantity, shares)
     low, high = orbit.low, orbit.high
     if orbit.leaves == orbit.direction:  # the body does not come to the turning point behind it
         low, high = (0.0, high) if orbit.leaves > 0 else (low, 0.0)
@@ -51,11 +61,22 @@ def extreme_by_itself(curve, orbit, quantity, max_grids):  # type: ignore[no-unt
 
 
 @Inner
+def is_extreme_at_stop(curve, part, quantity, shares, value):  # type: ignore[no-untyped-def]
+    """Return whether an extreme may be the value where the part of an orbit ends (`until.part_until`)."""
+    places, values, frame = point_buffer(), point_buffer(), frame_buffer()
+    sought = sought_for(curve, part, quantity, shares)[0]
+    places[0] = 0.0 if sought[1] == 0 and part.leaves < 0 else 1.0
+    sample_loads(curve, part, sought, places, 1, values, frame, False)
+    stop = values[0] if sought[0] == FORCE else sqrt(values[0])
+    return not fabs(stop - value) > STOP_SHARE * fabs(value)
+
+
+@Inner
 def load_at(curve, orbit, quantity, offset, v2):  # type: ignore[no-untyped-def]
     """Return the speed or the contact force of which an extreme is asked for, at an offset from the launch; the motion
     has the direction of the launch.
     """
-    (function, direction), _ = sought_for(curve, orbit, quantity)
+    (function, direction, _, _), _ = sought_for(curve, orbit, quantity, WHOLE)
     places, squares, out, frame = point_buffer(), point_buffer(), point_buffer(), frame_buffer()
     places[0], squares[0] = orbit.lam0 + offset, v2
     if function == V2:
@@ -75,7 +96,7 @@ def extreme_on(curve, orbit, passage, stop, half_v2_at_edges, quantity):  # type
     If the force depends on the direction of motion and the body turns, what it passes in each direction is searched by
     itself.
     """
-    (function, direction), sign = sought_for(curve, orbit, quantity)
+    (function, direction, _, _), sign = sought_for(curve, orbit, quantity, WHOLE)
     turns, passes_whole = stop.turns, stop.panel < 0
     if passes_whole and not (orbit.circulates or orbit.leaves == orbit.direction):
         turns = 1

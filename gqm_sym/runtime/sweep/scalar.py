@@ -23,7 +23,14 @@ from gqm_sym.runtime.compiled.strided import (
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.quadrature.trapezoid import trapezoid_rates, trapezoid_workspace
-from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on_table, load_at
+from gqm_sym.runtime.sweep.extremes import (
+    EXTREMES,
+    extreme_by_itself,
+    extreme_on_table,
+    is_extreme_at_stop,
+    load_at,
+    sought_for,
+)
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, SweptCurve
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
@@ -42,17 +49,20 @@ from gqm_sym.runtime.sweep.quantities import (
     UNDECIDED,
 )
 from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself, until_loss
-from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS
+from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS, WHOLE
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 from gqm_sym.runtime.sweep.single.until import (
+    ACCURATE_PART,
+    ROUGH_PART,
     checked_arrival,
+    ends_beside_turn,
     find_for,
     is_beside_turn,
     is_later,
     part_until,
     stops_beside_turn,
 )
-from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, follows_formulas, value_by_itself
+from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, follows_formulas
 from gqm_sym.runtime.sweep.tables.last_places import stop_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP, Stop, loss_of_contact
@@ -173,16 +183,22 @@ def passes_all(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignor
 @Inner
 def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ignore[no-untyped-def]
     """Return an extreme up to the last time, before which a body does not pass its whole orbit; NaN if it is not
-    accurate, or if it depends on the direction of motion and the orbit is not on a table.
+    accurate.
 
     ``asked`` is the quantity and the last time.
     """
     (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
-    by_formulas = not curve.directed and (passage.panels <= FEW_PANELS or follows_formulas(curve))
-    if by_formulas:  # beside hilltops they have more digits than the table
-        decided, part = part_until(curve, orbit, t_max, buffers.work)
-        if decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
-            value = value_by_itself(curve, part, quantity, nan, buffers)
+    (_, direction, _, _), sign = sought_for(curve, orbit, quantity, WHOLE)
+    is_directed = direction != 0
+    if passage.panels <= FEW_PANELS or follows_formulas(curve):  # beside hilltops they have more digits than the table
+        what, part, shares = part_until(curve, orbit, t_max, is_directed, buffers.work)
+        # Where the part ends roughly at the last time, it has a largest value if that is not at its end.
+        is_known = what == ACCURATE_PART or (what == ROUGH_PART and sign > 0.0)
+        if is_known and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
+            value = extreme_by_itself(curve, part, quantity, shares, MAX_GRIDS)
+            is_rough = what == ROUGH_PART or (is_directed and ends_beside_turn(orbit, part, shares[1]))
+            if is_rough and is_extreme_at_stop(curve, part, quantity, shares, value):
+                value = nan
     if value != value and tabulated and (passage.panels > FEW_PANELS or curve.directed):
         decided, stop = stop_at(curve, orbit, passage, edges, t_max)
         if decided and not (quantity == MIN_SPEED and is_beside_turn(orbit, stop.turns, stop.place - orbit.lam0)):
@@ -239,7 +255,7 @@ def fill_up_to_loss(curve, orbit, passage, tabulated, asked, buffers, out):  # t
         edges = buffers.half_v2_at_edges, tabulated
         out[0] = extreme_on_table(curve, orbit, passage, stop, edges, quantity)
     else:
-        out[0] = extreme_by_itself(curve, left, quantity, MAX_GRIDS)
+        out[0] = extreme_by_itself(curve, left, quantity, WHOLE, MAX_GRIDS)
     return ANSWERED if isfinite(out[0]) else UNDECIDED
 
 

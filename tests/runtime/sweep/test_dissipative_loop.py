@@ -102,6 +102,38 @@ def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
     assert module.sweep("t_end", [start], c=c).status == quantities.NOT_PERIODIC
 
 
+@pytest.mark.extended
+@pytest.mark.parametrize("lean", ["0", "0.6"])
+def test_extremes_of_swings_that_die_away(lean: str, build: Build) -> None:
+    """On a ring that leans, the extremes of a swing with quadratic drag that goes on for ever are those of its first
+    way down. Compiled code finds them, and `solve` too.
+
+    With the angle from the bottom, W' = -2 g cos(lean) sin(th) + 2 c W on that way, and the contact force has the parts
+    W + g cos(lean) cos(th) and g sin(lean).
+    """
+    curve = gqm.Curve.space(
+        x="sin(th)", y=f"-sin({lean})*cos(th)", z=f"-cos({lean})*cos(th)", parameter="th", period="2*pi"
+    )
+    module = build("leaning_ring" + lean[2:], curve, gqm.QuadraticDrag(b="c_d"))
+    start, c = np.linspace(0.3, 2.0, 12), mpf("0.2")
+    g, across = mpf(G) * mp.cos(mpf(lean)), mpf(G) * mp.sin(mpf(lean))
+    most = []
+    for begin in map(mpf, start.tolist()):
+
+        def w(th: Any, begin: Any = begin) -> Any:
+            one, other = (2 * g * (mp.cos(x) + 2 * c * mp.sin(x)) / (1 + 4 * c * c) for x in (th, begin))
+            return one - other * mp.exp(2 * c * (th - begin))
+
+        place = mp.findroot(lambda th, w=w: mp.diff(w, th) - g * mp.sin(th), 0.1)
+        most.append(float(mp.hypot(w(place) + g * mp.cos(place), across)))
+    swept = [module.sweep(f"normal_force_{name}", start, c_d=0.2) for name in ("max", "min")]
+    assert all(found.route_counts() == {"single": 12} for found in swept)
+    assert swept[0].values == pytest.approx(most, rel=FEW)
+    motion = module.solve(start[5], c_d=0.2)
+    solved = motion.normal_force_max.value, motion.normal_force_min.value
+    assert solved == pytest.approx([found.values[5] for found in swept], rel=FEW)
+
+
 CASES = {
     "friction": (ring, gqm.CoulombFriction, {"mu": 0.15}),
     "drag": (ring, lambda: gqm.QuadraticDrag(b="c"), {"c": 0.2}),

@@ -1,6 +1,6 @@
 """The part of a motion in which an extreme is searched for, and the phase angles at which quantities are sampled."""
 
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,7 @@ def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Traj
     SolutionError
         As `extreme`.
     """
-    if quantity.is_quadratic and _is_endless(motion):
+    if (quantity.is_quadratic or quantity.is_length) and _is_endless(motion):
         for turns in TURNS_OF_SEARCH:
             trajectory = motion._up_to_turn(turns)
             if trajectory is None:
@@ -89,17 +89,19 @@ def _is_exceeded(quantity: Any, sign: int, segments: tuple[TimedSegment, ...], b
 
     Two paths of a body in the plane of place and speed do not cross. If the last two legs, which are the segments from
     ``begin`` on, end nearer to the place where they began, all later states lie between them: at each place the body is
-    slower than it was there.
+    slower than it was there. Three values then show the largest one of a parabola in V, or of the square of a length,
+    which is one in V**2.
     """
+    middle, power = (sqrt(0.5), 2) if quantity.is_length else (0.5, 1)
     reached = inside = -np.inf
     size = 0.0
     for k, timed in enumerate(segments):
         low, high = min(timed.phi_start, timed.phi_stop), max(timed.phi_start, timed.phi_stop)
         phi = samples(timed.segment, np.empty(0), low, high)
-        full = sign * quantity.at(timed, phi, 1.0)
+        full = sign * quantity.at(timed, phi, 1.0) ** power
         reached, size = max(reached, float(full.max())), max(size, size_of(full))
         if k >= begin:
-            none, half = (sign * quantity.at(timed, phi, share) for share in (0.0, 0.5))
+            none, half = (sign * quantity.at(timed, phi, share) ** power for share in (0.0, middle))
             bend, rise = 2.0 * (none - 2.0 * half + full), 4.0 * half - 3.0 * none - full
             has_top = (bend < 0.0) & (rise > 0.0) & (rise < -2.0 * bend)
             top = none - np.divide(rise**2, 4.0 * bend, where=has_top, out=np.zeros_like(bend))

@@ -14,11 +14,12 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
-from gqm_sym.runtime.double_double.interpreter import BLOCK
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+from gqm_sym.runtime.sweep.batch.agm_times import half_periods_by_agm
 from gqm_sym.runtime.sweep.batch.arrivals import answer_arrivals
 from gqm_sym.runtime.sweep.batch.exact_ends import find_exact_ends, keeps_ends, refines_ends
 from gqm_sym.runtime.sweep.batch.exact_nodes import fill_checks, leave_unchecked
+from gqm_sym.runtime.sweep.batch.first_trials import start_at_first_hill
 from gqm_sym.runtime.sweep.batch.known_turns import fill_axis_offsets
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
@@ -46,16 +47,17 @@ from gqm_sym.runtime.sweep.batch.rows import (
     Orbits,
     Scratch,
     borrowed_orbits,
+    borrowed_waiting,
     contains,
     gather,
     has_tape,
     partition,
     shrink,
+    waiting_room,
 )
 from gqm_sym.runtime.sweep.batch.times import (
     AGM_LIBRATION,
     AXIS_LIBRATION,
-    half_periods_by_agm,
     times_by_trapezoid,
 )
 from gqm_sym.runtime.sweep.batch.turning_points import (
@@ -63,10 +65,10 @@ from gqm_sym.runtime.sweep.batch.turning_points import (
     prove,
     search,
     set_ends,
-    start_at_first_hill,
     start_search,
     start_search_behind,
 )
+from gqm_sym.runtime.sweep.batch.waiting import answer_exact_times, answer_waiting, no_room
 from gqm_sym.runtime.sweep.batch.wells import (
     borrowed_wells,
     prove_about_axis,
@@ -130,27 +132,20 @@ def fill_ends(orbits, kind, answers):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def answer_times(fns, kind, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Fill half periods, periods or loop times."""
+def answer_times(fns, kind, refined, orbits, spares, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Fill half periods, periods or loop times.
+
+    If their ends are ``refined``, orbits whose V**2 in doubles is too rough wait for double-double arithmetic.
+    """
     if kind.kind == AGM_LIBRATION:
         half_periods_by_agm(fns, orbits, scratch, quantity, answers)
-    else:
-        times_by_trapezoid(fns, kind.kind, kind.mirrored, False, orbits, scratch, quantity, answers)
-
-
-@Inner
-def answer_exact_times(fns, mirrored, orbits, block, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Fill half periods or periods that are corrected by double-double arithmetic; ``block`` stores some orbits
-    meanwhile.
-    """
-    for begin in range(0, orbits.size, BLOCK):
-        size = min(BLOCK, orbits.size - begin)
-        for j in range(size):
-            scratch.others[j] = begin + j
-        gather(orbits, scratch.param_count, scratch.others, size, block, ROWS)
-        some = Orbits(size, block.rows, block.params)
-        leave_unchecked(some)
-        times_by_trapezoid(fns, LIBRATION, mirrored, True, some, scratch, quantity, answers)
+        return
+    _, block, pairs = spares
+    waiting = pairs[1] if kind.mirrored else pairs[0]
+    rough = waiting if refined and kind.kind == LIBRATION else no_room(waiting)
+    times_by_trapezoid(fns, (kind.kind, kind.mirrored, False), orbits, rough, scratch, quantity, answers)
+    if waiting.number[0] >= BATCH:
+        answer_waiting(fns, kind.mirrored, waiting, block, scratch, quantity, answers)
 
 
 @Inner
@@ -158,7 +153,7 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
     """Prove orbits of one kind, and fill the answers for those that are proved; ``spares`` store the others and copies
     meanwhile.
     """
-    count, (spare, block) = scratch.param_count, spares
+    count, (spare, block, pair) = scratch.param_count, spares
     for pieces in (SHARED, FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         if pieces == SHARED and not kind.shared:
             continue
@@ -188,13 +183,14 @@ def answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers):
         elif orbits.size:
             fill_ends(orbits, kind.kind, answers)
             if kind.kind == LIBRATION and scratch.careful:
-                answer_exact_times(fns, kind.mirrored, orbits, block, scratch, quantity, answers)
+                exactly = orbits.size, block, pair[0]
+                answer_exact_times(fns, kind.mirrored, orbits, exactly, scratch, quantity, answers)
             else:
                 if refined:
                     fill_checks(scratch.exact, count, orbits, scratch.ends, scratch.others)
                 else:
                     leave_unchecked(orbits)
-                answer_times(fns, kind, orbits, scratch, quantity, answers)
+                answer_times(fns, kind, refined, orbits, (spare, block, pair), scratch, quantity, answers)
         if unproved == 0:
             return
         orbits, spare = Orbits(waiting, spare.rows, spare.params), orbits
@@ -313,7 +309,7 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     The buffers belong to the caller. Otherwise numba would count references to arrays at each call, by instructions
     that wait for memory.
     """
-    (first, spare, laps, rest), scratch, domain, wells = buffers
+    (first, spare, laps, rest), pair, scratch, domain, wells = buffers
     columns, domain = borrowed(columns), borrowed(domain)
     answers = Answers(borrowed(answers.values), borrowed(answers.status), borrowed(answers.route))
     first, spare, laps = borrowed_orbits(first), borrowed_orbits(spare), borrowed_orbits(laps)
@@ -324,21 +320,25 @@ def answer_all(fns, columns, monotone, quantity, answers, buffers):  # type: ign
     exact = RecordedFormulas(tape, borrowed(registers_of_places), borrowed(p))
     made = scratch.param_count, scratch.layout, chosen, others, work, borrowed(scratch.ends)
     scratch = Scratch(*made, scratch.careful, exact, columns, borrowed(scratch.rates))
-    wells = borrowed_wells(wells)
+    wells, pair = borrowed_wells(wells), (borrowed_waiting(pair[0]), borrowed_waiting(pair[1]))
+    spares = spare, laps, pair
     for begin in range(0, answers.status.size, BATCH):
         number = min(BATCH, answers.status.size - begin)
         orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
         load_launches(fns, columns, begin, number, orbits, domain, monotone, scratch)
         if set_ends_from_rest(fns, orbits.size, orbits.rows, domain, monotone, wells, scratch.work):
             kind = OrbitKind(fastest_method(fns), True, True, True, True)
-            answer_orbits(fns, kind, orbits, (spare, laps), wells, scratch, quantity, answers)
+            answer_orbits(fns, kind, orbits, spares, wells, scratch, quantity, answers)
             continue
         orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, wells, scratch)
         if lap_count:
             laps_found = Orbits(lap_count, laps.rows, laps.params)
             kind = OrbitKind(CIRCULATION, False, False, False, False)
-            answer_orbits(fns, kind, laps_found, (spare, laps), wells, scratch, quantity, answers)
-        answer_librations(fns, orbits, (rest, (spare, laps)), monotone, wells, scratch, quantity, answers)
+            answer_orbits(fns, kind, laps_found, spares, wells, scratch, quantity, answers)
+        answer_librations(fns, orbits, (rest, spares), monotone, wells, scratch, quantity, answers)
+    for mirrored in (False, True):
+        waiting = pair[1] if mirrored else pair[0]
+        answer_waiting(fns, mirrored, waiting, laps, scratch, quantity, answers)
 
 
 @entry(
@@ -384,5 +384,6 @@ def answer_batches(fns, layout, columns, monotone, quantity, careful, exact, ans
     spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
     rest = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
-    buffers = (first, spare, laps, rest), scratch, domain, wells_of(columns)
+    pair = waiting_room(count), waiting_room(count)
+    buffers = (first, spare, laps, rest), pair, scratch, domain, wells_of(columns)
     answer_all(fns, columns, monotone, quantity, answers, buffers)

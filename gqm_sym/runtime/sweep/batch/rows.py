@@ -61,6 +61,9 @@ from gqm_sym.runtime.compiled.types import Array
 # a register.
 BATCH, LANES = 128, 8
 
+# The largest number of orbits that wait: fewer than a batch, and another one.
+CAPACITY = 2 * BATCH
+
 INDEX, SUM, REST, VALUE, CHANGE, LACKING, FACTOR_LOW, FACTOR_HIGH, FACTOR_AT_TURN, OFFSET_LOW, OFFSET_HIGH = range(11)
 END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, HALF_WIDTH, HALF_REST, SEARCH_DIRECTION, SEARCH_LENGTH = range(11, 19)
 LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(19, 24)
@@ -89,6 +92,24 @@ class Orbits(NamedTuple):
     """
 
     size: int
+    rows: Array
+    params: Array
+
+
+class Waiting(NamedTuple):
+    """Orbits of several batches that wait until they are enough for blocks in double-double arithmetic.
+
+    Attributes
+    ----------
+    number : (1,) int array
+        How many they are.
+    rows : (ROWS, CAPACITY) array
+        A row for each quantity.
+    params : array
+        The rows of run-time parameters, CAPACITY numbers each.
+    """
+
+    number: NDArray[np.int64]
     rows: Array
     params: Array
 
@@ -162,6 +183,18 @@ def borrowed_orbits(orbits):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def waiting_room(param_count):  # type: ignore[no-untyped-def]
+    """Return space for orbits that wait."""
+    return Waiting(np.zeros(1, dtype=np.int64), np.empty((ROWS, CAPACITY)), np.empty(param_count * CAPACITY))
+
+
+@Inner
+def borrowed_waiting(waiting):  # type: ignore[no-untyped-def]
+    """Return orbits that wait with arrays whose references numba does not count."""
+    return Waiting(borrowed(waiting.number), borrowed(waiting.rows), borrowed(waiting.params))
+
+
+@Inner
 def contains_positive(row):  # type: ignore[no-untyped-def]
     """Return whether a number in a row is positive."""
     found = False
@@ -203,6 +236,19 @@ def gather(orbits, param_count, columns, number, target, row_count):  # type: ig
         for j in range(number, full):
             to_params[row * full + j] = to_params[row * full + number - 1]
     return full
+
+
+@Inner
+def append(orbits, param_count, columns, number, waiting):  # type: ignore[no-untyped-def]
+    """Append ``number`` columns and their parameters to orbits that wait."""
+    first, n = waiting.number[0], orbits.size
+    for row in range(ROWS):
+        for j in range(number):
+            waiting.rows[row, first + j] = orbits.rows[row, columns[j]]
+    for row in range(param_count):
+        for j in range(number):
+            waiting.params[row * CAPACITY + first + j] = orbits.params[row * n + columns[j]]
+    waiting.number[0] = first + number
 
 
 @Inner

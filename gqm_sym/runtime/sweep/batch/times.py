@@ -8,7 +8,6 @@ from math import fabs, inf, nan, sqrt
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.calls import (
-    call_agm_arguments_batch,
     call_integrand_invariants_batch,
     call_orbit_invariants_batch,
     call_potential_divdiff1_batch,
@@ -54,6 +53,8 @@ from gqm_sym.runtime.sweep.batch.rows import (
     SUM,
     TIME_ROWS,
     VALUE,
+    append,
+    contains,
     has_tape,
     shrink,
 )
@@ -87,11 +88,6 @@ MIN_EXACT_RATIO = 0.03
 
 # The largest relative error of V**2 in doubles where it is checked.
 MAX_FACTOR_ERROR = 3.0 * 2.0**-53
-
-# The number of steps of the arithmetic-geometric mean. For two numbers in the ratio 1 : 10, the square root of
-# MIN_CANCELLATION_RATIO, the relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then
-# exact to half an ulp, because its error is the square of that.
-AGM_STEPS = 4
 
 
 @Inner
@@ -183,15 +179,24 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def keep_factor_at_turn(n, rows, offset, factors):  # type: ignore[no-untyped-def]
+def keep_factor_at_turn(rule, n, node, rows, factors):  # type: ignore[no-untyped-def]
     """Keep the smallest factor of V**2 at turning points that are rounded: all but those at which a body is released.
 
-    ``offset`` is the row of the turning point's offset from the launch.
+    The ``rule`` is that of `times_by_trapezoid`, and the node is its first or its last one.
     """
-    for j in range(n):
-        exact = (rows[LAUNCH_V2, j] == 0.0) & (rows[offset, j] == 0.0)
-        factor, known = choose(exact, inf, factors[j]), rows[FACTOR_AT_TURN, j]
-        rows[FACTOR_AT_TURN, j] = choose(factor < known, factor, known)
+    kind, mirrored, _ = rule
+    if mirrored and node == 0:
+        for j in range(n):
+            rest, offset = rows[LAUNCH_V2, j] == 0.0, rows[OFFSET_LOW, j] + rows[OFFSET_HIGH, j]
+            _, rounding = two_sum(rows[LAUNCH_PLACE, j], offset)
+            exact = rest & ((kind == AXIS_LIBRATION) | (rounding == 0.0))
+            rows[FACTOR_AT_TURN, j] = choose(exact, inf, rows[FACTOR_LOW, j])
+    elif kind == LIBRATION:
+        offset = OFFSET_LOW if node == 0 else OFFSET_HIGH
+        for j in range(n):
+            exact = (rows[LAUNCH_V2, j] == 0.0) & (rows[offset, j] == 0.0)
+            factor, known = choose(exact, inf, factors[j]), rows[FACTOR_AT_TURN, j]
+            rows[FACTOR_AT_TURN, j] = choose(factor < known, factor, known)
 
 
 @Inner
@@ -201,6 +206,19 @@ def refuse_rough_factors(n, rows, check, factors):  # type: ignore[no-untyped-de
     for j in range(n):
         rough = fabs(factors[j] - exact[j]) > MAX_FACTOR_ERROR * exact[j]  # false for NaN
         low[j] = choose(rough, -1.0, low[j])
+
+
+@Inner
+def least_ratios(rule, with_tape):  # type: ignore[no-untyped-def]
+    """Return the ratios of `judge_level` for a rule of `times_by_trapezoid`."""
+    kind, mirrored, exactly = rule
+    if with_tape and kind != CIRCULATION:
+        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if exactly else MIN_RATIO
+        return least, least, 0.0
+    from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
+    thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
+    at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
+    return from_rest, thrown, at_turns
 
 
 @Inner
@@ -293,26 +311,38 @@ def start_sums(n, rows):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+def move_rough(orbits, scratch, rough):  # type: ignore[no-untyped-def]
+    """Append orbits to ``rough`` for which double-double arithmetic may do what doubles have failed to, and list those
+    that continue, by the verdicts in the first row of work space; return the number of the latter.
+    """
+    n, rows, verdict, continuing, moved = orbits.size, orbits.rows, scratch.work[0], 0, 0
+    for j in range(n):
+        low, failed = rows[FACTOR_LOW, j], verdict[j] == FAILED
+        scratch.chosen[continuing] = scratch.others[moved] = j
+        continuing += not failed
+        usable = (low < 0.0) | (low > MIN_EXACT_RATIO * rows[FACTOR_HIGH, j])
+        moved += failed & usable & (j == 0 or rows[INDEX, j] != rows[INDEX, j - 1])
+    append(orbits, scratch.param_count, scratch.others, moved, rough)
+    return continuing
+
+
+@Inner
+def times_by_trapezoid(fns, rule, orbits, rough, scratch, quantity, answers):  # type: ignore[no-untyped-def]
     """Fill half periods, periods or loop times by the trapezoidal rule.
 
     The number of nodes is doubled until the rule has converged. Orbits for which it has are removed, as are those on
     which V**2 almost vanishes. On orbits that are ``mirrored`` only nodes up to the middle are evaluated.
     Times are corrected ``exactly`` by the integrand in double-double arithmetic at the first nodes; the orbits are then
-    a block at most.
+    a block at most. Otherwise orbits for which the first nodes show that they need this are moved to ``rough``, unless
+    it has no rows. The ``rule`` is the kind of the orbits and whether they are mirrored and times are corrected.
     """
+    kind, mirrored, exactly = rule
     count = add_invariants(fns, kind, orbits, scratch)
     n, rows, work, chosen = orbits.size, orbits.rows, scratch.work, scratch.chosen
     start_sums(n, rows)
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD else 1.0
     ranges = (1.0, 0.0) if kind == CIRCULATION else (factor * PI_HIGH, factor * PI_LOW)
-    from_rest = MIN_RATIO if kind == LIBRATION else MIN_CANCELLATION_RATIO
-    thrown = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
-    at_turns = MIN_AXIS_RATIO if kind == AXIS_LIBRATION else MIN_EVEN_RATIO if mirrored else MIN_TURN_RATIO
-    if has_tape(scratch) and kind != CIRCULATION:
-        least = MIN_CANCELLATION_RATIO if kind == AXIS_LIBRATION else MIN_EXACT_RATIO if exactly else MIN_RATIO
-        from_rest, thrown, at_turns = least, least, 0.0
-    ratios = from_rest, thrown, at_turns
+    ratios = least_ratios(rule, has_tape(scratch))
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
@@ -322,14 +352,8 @@ def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, 
             load_block(scratch.exact, scratch.param_count, orbits, scratch.others)
         for node in range(begin, last + 1):
             rates = fill_rates(fns, kind, n, node, rows, p, scratch)
-            if mirrored and node == 0 and begin == 0:
-                for j in range(n):
-                    rest, offset = rows[LAUNCH_V2, j] == 0.0, rows[OFFSET_LOW, j] + rows[OFFSET_HIGH, j]
-                    _, rounding = two_sum(rows[LAUNCH_PLACE, j], offset)
-                    exact = rest & ((kind == AXIS_LIBRATION) | (rounding == 0.0))
-                    rows[FACTOR_AT_TURN, j] = choose(exact, inf, rows[FACTOR_LOW, j])
-            elif kind == LIBRATION and begin == 0 and (node == 0 or node == last):
-                keep_factor_at_turn(n, rows, OFFSET_LOW if node == 0 else OFFSET_HIGH, work[3, :n])
+            if begin == 0 and node in (0, last):
+                keep_factor_at_turn(rule, n, node, rows, work[3, :n])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             if corrected:
                 add_what_rates_lack(rows, node, weight, rates, scratch)
@@ -345,6 +369,12 @@ def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, 
             total, rounding = two_sum(rows[SUM, j], more[j])
             rows[SUM, j], rows[REST, j] = total, rows[REST, j] + (rounding - lost[j])
         judge_level(rows, n, nodes, ratios, work[0, :n])
+        if begin == 0 and rough.rows.size and contains(work[0, :n], FAILED):
+            continuing = move_rough(orbits, scratch, rough)
+            if continuing == 0:
+                return
+            orbits = shrink(orbits, count, chosen, continuing, ROWS)
+            n = orbits.size
         if begin > 0:
             rests, times = work[1, :n], work[2, :n]
             relative_rests(orbits.params, scratch.layout[2] if kind != CIRCULATION else -1, rests)
@@ -355,37 +385,3 @@ def times_by_trapezoid(fns, kind, mirrored, exactly, orbits, scratch, quantity, 
             orbits = shrink(orbits, count, chosen, continuing, ROWS if exactly else NEEDED_ROWS[kind])
             n = orbits.size
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
-
-
-@Inner
-def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignore[no-untyped-def]
-    """Fill half periods or periods by the arithmetic-geometric mean; orbits next to a separatrix stay undecided."""
-    count, n, rows, work = scratch.param_count, orbits.size, orbits.rows, scratch.work
-    p, halves = orbits.params[: count * n].reshape(count, n), work[:2].reshape(-1)[: 2 * n]
-    pair, clear, times = work[2:4].reshape(-1)[: 2 * n].reshape(2, n), work[4, :n], work[5, :n]
-    rests, from_thrown = work[6, :n], MIN_CANCELLATION_RATIO if scratch.careful else MIN_AXIS_RATIO
-    fill_halves(n, rows, halves[:n])
-    halves[n:] = rows[HALF_REST, :n]
-    call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
-    for j in range(n):
-        a, b = pair[0, j], pair[1, j]
-        least = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, from_thrown)
-        balanced = (b > least * a) & (a > least * b) & (a + b < inf)
-        clear[j] = choose(balanced, 1.0, 0.0)
-        pair[0, j], pair[1, j] = sqrt(a), sqrt(b)
-    for _ in range(AGM_STEPS):
-        for j in range(n):
-            a, b = pair[0, j], pair[1, j]
-            pair[0, j], pair[1, j] = 0.5 * (a + b), sqrt(a * b)
-    factor = 2.0 if quantity != PERIOD else 4.0
-    high, low = factor * PI_HIGH, factor * PI_LOW
-    relative_rests(orbits.params, scratch.layout[2], rests)
-    for j in range(n):
-        total, rounding = two_sum(pair[0, j], pair[1, j])
-        time = high / total
-        rest = (fma(-time, total, high) + fma(-time, rounding, low)) / total
-        times[j] = choose(clear[j] == 1.0, time + fma(time, rests[j], rest), nan)
-    for j in range(n):
-        k = int(rows[INDEX, j])
-        answers.values[k, 0] = times[j]
-        answers.status[k] = ANSWERED if clear[j] == 1.0 else UNDECIDED

@@ -12,6 +12,7 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.launch.ends import distance_to_axis
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CUSP_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
+from gqm_sym.runtime.sweep.batch.first_trials import fill_slopes, start_at_axes, start_at_harmonic_turns
 from gqm_sym.runtime.sweep.batch.known_turns import by_closed_form, by_symmetry
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
@@ -46,9 +47,8 @@ from gqm_sym.runtime.sweep.batch.wells import is_clear_of_axes
 # The largest number of trials of a search, and the relative step after which the next one would be below rounding.
 MAX_TRIALS, LAST_STEP = 40, 1e-9
 
-# A careful search looks at so many places before its first trial, with distances in this ratio; and the largest growth
-# of the distance in a step that follows.
-SAMPLES, SAMPLE_RATIO, SMALL_GROWTH = 16, 1.25, 1.5
+# The largest growth of the distance in a step of a careful search.
+SMALL_GROWTH = 1.5
 
 # The share of an orbit from which on a proof by pieces takes the rest of it as one piece.
 ALMOST_WHOLE = 1.0 - 2.0**-30
@@ -58,32 +58,6 @@ EVEN_TOLERANCE = 8.0 * 2.0**-52
 
 # The largest width of an orbit about one axis, in distances between axes; a wider one may reach the neighbouring axes.
 MAX_WIDTH = 1.999
-
-
-@Inner
-def start_at_axes(fns, n, rows, p, axes, work):  # type: ignore[no-untyped-def]
-    """Let searches that would begin at a mirror image begin at the axis of symmetry if V**2 < 0 there.
-
-    The image has the same V**2, and belongs to another orbit then. ``axes`` has the distances of the axes from the
-    launches, and those of other searches, which stay as they are, have TRIAL there.
-    """
-    offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, direction, trial = (
-        rows[LAUNCH_PLACE, :n],
-        rows[LAUNCH_V2, :n],
-        rows[SEARCH_DIRECTION, :n],
-        rows[TRIAL, :n],
-    )
-    any_axis = False
-    for j in range(n):
-        offsets[j] = direction[j] * axes[j]
-        places[j] = start[j] + offsets[j]
-        any_axis |= axes[j] != trial[j]
-    if not any_axis:
-        return
-    call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
-    for j in range(n):
-        trial[j] = choose(w0[j] - 2.0 * offsets[j] * out[0, j] < 0.0, axes[j], trial[j])
 
 
 @Inner
@@ -115,16 +89,14 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
         if wells.about_axis.proofs.size > 0 and not monotone:
             by_symmetry(fns, n, rows, domain, wells, work)
-    none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    axes = work[5, :n]
+    unknown, axes, images, slopes = work[1, :n], work[5, :n], work[6, :n], work[7, :n]
     for j in range(n):
-        undecided[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), 1.0, 0.0)
-    if contains(undecided, 1.0):
-        none[:] = 0.0
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, start, none, p, out)
+        unknown[j] = choose((behind[j] != behind[j]) & (state[j] == SEEKING), 1.0, 0.0)
+    if contains(unknown, 1.0):
+        fill_slopes(fns, n, rows, p, work)
         for j in range(n):
-            falls = (out[2, j] < 0.0) * 1.0 - (out[2, j] > 0.0) * 1.0
-            direction[j] = choose(undecided[j] == 1.0, falls, direction[j])
+            falls = (slopes[j] < 0.0) * 1.0 - (slopes[j] > 0.0) * 1.0
+            direction[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), falls, direction[j])
     for j in range(n):
         low, high, period = lows[j], highs[j], periods[j]
         forwards, closed, extent = direction[j] > 0.0, period > 0.0, high - low
@@ -149,6 +121,9 @@ def start_search(fns, n, rows, p, domain, monotone, wells, work):  # type: ignor
         axis[j], next_axis[j] = choose(known, axis[j], first), step
         number[j] = choose(known | (step == 0.0), 0.0, direction[j] * passed)
         axes[j] = choose((w0[j] == 0.0) & (first > 0.0) & (first < length[j]), first, trial[j])
+        images[j] = choose(state[j] == SEEKING, choose((w0[j] == 0.0) & (first > 0.0), 1.0, 0.0), 1.0)
+    if contains(images, 0.0):
+        start_at_harmonic_turns(fns, n, rows, p, images, work)
     if not monotone and contains(state, SEEKING):
         start_at_axes(fns, n, rows, p, axes, work)
 
@@ -175,7 +150,7 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
         rows[END_LOW, :n],
         rows[LAUNCH_V2, :n],
     )
-    behind, axes = rows[ZERO_BEHIND, :n], work[5, :n]
+    behind, axes, images = rows[ZERO_BEHIND, :n], work[5, :n], work[6, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
         passed = choose(step > 0.0, floor_of((ahead - axis[j]) / step), 0.0)
@@ -185,36 +160,17 @@ def start_search_behind(fns, n, rows, p, monotone, work):  # type: ignore[no-unt
         mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
         trial[j] = choose(mirrored < length[j], mirrored, length[j])
         axes[j] = choose((last < 0.0) & (-last < length[j]), -last, trial[j])
+        images[j] = choose(ahead > 2.0 * last, 1.0, 0.0)
     for j in range(n):
         known = behind[j] == behind[j]
         direction[j], zero[j] = -direction[j], choose(known, behind[j], 0.0)
         state[j] = choose((w0[j] > 0.0) & (behind[j] != behind[j]), SEEKING, FOUND)
+        images[j] = choose(state[j] == SEEKING, images[j], 1.0)
+    if contains(images, 0.0):
+        fill_slopes(fns, n, rows, p, work)
+        start_at_harmonic_turns(fns, n, rows, p, images, work)
     if not monotone and contains(state, SEEKING):
         start_at_axes(fns, n, rows, p, axes, work)
-
-
-@Inner
-def start_at_first_hill(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
-    """Let searches begin at the first of some places up to the first trial at which V**2 < 0, if there is one.
-
-    So they do not pass over hills, or over poles of the potential, that are not narrower than the distances between
-    these places.
-    """
-    offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    firsts, start, w0 = work[5, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
-    direction, trial, share = rows[SEARCH_DIRECTION, :n], rows[TRIAL, :n], SAMPLE_RATIO**-SAMPLES
-    firsts[:] = 0.0
-    for _ in range(SAMPLES):
-        for j in range(n):
-            offsets[j] = direction[j] * share * trial[j]
-            places[j] = start[j] + offsets[j]
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
-        for j in range(n):
-            is_first = (firsts[j] == 0.0) & (w0[j] - 2.0 * offsets[j] * out[0, j] < 0.0)
-            firsts[j] = choose(is_first, share * trial[j], firsts[j])
-        share *= SAMPLE_RATIO
-    for j in range(n):
-        trial[j] = choose(firsts[j] > 0.0, firsts[j], trial[j])
 
 
 @Inner
@@ -251,12 +207,14 @@ def search(fns, n, rows, p, careful, work):  # type: ignore[no-untyped-def]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
             guess, w = trial[j], fma(-2.0 * offsets[j], out[0, j], w0[j]) + rests[j]
-            before = w > 0.0
-            low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
             better = guess + guess * (w / (2.0 * offsets[j] * out[2, j] + w))
-            close = fabs(better - guess) <= LAST_STEP * guess
+            tiny = fabs(better - guess) <= LAST_STEP * guess
+            # There may be a pole at the end of the curve, where steps are tiny without being close to a zero.
+            clipped = tiny & (guess >= length[j]) & (bracket_low[j] > 0.0)
+            before, close = (w > 0.0) & (not clipped), tiny & (not clipped)
+            low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
             bracketed = high < inf
-            within = (better > low) & (better < choose(bracketed, high, growth * guess))
+            within = (better > low) & (better < choose(bracketed, high, growth * guess)) & (not clipped)
             new = choose(within, better, choose(bracketed, 0.5 * (low + high), step * guess))
             new = choose(new > length[j], length[j], new)
             lost = (w != w) | (before & (guess >= length[j]))

@@ -18,6 +18,7 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     PEAK_MARGIN,
     REFINEMENT,
     UPWARDS,
+    WHOLE,
     find_peaks,
     frame_buffer,
     highest_top,
@@ -49,7 +50,7 @@ class Loss(NamedTuple):
 @Inner
 def force_of(curve):  # type: ignore[no-untyped-def]
     """Return the force whose sign tells on which side of the track a body is, as a function that is searched."""
-    return (FORCE if curve.signed else UPWARDS), 0
+    return (FORCE if curve.signed else UPWARDS), 0, *WHOLE
 
 
 @Inner

@@ -50,6 +50,10 @@ MAX_BEND_CHANGE, BEND_ROUNDING = 0.25, 2e-15
 # The square of a length that is only a rounding of the largest length, as a share of the square of the latter.
 SMALLEST_SQUARE = 1e-32
 
+# The shares of a libration's period between which it is searched, if it is passed as a whole. A period begins at the
+# lower turning point.
+WHOLE = (0.0, 1.0)
+
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
 WIDTH_SHARES = np.sin(0.5 * pi * LAP_SHARES) ** 2
@@ -101,23 +105,27 @@ def fill_force(curve, function, n, lam, v2, frame, out):  # type: ignore[no-unty
 def is_loop(orbit, sought):  # type: ignore[no-untyped-def]
     """Return whether the function that is sought is searched along a whole lap or period.
 
-    ``sought`` has the function that is searched, and the direction of motion at launch if the force depends on it,
-    otherwise 0. That is so for circulations, and for librations if the force depends on the direction of motion.
+    ``sought`` has the function that is searched; the direction of motion at launch if the force depends on it,
+    otherwise 0; and the shares of a period between which it is then searched on a libration (`WHOLE`). That is so for
+    circulations, and for librations if the force depends on the direction of motion.
     """
-    return orbit.circulates or (sought[1] != 0 and orbit.leaves == 0)
+    return orbit.circulates or (sought[1] != 0 and orbit.leaves == 0 and sought[3] - sought[2] == 1.0)
 
 
 @Inlined
-def moving_at(orbit, direction, share):  # type: ignore[no-untyped-def]
-    """Return a place on an orbit, as a share of the orbit's width from its lower end, and the sign of ds/dt there.
+def moving_at(orbit, sought, share):  # type: ignore[no-untyped-def]
+    """Return a place on an orbit, as a share of the orbit's width from its lower end, and the sign of ds/dt there;
+    ``sought`` is that of `is_loop`.
 
-    ``share`` is one of a lap, of a period of a libration, or of the way of a body that leaves the curve. If that body
-    turns on its way, the root of its distance from the turning point, with the sign of ds/dt, grows in equal steps,
-    because the speed is smooth in it.
+    ``share`` is one of a lap, of a period of a libration or a part of it, or of the way of a body that leaves the
+    curve. If that body turns on its way, the root of its distance from the turning point, with the sign of ds/dt, grows
+    in equal steps, because the speed is smooth in it.
     """
+    direction = sought[1]
     if orbit.circulates:
         return share, direction
     if orbit.leaves == 0:
+        share = sought[2] + (sought[3] - sought[2]) * share
         return sin(pi * share) ** 2, 1 if floor(2.0 * share) % 2.0 == 0.0 else -1
     turn = orbit.low if orbit.leaves > 0 else orbit.high
     begin = 0.0 if orbit.leaves == direction else -sqrt(fabs(turn) / (orbit.high - orbit.low))
@@ -138,7 +146,7 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame, with_path):  # typ
     offsets, lam, rows, v2 = line_buffer(), line_buffer(), pair_buffer(), line_buffer()
     width = orbit.high - orbit.low
     for i in range(n):
-        share = moving_at(orbit, sought[1], shares[i])[0] if sought[1] != 0 else shares[i]
+        share = moving_at(orbit, sought, shares[i])[0] if sought[1] != 0 else shares[i]
         offsets[i] = orbit.low + width * share
         lam[i] = orbit.lam0 + offsets[i]
     call_potential_divdiff1(curve.fns.potential_divdiff1, n, orbit.lam0, lam, offsets, curve.p, rows)
@@ -153,8 +161,8 @@ def sample_loads(curve, orbit, sought, shares, n, out, frame, with_path):  # typ
         call_path_and_contact_force(curve.fns.path_and_contact_force, n, lam, v2, curve.p, frame)
     begin = 0
     while begin < n:
-        way, end = moving_at(orbit, sought[1], shares[begin])[1], begin + 1
-        while end < n and moving_at(orbit, sought[1], shares[end])[1] == way:
+        way, end = moving_at(orbit, sought, shares[begin])[1], begin + 1
+        while end < n and moving_at(orbit, sought, shares[end])[1] == way:
             end += 1
         fill_squares(curve, way, end - begin, lam[begin:end], v2[begin:end], out[begin:end])
         begin = end

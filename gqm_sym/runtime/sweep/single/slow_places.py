@@ -23,7 +23,14 @@ from gqm_sym.runtime.double_double.quadrature import TAPE, energy_level, fill_pa
 from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
 from gqm_sym.runtime.sweep.orbit import Orbit
-from gqm_sym.runtime.sweep.single.orbit_extremes import GRID_INTERVALS, GRID_POINTS, V2, WIDTH_SHARES, sample_loads
+from gqm_sym.runtime.sweep.single.orbit_extremes import (
+    GRID_INTERVALS,
+    GRID_POINTS,
+    V2,
+    WHOLE,
+    WIDTH_SHARES,
+    sample_loads,
+)
 
 # The smallest V**2 between turning points for which its place and times are accurate, as a share of the largest V**2.
 MIN_V2_SHARE = 1e-9
@@ -133,7 +140,7 @@ def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
     v2, cuts, places = grid_buffer(), place_buffer(), place_buffer()
     slowest, slopes = place_buffer(), place_buffer()
     part_orbit = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
-    sample_loads(curve, part_orbit, (V2, 0), WIDTH_SHARES, GRID_POINTS, v2, v2, False)
+    sample_loads(curve, part_orbit, (V2, 0, *WHOLE), WIDTH_SHARES, GRID_POINTS, v2, v2, False)
     # The ends are known with their rounding errors; the places in between are doubles.
     (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
     count, peak, at_peak, largest = 0, -1.0, 0, 0.0

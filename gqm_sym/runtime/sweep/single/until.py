@@ -1,6 +1,6 @@
 """The orbit of one of many launches as far as a question needs it, and the part that a body passes up to a time."""
 
-from math import fabs, inf, isfinite, nan, sqrt
+from math import fabs, inf, isfinite, nan, pi, sqrt
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from gqm_sym.runtime.inversion.table import place_on_panel
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
     DEGREE,
+    FLOOR,
     are_accurate,
     derivative,
     joints_between,
@@ -23,6 +24,7 @@ from gqm_sym.runtime.sweep.finding import EVERYWHERE, find_orbit
 from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.quantities import ANSWERED, ARRIVAL_TIME, END_TIME, NEVER_THERE, UNDECIDED
 from gqm_sym.runtime.sweep.single.arrivals import arrival, phase_of, refined_end, with_refined_ends
+from gqm_sym.runtime.sweep.single.orbit_extremes import WHOLE
 
 # The distances from the launch, in units of `unit_of`, within which both turning points of a body on an endless curve
 # are sought first, and then the place that it reaches in time; how often the latter is doubled; and after how many
@@ -35,6 +37,12 @@ UNIT_SHARE = 2.0**-4
 # The distance from a turning point as a share of the way there within which the place of a body does not have all the
 # digits of its speed.
 NEAR_TURN = 2.0**-7
+
+# If cancellation leaves no less than this part of V**2, the place of a body at a time is known to some nine digits.
+ROUGH_RATIO = 1e-7
+
+# How accurately the part of an orbit up to a time is known.
+UNDECIDED_PART, ROUGH_PART, ACCURATE_PART = range(3)
 
 # The share of a time by which another one must differ to be later beyond doubt.
 ROUNDED_TIME = 1e-12
@@ -115,28 +123,47 @@ def part_of(orbit, one, other, leaves):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def part_of_swing(orbit, panels, t_max):  # type: ignore[no-untyped-def]
-    """Return the part of a libration with refined ends that a body passes up to a time."""
+def part_of_swing(orbit, panels, t_max, exact):  # type: ignore[no-untyped-def]
+    """Return the part of a libration with refined ends that a body passes up to a time, as `part_until` does."""
     v, low, high, half_period = orbit.direction, orbit.low, orbit.high, panels.times[-1]
-    start = read_off(panels.edges, panels.times, panels.time_terms, phase_of(-low, high))
+    launch = phase_of(-low, high)
+    start = read_off(panels.edges, panels.times, panels.time_terms, launch)
+    if t_max >= 2.0 * half_period:
+        return orbit, WHOLE
     # Times are counted from the passage of the turning point behind the launch.
     start, ahead = (start, high) if v > 0 else (half_period - start, low)
-    time, has_turned = start + t_max, start + t_max > half_period
-    if has_turned:
-        time = 2.0 * half_period - time
-        if time >= start or time <= 0.0:
-            return part_of(orbit, 0.0, ahead, -v) if time >= start else orbit
+    time, turns = start + t_max, 0
+    if time > half_period:
+        time, turns = 2.0 * half_period - time, 1
+        if time <= 0.0:
+            time, turns = -time, 2
+    if turns == 2 and not exact:
+        return orbit, WHOLE
+    if turns == 1 and time >= start and not exact:
+        return part_of(orbit, 0.0, ahead, -v), WHOLE
     phi = phase_at(panels, time if v > 0 else half_period - time)
+    if exact:
+        first, last = 0.5 * launch / pi, 0.5 * phi / pi
+        if v < 0:
+            first = 1.0 - first
+        moves_up = (turns == 1) == (v < 0)
+        last = last + (0.0 if turns == 0 else 1.0) if moves_up else (1.0 if turns < 2 else 2.0) - last
+        return orbit, (first, last)
     below, above = (high - low) * sin(0.5 * phi) ** 2, (high - low) * cos(0.5 * phi) ** 2
     end = low + below if below < above else high - above
-    return part_of(orbit, end, ahead, -v) if has_turned else part_of(orbit, 0.0, end, v)
+    if turns == 0:
+        return part_of(orbit, 0.0, end, v), WHOLE
+    return part_of(orbit, end, ahead, -v), WHOLE
 
 
 @Inner
-def part_of_way(orbit, panels, turn, end, t_max):  # type: ignore[no-untyped-def]
-    """Return the part of a way to the offset ``end`` that a body passes up to a time; it begins at a turning point
-    unless that is NaN.
+def part_of_way(orbit, panels, ways, t_max, exact):  # type: ignore[no-untyped-def]
+    """Return the part of a way that a body passes up to a time, as `part_until` does.
+
+    ``ways`` has the offsets of the turning point at which the way begins, which is NaN if there is none, and of its
+    end.
     """
+    turn, end = ways
     v, turns, last, before = orbit.direction, turn == turn, panels.times[-1], 0.0
     begin = turn if turns else 0.0
     if turns and begin != 0.0:
@@ -146,7 +173,7 @@ def part_of_way(orbit, panels, turn, end, t_max):  # type: ignore[no-untyped-def
     time = t_max - before if is_inwards else t_max + before
     if time >= last:
         return orbit
-    if is_inwards and 0.0 <= time <= before:
+    if is_inwards and 0.0 <= time <= before and not exact:
         return part_of(orbit, 0.0, begin, -v)
     share = phase_at(panels, fabs(time))
     offset = begin + (end - begin) * (share * share if turns else share)
@@ -154,9 +181,24 @@ def part_of_way(orbit, panels, turn, end, t_max):  # type: ignore[no-untyped-def
 
 
 @Inner
-def part_until(curve, orbit, t_max, work):  # type: ignore[no-untyped-def]
-    """Return whether it is decided which part of an orbit a body passes up to a time; and that part, as the orbit of a
-    body that leaves the curve there.
+def part_until(curve, orbit, t_max, exact, work):  # type: ignore[no-untyped-def]
+    """Return what a body passes of an orbit up to a time, before which it does not pass the orbit in both directions.
+
+    Parameters
+    ----------
+    exact : bool
+        Whether it matters in which direction the body passes a place. Otherwise the part need not contain a place
+        twice.
+
+    Returns
+    -------
+    what : int
+        UNDECIDED_PART, ROUGH_PART (of which only the end is not accurate) or ACCURATE_PART.
+    part : Orbit
+        The part of the orbit, as the orbit of a body that leaves the curve where it ends.
+    shares : (first, last)
+        Of an exact part of a libration, which is returned whole, the ends as shares of the period
+        (`orbit_extremes.moving_at`).
     """
     kind, low, high, turn = REGULAR, orbit.low, orbit.high, nan
     if orbit.leaves == 0 and not orbit.circulates:
@@ -171,12 +213,15 @@ def part_until(curve, orbit, t_max, work):  # type: ignore[no-untyped-def]
             turn = begin
     a, b = orbit.lam0 + begin, orbit.lam0 + end
     if joints_between(curve.joints, curve.period, min(a, b), max(a, b)).size:
-        return False, orbit
+        return UNDECIDED_PART, orbit, WHOLE
     panels = orbit_panels(curve.fns, curve.p, kind, a, b, orbit.lam0, orbit.v2, curve.joints[:0])
-    if not are_accurate(panels):
-        return False, orbit
-    part = part_of_swing(orbit, panels, t_max) if kind == TURN_TURN else part_of_way(orbit, panels, turn, end, t_max)
-    return True, part
+    what = ACCURATE_PART if are_accurate(panels) else ROUGH_PART
+    if panels.status > FLOOR or panels.cancellation < ROUGH_RATIO:
+        return UNDECIDED_PART, orbit, WHOLE
+    if kind == TURN_TURN:
+        part, shares = part_of_swing(orbit, panels, t_max, exact)
+        return what, part, shares
+    return what, part_of_way(orbit, panels, (turn, end), t_max, exact), WHOLE
 
 
 @Inner
@@ -185,6 +230,21 @@ def stops_beside_turn(orbit, part):  # type: ignore[no-untyped-def]
     speed there has lost digits.
     """
     return is_beside_turn(orbit, 0 if part.leaves == orbit.direction else 1, part.high + part.low)
+
+
+@Inner
+def ends_beside_turn(orbit, part, last):  # type: ignore[no-untyped-def]
+    """Return whether a part of an orbit (`part_until`) ends so near to a turning point that the speed there has lost
+    digits.
+    """
+    width = orbit.high - orbit.low
+    if orbit.circulates:
+        return False
+    if orbit.leaves == 0:
+        return fabs(sin(2.0 * pi * last)) < 2.0 * sqrt(NEAR_TURN)
+    return fabs((part.high if part.leaves > 0 else part.low) - (orbit.low if orbit.leaves > 0 else orbit.high)) < (
+        NEAR_TURN * width
+    )
 
 
 @Inlined

@@ -9,7 +9,7 @@ from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_
 from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.quantities import ARRIVAL_TIME, HALF_PERIOD, PERIOD
 from gqm_sym.runtime.sweep.single.arrivals import arrival, refined_end
-from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS
+from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS, WHOLE
 from gqm_sym.runtime.sweep.single.slow_places import passing_time, turns_at
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
@@ -52,7 +52,7 @@ def value_from_table(curve, orbit, passage, quantity, target, half_v2_at_edges):
     if is_extreme:
         value = nan
         if orbit.leaves != 0 and follows_formulas(curve):  # one grid is faster, if it suffices
-            value = extreme_by_itself(curve, orbit, quantity, 1)
+            value = extreme_by_itself(curve, orbit, quantity, WHOLE, 1)
         return value if value == value else extreme_on(curve, orbit, passage, NO_STOP, half_v2_at_edges, quantity)
     return travel_time(curve, orbit, passage, half_v2_at_edges, target if quantity == ARRIVAL_TIME else nan, False)
 
@@ -67,7 +67,7 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
     inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
     if inside.size:
         return nan
-    return extreme_by_itself(curve, orbit, quantity, MAX_GRIDS)
+    return extreme_by_itself(curve, orbit, quantity, WHOLE, MAX_GRIDS)
 
 
 @Inner

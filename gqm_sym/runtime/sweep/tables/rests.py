@@ -1,4 +1,4 @@
-"""Bodies that are launched at rest on a level part of a tabulated curve, and stay there."""
+"""Bodies that are launched at rest on a level part of a tabulated curve, and stay there or leave the track at once."""
 
 from math import inf, nan
 
@@ -47,24 +47,27 @@ def rests_on_level(curve, lam0):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_at_rest(curve, lam0, asked, out):  # type: ignore[no-untyped-def]
-    """Fill the row ``out`` with a quantity of a body that rests; return the status.
+    """Fill the row ``out`` with a quantity of a body that rests, or that leaves the track at once; return the status.
 
     ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side and the last time as in `GivenCurve`.
     """
     quantity, target, side, t_max = asked
     places, v2, force, frame = point_buffer(), point_buffer(), point_buffer(), frame_buffer()
-    places[0], v2[0], value = lam0, 0.0, nan
+    places[0], v2[0], value, leaves = lam0, 0.0, nan, False
     if side != 0:
         fill_force(curve, force_of(curve)[0], 1, places, v2, frame, force)
-        if not side * force[0] > 0.0:
+        leaves = side * force[0] < 0.0
+        if not (leaves or side * force[0] > 0.0):
             return UNDECIDED
     fill_force(curve, FORCE, 1, places, v2, frame, force)
     if quantity == ARRIVAL_TIME and target != lam0:
-        return UNDECIDED if curve.period > 0.0 else NEVER_THERE
+        return UNDECIDED if curve.period > 0.0 and not leaves else NEVER_THERE
     if quantity in (ARRIVAL_TIME, MIN_SPEED, MAX_SPEED):
         value = 0.0
     elif quantity in (MIN_FORCE, MAX_FORCE):
         value = force[0]
+    elif quantity == END_TIME and leaves:
+        value = 0.0
     elif quantity == END_TIME and t_max < inf:
         value = t_max
     out[0] = value

@@ -21,14 +21,16 @@ NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
     [(1.0, 0.0), *(pytest.param(*launch, marks=pytest.mark.extended) for launch in [(0.3, 2.0), (0.0, 12.0)])],
 )
 def test_a_swing_that_dies_away_for_ever(lam0: float, v0: float) -> None:
-    """Its extremes are those of its first swings, in sweeps too, and so are their derivatives; the largest speed from
-    rest is that of the closed form.
+    """Its extremes are those of its first swings, in sweeps too, which compiled code answers, and so are their
+    derivatives; the largest speed from rest is that of the closed form.
     """
     module = load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag")
     motion, whole = module.solve(lam0, v0), module.solve(lam0, v0, t_max=60)
     for name in NAMES:
         assert getattr(motion, name) == getattr(whole, name)
-        assert module.sweep(name, [lam0], v0).values == pytest.approx([getattr(whole, name).value], rel=1e-15)
+        swept = module.sweep(name, [lam0], v0)
+        assert swept.values == pytest.approx([getattr(whole, name).value], rel=1e-15)
+        assert swept.route_counts() == {"single": 1}
         assert motion.gradient(name) == pytest.approx(whole.gradient(name), rel=1e-13, abs=1e-14)
     if v0 == 0.0:  # V**2 = 2gL/(1 + k**2) (cos(u) + k*sin(u) - exp(k (u - 1)) (cos(1) + k*sin(1))) on the way down
         k, place = 0.2, motion.v_max.lam  # k = 2bL/m

@@ -43,6 +43,19 @@ def test_a_pendulum_up_to_a_time(module_of: ModuleOf) -> None:
     assert (later.route == 1).all()
 
 
+def test_from_beside_a_hilltop_up_to_a_time(module_of: ModuleOf) -> None:
+    """A pendulum that is released beside its top, where doubles lose digits of the time, has passed the bottom: its
+    extremes there do not depend on where it is at the last time.
+    """
+    circle, beside = module_of("circle"), np.array([0.02, 0.005, 0.002])
+    with mp.workdps(30):
+        squares = [2 * mp.mpf(9.81) * (1 - mp.cos(start)) for start in (np.pi - beside).tolist()]
+    for name, values in (("v_max", [mp.sqrt(w) for w in squares]), ("normal_force_max", [9.81 + w for w in squares])):
+        swept = circle.sweep(name, np.pi - beside, L=1, g=9.81, t_max=4.0)
+        assert (swept.route == 1).all()
+        assert swept.values == pytest.approx([float(value) for value in values], rel=1e-15)
+
+
 def test_an_arrival_after_the_last_time_is_none(module_of: ModuleOf) -> None:
     """What is reached in time is reached at the same time as without a last one."""
     circle, starts = module_of("circle"), np.array([0.4, 1.0, 2.0])
@@ -95,3 +108,43 @@ def test_as_solved_motions(generated_folder: object, t_max: float) -> None:
                 motion = module.solve(starts[k], speeds[k], int(directions[k]), t_max=t_max)
                 true = getattr(motion, quantity)
                 assert value == pytest.approx(getattr(true, "value", true), rel=1e-12, abs=1e-12)
+
+
+def squared_force_in_turning_frame(lam: float, v: float, heading: int, spin: float) -> float:
+    """Return the square of the contact force of 1 kg on the wave (t, sin(2t)/4, sin(t) + t**2/8) in a frame that turns
+    about the vertical: what is left of the acceleration across the tangent.
+    """
+    first = np.array([1.0, 0.5 * np.cos(2 * lam), np.cos(lam) + 0.25 * lam])
+    second = np.array([0.0, -np.sin(2 * lam), 0.25 - np.sin(lam)])
+    tangent, axis = first / np.linalg.norm(first), np.array([0.0, 0.0, spin])
+    place = np.array([lam, 0.25 * np.sin(2 * lam), 0.0])
+    bend = second / (first @ first)
+    load = v * v * bend + 2.0 * heading * v * np.cross(axis, tangent) - spin**2 * place + np.array([0.0, 0.0, 9.81])
+    return float(load @ load - (load @ tangent) ** 2)
+
+
+@pytest.mark.extended
+def test_a_force_that_depends_on_the_direction_up_to_a_time(generated_folder: object) -> None:
+    """In a rotating frame the force differs on the way there and back, and just behind a launch from rest it may be
+    smaller than anywhere else. All launches are answered by compiled code.
+    """
+    curve = gqm.Curve.space(x="t", y="sin(2*t)/4", z="sin(t)+t**2/8", parameter="t")
+    law, spin = gqm.Gravity() + gqm.RotatingFrame(), 0.7
+    module = gqm.build(gqm.derive(curve, law), name="wave_until", folder=generated_folder)
+    starts, speeds, directions = [-0.6535684695279005, -1.0, -1.2], [0.0, 1.0, 2.0], [-1, 1, -1]
+    for t_max in (0.4, 2.0):
+        for sign, name in ((-1.0, "normal_force_min"), (1.0, "normal_force_max")):
+            swept = module.sweep(name, starts, speeds, directions, Omega=spin, t_max=t_max)
+            assert (swept.route == 1).all()
+            for k, value in enumerate(swept.values.tolist()):
+                motion = module.solve(starts[k], speeds[k], directions[k], Omega=spin, t_max=t_max)
+                # Close to the launch from rest the times are close too.
+                times = np.concatenate([np.linspace(0.0, 0.01, 51), np.linspace(0.01, t_max, 251)])
+                states = motion.state(times)
+                found = [
+                    sign * np.sqrt(squared_force_in_turning_frame(lam, abs(v), 1 if v > 0 else -1, spin))
+                    for lam, v in zip(states.lam.tolist(), states.v.tolist(), strict=True)
+                ]
+                assert sign * value == pytest.approx(max(found), rel=1e-3)
+                assert sign * value >= max(found) - 1e-12 * abs(value)
+                assert value == pytest.approx(getattr(motion, name).value, rel=1e-12)

@@ -464,3 +464,20 @@ def test_bodies_that_rest_on_a_level_line(tmp_path: Path) -> None:
         assert (swept.route_counts(), swept.status.tolist()) == ({"single": 2}, [0, never])
         assert swept.values[0] == 0.0
         assert module.sweep("t_end", places, t_max=3, contact=contact).values.tolist() == [3.0, 3.0]
+
+
+def test_bodies_at_rest_under_a_level_line(tmp_path: Path) -> None:
+    """A track that can only hold down does not hold a body released on its floor: the body leaves at once."""
+    pieces = [gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4), gqm.arc(radius=3, angle="pi/2")]
+    module = built(tmp_path, "ceiling", pieces, start=(-5, 4), heading="-pi/2")
+    places = 1.5 * np.pi + np.array([0.1, 2.0])
+    for t_max in (None, 3.0):
+        given = {"contact": "below", "t_max": t_max}
+        for name, value in {"t_end": 0.0, "v_max": 0.0, "normal_force_max": 9.81}.items():
+            swept = module.sweep(name, places, **given)
+            assert swept.route_counts() == {"single": 2}
+            assert swept.values == pytest.approx(value, rel=2.0 * TWO_ULPS)
+        swept = module.sweep("time_at", places, lam=places[0], **given)
+        assert (swept.route_counts(), swept.values[0]) == ({"single": 2}, 0.0)
+        assert np.isnan(swept.values[1])
+        assert np.isnan(module.sweep("half_period", places, **given).values).all()
