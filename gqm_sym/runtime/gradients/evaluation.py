@@ -26,6 +26,10 @@ from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 # change, from 16 to 32 nodes, is about the square root of the next one.
 MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 
+# A lap begins at any phase of the harmonics that the rule takes for the mean, so that one change may be small by
+# accident. The change before it is limited, too, so that the error is below rounding whatever the last change is.
+MAX_LAP_CHANGE = 3e-8
+
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
 
@@ -178,7 +182,7 @@ def clear_rounding(found):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
+def fill_means_of(program, work, inputs, kind, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means` does."""
     begin(program, work, inputs)
     sums, before, rounding = np.empty((found.shape[0], MEAN)), 1.0, inf
@@ -195,15 +199,16 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
             rounding = max(rounding, rounding_of(j, size, sums[j, 2] / n, sums[0, 3] / n))
             found[j, 0], found[j, 1], found[j, 2], found[j, 3] = high, low, sums[j, 2] / n, size
         has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
-        if level > 1 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
+        has_converged = (has_converged or change <= rounding) and (kind == LIBRATION or before <= MAX_LAP_CHANGE)
+        if level > 1 and rounding <= MAX_ROUNDING and has_converged:
             clear_rounding(found)
             return n
         before = change if level > 1 else 1.0
     return NOT_SMOOTH if rounding <= MAX_ROUNDING else LOST_DIGITS
 
 
-@entry(INTEGER(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX), checked=False)
-def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
+@entry(INTEGER(PROGRAM, VECTOR, MATRIX, INTEGER, MATRIX, MATRIX), checked=False)
+def fill_means(program, work, inputs, kind, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results of a program over its range, and return the number of nodes or a code of failure.
 
     Parameters
@@ -212,6 +217,8 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
         The program (`programs.Program.operands`), and its work space.
     inputs : (3, m) array
         The inputs: high and low doubles, and bounds on the errors.
+    kind : int
+        LIBRATION or CIRCULATION.
     nodes : (4, n) array
         The table of shares (`nodes.trapezoidal_nodes`).
     found : (k, 4) array
@@ -220,7 +227,7 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
     """
     address, operations, first, count, outputs = program
     program = (address, borrowed(operations), first, count, borrowed(outputs))
-    return fill_means_of(program, borrowed(work), borrowed(inputs), borrowed(nodes), borrowed(found))
+    return fill_means_of(program, borrowed(work), borrowed(inputs), kind, borrowed(nodes), borrowed(found))
 
 
 @Inner

@@ -199,10 +199,11 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         if self._orbit is None:
             return None, UNKNOWN
         (inputs, nodes), found = self._rule_with(ends()), np.zeros((program.outputs.size, MEAN))
-        n = fill_means(program.operands, program.work, inputs, nodes, found)
+        kind = CIRCULATION if self.direction else LIBRATION
+        n = fill_means(program.operands, program.work, inputs, kind, nodes, found)
         if n > 0:
             return found, n
-        kind, is_lost = CIRCULATION if self.direction else LIBRATION, n == LOST_DIGITS
+        is_lost = n == LOST_DIGITS
         ways = [] if is_lost else [(program, inputs[np.newaxis])]
         if program is self._program and self._from_turns is not None:
             ways.insert(0, (self._from_turns, on_both_sides(inputs, self.source.inputs)))

@@ -64,7 +64,7 @@ def fill_period_gradient(programs, works, kind, parameters, launch, nodes, found
     else:
         inputs[:, : variables.shape[1]] = variables
         inputs[:, variables.shape[1]] = variables[:, n]  # a lap begins at the launch
-    if fill_means_of(program, work, inputs, nodes, means) <= 0:
+    if fill_means_of(program, work, inputs, kind, nodes, means) <= 0:
         return False
     for k in range(count):
         high, low = means[1 + k, 0], means[1 + k, 1]

@@ -26,8 +26,8 @@ from gqm_sym.runtime.sweep.tables.extremes import (
 )
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 
-# The share of a force up to which it is taken for that at the end of a motion.
-STOP_SHARE = 1e-9
+# The share up to which an extreme is taken for the value at the end of a motion.
+STOP_SHARE = 1e-3
 
 EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
@@ -61,14 +61,14 @@ def extreme_by_itself(curve, orbit, quantity, shares, max_grids):  # type: ignor
 
 
 @Inner
-def is_extreme_at_stop(curve, part, quantity, ends, value):  # type: ignore[no-untyped-def]
-    """Return whether an extreme of a contact force that depends on the direction of motion is its value where the part
-    of an orbit (`until.part_until`) ends.
-    """
-    shares, squares, frame = point_buffer(), point_buffer(), frame_buffer()
-    shares[0] = 1.0
-    sample_loads(curve, part, sought_for(curve, part, quantity, ends)[0], shares, 1, squares, frame, False)
-    return fabs(squares[0] - value * value) <= STOP_SHARE * value * value
+def is_extreme_at_stop(curve, part, quantity, shares, value):  # type: ignore[no-untyped-def]
+    """Return whether an extreme may be the value where the part of an orbit ends (`until.part_until`)."""
+    places, values, frame = point_buffer(), point_buffer(), frame_buffer()
+    sought = sought_for(curve, part, quantity, shares)[0]
+    places[0] = 0.0 if sought[1] == 0 and part.leaves < 0 else 1.0
+    sample_loads(curve, part, sought, places, 1, values, frame, False)
+    stop = values[0] if sought[0] == FORCE else sqrt(values[0])
+    return not fabs(stop - value) > STOP_SHARE * fabs(value)
 
 
 @Inner

@@ -52,6 +52,8 @@ from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself
 from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS, WHOLE
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 from gqm_sym.runtime.sweep.single.until import (
+    ACCURATE_PART,
+    ROUGH_PART,
     checked_arrival,
     ends_beside_turn,
     find_for,
@@ -186,13 +188,16 @@ def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ig
     ``asked`` is the quantity and the last time.
     """
     (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
-    is_directed = sought_for(curve, orbit, quantity, WHOLE)[0][1] != 0
+    (_, direction, _, _), sign = sought_for(curve, orbit, quantity, WHOLE)
+    is_directed = direction != 0
     if passage.panels <= FEW_PANELS or follows_formulas(curve):  # beside hilltops they have more digits than the table
-        decided, part, shares = part_until(curve, orbit, t_max, is_directed, buffers.work)
-        if decided and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
+        what, part, shares = part_until(curve, orbit, t_max, is_directed, buffers.work)
+        # Where the part ends roughly at the last time, it has a largest value if that is not at its end.
+        is_known = what == ACCURATE_PART or (what == ROUGH_PART and sign > 0.0)
+        if is_known and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
             value = extreme_by_itself(curve, part, quantity, shares, MAX_GRIDS)
-            beside = is_directed and ends_beside_turn(orbit, part, shares[1])
-            if beside and is_extreme_at_stop(curve, part, quantity, shares, value):
+            is_rough = what == ROUGH_PART or (is_directed and ends_beside_turn(orbit, part, shares[1]))
+            if is_rough and is_extreme_at_stop(curve, part, quantity, shares, value):
                 value = nan
     if value != value and tabulated and (passage.panels > FEW_PANELS or curve.directed):
         decided, stop = stop_at(curve, orbit, passage, edges, t_max)

@@ -13,9 +13,9 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM
 from gqm_sym.runtime.quadrature.trapezoid import (
+    MAX_LAST_CHANGE,
     MIN_INTERVALS,
     NODE_SHARES,
-    has_converged,
 )
 
 # The largest numbers of intervals of the trapezoidal rule, in successive passes over the orbits that are left. More of
@@ -271,16 +271,17 @@ def judge(rule, lanes, sums, means, state, found):  # type: ignore[no-untyped-de
 
     Parameters
     ----------
-    rule : (int, int, int)
-        The number of nodes, and the largest numbers of them in this call and in any call.
+    rule : (int, int, int, float)
+        The number of nodes, the largest numbers of them in this call and in any call, and the largest change by the
+        last level but one.
     """
-    nodes, limit, most = rule
+    nodes, limit, most, max_before = rule
     kinds, before, change, spread = state[STATE], state[BEFORE], state[CHANGE], state[SPREAD]
     smallest, largest, is_new, enough = state[SMALLEST], state[LARGEST], state[NEW], state[ENOUGH]
     some, soon = 0, 0
     for i in range(lanes):
         kind, is_clear = kinds[i], smallest[i] >= MIN_FACTOR_RATIO * largest[i]
-        has_settled = (before[i] < 0.0) | has_converged(before[i], change[i])
+        has_settled = (before[i] < 0.0) | ((before[i] <= max_before) & (change[i] <= MAX_LAST_CHANGE))
         is_answered = (kind == OPEN) & has_settled & (spread[i] <= nodes) & is_clear
         # Means have some digits from MIN_HOPE nodes on, by which the number of nodes is known that would suffice.
         has_hope = (nodes < MIN_HOPE) | ((nodes < most) & (spread[i] <= 2.0 * most) & (smallest[i] > 0.0))
@@ -334,7 +335,7 @@ def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type:
                 begin_means(program, work, lanes, state, means)
         compare_levels(nodes, lanes, sums, means, variances, state)
         fill_enough(nodes, lanes, state)
-        some, soon = judge((nodes, limits[0], limits[1]), lanes, sums, means, state, found)
+        some, soon = judge((nodes, limits[0], limits[1], limits[2]), lanes, sums, means, state, found)
         if some == 0 or (some <= MAX_OPEN * lanes and (nodes >= limits[0] or soon == 0)):
             return
         first, nodes = nodes + 1, 2 * nodes
@@ -342,7 +343,7 @@ def fill_batch(program, is_mirrored, limits, work, lanes, state, rows):  # type:
 
 @entry(
     types.void(
-        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, types.UniTuple(INTEGER, 3)),
+        *(PROGRAM, VECTOR, LANE_PROGRAM, VECTOR, types.Tuple((INTEGER, INTEGER, INTEGER, types.float64))),
         *(MATRIX, types.boolean[::1], types.Tuple((MATRIX, types.int8[::1]))),
     ),
     nogil=True,
@@ -357,9 +358,9 @@ def fill_lane_gradients(turn, turn_work, program, work, limits, launches, mirror
         results if the orbit's program does not need them.
     program, work
         The program of an orbit (`assembly.LaneProgram.operands`), with its work space.
-    limits : (int, int, int)
-        The number of columns of the launches that are inputs of the program, and the largest numbers of intervals in
-        this call and in any call.
+    limits : (int, int, int, float)
+        The number of columns of the launches that are inputs of the program, the largest numbers of intervals in this
+        call and in any call, and the largest change by the last level but one (`quadrature.trapezoid`).
     launches : (k, m) array
         The inputs of the program, and then turning points to the accuracy of doubles if the program needs them
         (`launches`).

@@ -117,10 +117,9 @@ class LaneRecorder(RecorderOfMore):
             return self._by_inverse(a, b) if self.by_inverses else None
         if self.depends(self.register(a)):
             return a * (self.number(1) / b)
-        _, *operands = self.entries[b.register]
-        are_inputs = [self.entries[k][0] in ("parameter", "constant") for k in operands]
-        is_multiple = self.entries[b.register][0] == MULTIPLY and all(are_inputs)
-        return self._by_inverse(a, b) if is_multiple or self.entries[b.register][0] == "parameter" else None
+        code, *operands = self.entries[b.register]
+        is_multiple = code == MULTIPLY and all(self.entries[k][0] in ("parameter", "constant") for k in operands)
+        return self._by_inverse(a, b) if is_multiple or code == "parameter" else None
 
     def _by_inverse(self, a: TapeNumber, b: TapeNumber) -> TapeNumber | None:
         """Return a quotient as a product with an inverse; None if it is one."""

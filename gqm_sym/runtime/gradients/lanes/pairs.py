@@ -14,6 +14,7 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS
 from gqm_sym.runtime.gradients.evaluation import (
+    MAX_LAP_CHANGE,
     MAX_NEXT_CHANGE,
     MAX_RATIO,
     MAX_ROUNDING,
@@ -114,13 +115,13 @@ def add_nodes(program, work, nodes, n, mirrored, lanes, sums):  # type: ignore[n
 
 
 @Inner
-def judge_means(level, is_last, lanes, sums, means, states, most):  # type: ignore[no-untyped-def]
+def judge_means(level, is_last, lanes, sums, means, states, limits):  # type: ignore[no-untyped-def]
     """Take the means of a level for orbits for which the rule has not converged; return whether there is none left.
 
-    The criteria are those of `evaluation.fill_means_of`. The next change is also at most the share ``most`` of each
-    mean. Of a level that is the last one it is known that the rule has converged.
+    The criteria are those of `evaluation.fill_means_of`. The ``limits`` are for the next change, as a share of each
+    mean, and for the change before. Of a level that is the last one it is known that the rule has converged.
     """
-    is_done = True
+    is_done, (most, max_before) = True, limits
     for i in range(lanes):
         if states[DONE, i] != 0.0:
             continue
@@ -138,7 +139,7 @@ def judge_means(level, is_last, lanes, sums, means, states, most):  # type: igno
                 condition = max(condition, size / fabs(sums[j, 0, i]) if sums[j, 0, i] != 0.0 else inf)
         before = states[CHANGE, i]
         has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
-        has_converged = has_converged and not change * change * condition > most * before
+        has_converged = has_converged and before <= max_before and not change * change * condition > most * before
         if not rounding <= MAX_ROUNDING:
             states[DONE, i] = -1.0
         elif is_last or (level > 1 and has_converged):
@@ -181,6 +182,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
     """
     count, (inputs, phase, nodes, most, enough), even = found.shape[1], rule, np.zeros(BLOCK)
     # The time itself is never zero, so that its rounding shows where all digits of derivatives are lost.
+    max_before = MAX_LAP_CHANGE if phase[0] == 1.0 else inf  # the phase of laps is the share
     sums, means, states = np.empty((1 + count, MEAN, BLOCK)), np.empty((1 + count, 3, BLOCK)), np.empty((2, BLOCK))
     for start in range(0, launches.shape[1], BLOCK):
         size = min(BLOCK, launches.shape[1] - start)
@@ -196,7 +198,7 @@ def fill_pair_gradients(ends, works, program, work, rule, launches, mirrored, fo
             if LEVELS[level] < enough:
                 continue
             add_nodes(program, work, nodes, LEVELS[level], even, lanes, sums)
-            if judge_means(level, enough > 0, lanes, sums, means, states, most):
+            if judge_means(level, enough > 0, lanes, sums, means, states, (most, max_before)):
                 break
         for i in range(size):
             for j in range(count):

@@ -3,8 +3,8 @@ digits.
 
 Where a derivative is a multiple of the half period, it takes no program (`scaling`).
 About an axis of symmetry that is an arithmetic-geometric mean or an integral without divided differences. For other
-librations it is an integral in double precision, and for what remains and for laps one in double-double arithmetic,
-for the smallest swings with divided differences.
+librations and for laps it is an integral in double precision, and for what remains one in double-double arithmetic, for
+the smallest swings with divided differences.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,6 +19,7 @@ from gqm_sym.runtime.arithmetic.elementary import HALF_PI
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
+from gqm_sym.runtime.gradients.evaluation import MAX_LAP_CHANGE
 from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram
 from gqm_sym.runtime.gradients.lanes.evaluation import (
@@ -38,6 +39,7 @@ from gqm_sym.runtime.gradients.lanes.programs import (
     axis_program,
     end_programs,
     exact_axis_program,
+    lap_program,
     mean_program,
     moved_variables,
     swing_program,
@@ -47,7 +49,7 @@ from gqm_sym.runtime.gradients.lanes.scaling import Plan, plan_of, scalings
 from gqm_sym.runtime.gradients.passages.slow_orbits import MAX_SHARE, slow_gradients
 from gqm_sym.runtime.gradients.programs import Program, Source, circulation_program, libration_program
 from gqm_sym.runtime.launch.formulas import Formulas
-from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, MIN_INTERVALS
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, MAX_CHANGE_BEFORE, MIN_INTERVALS
 
 # The number of launches from which on a thread is worth starting. Machine code for a program takes up to 0.2 s, and is
 # worth making for so many launches of one call, or of all calls so far.
@@ -58,6 +60,9 @@ MAX_CODED = 48
 
 # The ranges of phases of half periods and laps, as two doubles.
 PHASES = {LIBRATION: (2.0 * HALF_PI[0], 2.0 * HALF_PI[1]), CIRCULATION: (1.0, 0.0)}
+
+# The largest change by the last level but one of the trapezoidal rule.
+MAX_BEFORE = {LIBRATION: MAX_CHANGE_BEFORE, CIRCULATION: MAX_LAP_CHANGE}
 
 # A program without results, and its work space.
 NO_PROGRAM = (0, np.zeros((0, 4), dtype=np.int64), 0, 0, np.zeros(0, dtype=np.int64))
@@ -138,8 +143,11 @@ def period_gradients(formulas: Formulas, launches: Launches, values: Array, rows
         if plan.wanted:
             fill_by_stages(stages(formulas, launches, group, plan), launches, direct.others, group.serves, found)
     if circulates.any():
-        everything = tuple(range(len(rows)))
-        fill_by_stages(lap_stages(source, launches, rows), launches, everything, circulates, found)
+        direct, plan = plan_of(source, rows, at_rest=False, is_scaled=False)
+        for position in direct.zeros:
+            found[circulates, position] = 0.0
+        if plan.wanted:
+            fill_by_stages(lap_stages(source, launches, plan), launches, direct.others, circulates, found)
     if np.isnan(found.sum()):  # one sum is much faster than one for each
         fill_slow_orbits(source, launches, rows, found)
     return found
@@ -267,14 +275,14 @@ def laps_of(source: Source, launches: Launches) -> Array:
     return np.vstack([table[: source.variables], table[source.parameters]])
 
 
-def lap_stages(source: Source, launches: Launches, rows: tuple[int, ...]) -> Iterator[Stage]:
+def lap_stages(source: Source, launches: Launches, plan: Plan) -> Iterator[Stage]:
     """Yield the programs for the times of laps."""
-    laps = laps_of(source, launches)
+    laps, inputs = laps_of(source, launches), source.variables + 1
     for direction in (1, -1):
         chosen = launches.circulates & (launches.directions == direction)
-        yield Stage(
-            chosen, circulation_program, (source, direction, rows), laps, source.variables + 1, False, CIRCULATION
-        )
+        yield Stage(chosen, lap_program, (source, direction, plan), laps, inputs, False, CIRCULATION)
+        given = source, direction, plan.wanted
+        yield Stage(chosen, circulation_program, given, laps, inputs, False, CIRCULATION)
 
 
 def moves_of(stage: Stage) -> tuple[Source, tuple[int, ...]]:
@@ -363,7 +371,7 @@ def carried_out(
         if stage.make is mean_program:
             fill_mean_gradients(ends[0], spaces[0], addressed, own, stage.inputs, some, answers)
         elif isinstance(program, LaneProgram):
-            limits = stage.inputs, most, PASSES[-1]
+            limits = stage.inputs, most, PASSES[-1], MAX_BEFORE[stage.kind]
             fill_lane_gradients(ends[0], spaces[0], addressed, own, limits, some, mirrored[part], answers)
         else:
             max_error = MAX_SHARE if stage.make is exact_swing_program else inf

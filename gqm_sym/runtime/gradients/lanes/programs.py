@@ -34,6 +34,9 @@ from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, NODE_SHARES, S
 ALONG = np.array([np.copysign(np.sqrt(COSINES_SQUARED), NODE_SHARES - 0.5), SINES_SQUARED])
 FROM_AXIS = np.array([COSINES_SQUARED, SINES_SQUARED])
 
+# Those of laps: the share of the lap, and nothing else.
+OVER_LAP = np.array([NODE_SHARES, np.zeros(NODE_SHARES.size)])
+
 # The steps of an arithmetic-geometric mean. The relative difference of two numbers in the ratio 1 : 10 is then 4e-9,
 # and the square of this is the error of one more arithmetic mean.
 MEAN_STEPS = 4
@@ -132,6 +135,27 @@ def swing_program(source: Source, plan: Plan) -> LaneProgram | None:
     rate, adjoints = quotient_with_root(op, ds, 2 * factor)
     rates = [rate, *changes(op, adjoints, (a, b, *p), moves)]
     return assemble_rates(op, factor, rates, terms_of(op, source, plan, launch, op.values[-1]), ALONG)
+
+
+@lru_cache(maxsize=64)
+def lap_program(source: Source, direction: int, plan: Plan) -> LaneProgram:
+    """Return the program of the time per share of a lap over pi, differentiated at the same share.
+
+    The inputs are those of `programs.circulation_program`. The first coordinate of a place is the share. The results
+    are V**3 and the derivatives. V**3 may vary by a factor of ten (`evaluation.MIN_FACTOR_RATIO`): where V**2 varies by
+    more than five, the nodes at which variances are found miss so much of a hilltop that they are too small.
+    """
+    n, variables = source.parameters, source.variables
+    op = LaneRecorder(variables + 1, 2, by_inverses=True)
+    inputs, share = op.values[:variables], op.places[0]
+    p, lap = inputs[:n], op.number(source.domain(op, inputs[:n])[2])
+    lam = op.values[variables] + direction * lap * share
+    v2 = 2 * source.half(op, lam)
+    rate, adjoints = quotient_with_root(op, (lap / op.pi) * op.number(source.formulas.ds(op, lam, p)), v2)
+    moves = [[op.number(int(i == k)) for i in range(variables)] for k in plan.moves(n + 2)]
+    rates = [rate, *changes(op, adjoints, inputs, moves)]
+    terms = terms_of(op, source, plan, (inputs[n], inputs[n + 1]))
+    return assemble_rates(op, v2 * op.sqrt(v2), rates, terms, OVER_LAP)
 
 
 class Orbits(NamedTuple):

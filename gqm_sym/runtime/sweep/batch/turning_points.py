@@ -207,12 +207,14 @@ def search(fns, n, rows, p, careful, work):  # type: ignore[no-untyped-def]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
             guess, w = trial[j], fma(-2.0 * offsets[j], out[0, j], w0[j]) + rests[j]
-            before = w > 0.0
-            low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
             better = guess + guess * (w / (2.0 * offsets[j] * out[2, j] + w))
-            close = fabs(better - guess) <= LAST_STEP * guess
+            tiny = fabs(better - guess) <= LAST_STEP * guess
+            # There may be a pole at the end of the curve, where steps are tiny without being close to a zero.
+            clipped = tiny & (guess >= length[j]) & (bracket_low[j] > 0.0)
+            before, close = (w > 0.0) & (not clipped), tiny & (not clipped)
+            low, high = choose(before, guess, bracket_low[j]), choose(before, bracket_high[j], guess)
             bracketed = high < inf
-            within = (better > low) & (better < choose(bracketed, high, growth * guess))
+            within = (better > low) & (better < choose(bracketed, high, growth * guess)) & (not clipped)
             new = choose(within, better, choose(bracketed, 0.5 * (low + high), step * guess))
             new = choose(new > length[j], length[j], new)
             lost = (w != w) | (before & (guess >= length[j]))

@@ -11,6 +11,7 @@ from gqm_sym.runtime.inversion.table import place_on_panel
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
     DEGREE,
+    FLOOR,
     are_accurate,
     derivative,
     joints_between,
@@ -36,6 +37,12 @@ UNIT_SHARE = 2.0**-4
 # The distance from a turning point as a share of the way there within which the place of a body does not have all the
 # digits of its speed.
 NEAR_TURN = 2.0**-7
+
+# If cancellation leaves no less than this part of V**2, the place of a body at a time is known to some nine digits.
+ROUGH_RATIO = 1e-7
+
+# How accurately the part of an orbit up to a time is known.
+UNDECIDED_PART, ROUGH_PART, ACCURATE_PART = range(3)
 
 # The share of a time by which another one must differ to be later beyond doubt.
 ROUNDED_TIME = 1e-12
@@ -121,6 +128,8 @@ def part_of_swing(orbit, panels, t_max, exact):  # type: ignore[no-untyped-def]
     v, low, high, half_period = orbit.direction, orbit.low, orbit.high, panels.times[-1]
     launch = phase_of(-low, high)
     start = read_off(panels.edges, panels.times, panels.time_terms, launch)
+    if t_max >= 2.0 * half_period:
+        return orbit, WHOLE
     # Times are counted from the passage of the turning point behind the launch.
     start, ahead = (start, high) if v > 0 else (half_period - start, low)
     time, turns = start + t_max, 0
@@ -183,7 +192,8 @@ def part_until(curve, orbit, t_max, exact, work):  # type: ignore[no-untyped-def
 
     Returns
     -------
-    decided : bool
+    what : int
+        UNDECIDED_PART, ROUGH_PART (of which only the end is not accurate) or ACCURATE_PART.
     part : Orbit
         The part of the orbit, as the orbit of a body that leaves the curve where it ends.
     shares : (first, last)
@@ -203,14 +213,15 @@ def part_until(curve, orbit, t_max, exact, work):  # type: ignore[no-untyped-def
             turn = begin
     a, b = orbit.lam0 + begin, orbit.lam0 + end
     if joints_between(curve.joints, curve.period, min(a, b), max(a, b)).size:
-        return False, orbit, WHOLE
+        return UNDECIDED_PART, orbit, WHOLE
     panels = orbit_panels(curve.fns, curve.p, kind, a, b, orbit.lam0, orbit.v2, curve.joints[:0])
-    if not are_accurate(panels):
-        return False, orbit, WHOLE
+    what = ACCURATE_PART if are_accurate(panels) else ROUGH_PART
+    if panels.status > FLOOR or panels.cancellation < ROUGH_RATIO:
+        return UNDECIDED_PART, orbit, WHOLE
     if kind == TURN_TURN:
         part, shares = part_of_swing(orbit, panels, t_max, exact)
-        return True, part, shares
-    return True, part_of_way(orbit, panels, (turn, end), t_max, exact), WHOLE
+        return what, part, shares
+    return what, part_of_way(orbit, panels, (turn, end), t_max, exact), WHOLE
 
 
 @Inner

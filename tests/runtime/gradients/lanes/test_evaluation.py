@@ -211,12 +211,14 @@ def test_near_the_separatrix(answered: Counter[str]) -> None:
                 assert abs(value - true) <= 2 * ULP * abs(true)
 
 
-@pytest.mark.parametrize("v0", [7.5, 30.0])
-def test_laps_of_pendulums(v0: float, answered: Counter[str]) -> None:
-    """Laps of pendulums have the derivatives of their elliptic integrals, in double-double arithmetic."""
-    lam0, direction = np.array([0.1, -0.4, 1.3]), np.array([1, -1, 1])
+@pytest.mark.parametrize(("v0", "program"), [(6.5, "circulation_program"), (7.5, "lap_program"), (30.0, "lap_program")])
+def test_laps_of_pendulums(v0: float, program: str, answered: Counter[str]) -> None:
+    """Laps of pendulums have the derivatives of their elliptic integrals: in doubles, which they had in double-double
+    arithmetic alone, and in the latter if they almost come to rest at the top.
+    """
+    lam0, direction = np.array([0.1, -0.4, 0.5]), np.array([1, -1, 1])
     found = generated("circle").sweep("period", lam0=lam0, v0=v0, direction=direction, L=1, g=10, gradient=("g", "v0"))
-    assert answered["circulation_program"] == 3
+    assert answered[program] == 3
     with mp.workdps(40):
         for k, place in enumerate(lam0):
 
@@ -227,3 +229,28 @@ def test_laps_of_pendulums(v0: float, answered: Counter[str]) -> None:
             wanted = mp.diff(lambda g: lap(g, mpf(v0)), mpf(10)), mp.diff(lambda v: lap(mpf(10), v), mpf(v0))
             for value, true in zip(found.gradient[k], wanted, strict=True):
                 assert abs(value - true) <= 2 * ULP * abs(true)
+
+
+@pytest.mark.parametrize("program", ["lap_program", "circulation_program"])
+def test_laps_whose_rule_seems_to_converge(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The phase of a launch may make one change of the trapezoidal rule small by accident. The derivatives of such laps
+    around Viviani's curve were off by up to 600 ulp, for one motion too; they are sums over 400 nodes.
+    """
+    if program == "circulation_program":
+        stages = periods.lap_stages
+        monkeypatch.setattr(periods, "lap_stages", lambda *a: (s for s in stages(*a) if s.make.__name__ == program))
+    module = generated("viviani")
+    launch = {"lam0": [-0.19633934, 0.98180911], "v0": [8.0628322, 8.6284625], "a": [1.0384631, 0.9565449]}
+    found = module.sweep("period", **launch, g=9.75, gradient="v0").gradient[:, 0]
+    for k in range(2):
+        given = [values[k] for values in launch.values()]
+        single = module.solve(*given[:2], a=given[2], g=9.75).gradient("period", "v0")["v0"]
+        with mp.workdps(30):
+            lam0, v0, a = map(mpf, given)
+            wanted = mpf(0)
+            for n in range(400):
+                lam = lam0 + 4 * mp.pi * n / 400
+                ds, fallen = a * mp.sqrt(1 + mp.cos(lam / 2) ** 2), mp.sin(lam0 / 2) - mp.sin(lam / 2)
+                wanted -= 4 * mp.pi * v0 * ds / mp.sqrt(v0**2 + 39 * a * fallen) ** 3 / 400
+            for value in (found[k], single):
+                assert abs(value - wanted) <= 2 * ULP * abs(wanted)

@@ -83,3 +83,14 @@ def test_rough_orbits_are_corrected_at_the_first_try(module: ModuleType, tried: 
             terms = [mp.hypot(1, x**3 - x + mpf("0.37")) / mp.sqrt(mpf("9.81") / 2 * (x - c) * (x - d)) for x in places]
             truth = mp.pi * mp.fsum(terms) / 200
         assert abs(mpf(float(found.values[k])) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_searches_come_back_from_poles(generated_folder: Path) -> None:
+    """On the kappa curve, which ends at poles of the height, a search that steps to a pole finds the zero before it."""
+    curve = gqm.Curve.polar("1.3*tan(theta)", parameter="theta", domain=("-pi/2", "pi/2"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="kappa_to_poles", folder=generated_folder)
+    lam0, reach = np.linspace(-1.0, -0.3, 50), np.tile(np.linspace(1.38, 1.48, 10), 5)
+    v0 = np.sqrt(2 * 9.81 * 1.3 * (np.sin(reach) * np.tan(reach) - np.sin(lam0) * np.tan(lam0)))
+    found = module.sweep("turning_points", lam0, v0)
+    assert found.route_counts() == {"batch": 50}
+    np.testing.assert_allclose(found.values, np.column_stack([-reach, reach]), rtol=1e-14)

@@ -43,6 +43,19 @@ def test_a_pendulum_up_to_a_time(module_of: ModuleOf) -> None:
     assert (later.route == 1).all()
 
 
+def test_from_beside_a_hilltop_up_to_a_time(module_of: ModuleOf) -> None:
+    """A pendulum that is released beside its top, where doubles lose digits of the time, has passed the bottom: its
+    extremes there do not depend on where it is at the last time.
+    """
+    circle, beside = module_of("circle"), np.array([0.02, 0.005, 0.002])
+    with mp.workdps(30):
+        squares = [2 * mp.mpf(9.81) * (1 - mp.cos(start)) for start in (np.pi - beside).tolist()]
+    for name, values in (("v_max", [mp.sqrt(w) for w in squares]), ("normal_force_max", [9.81 + w for w in squares])):
+        swept = circle.sweep(name, np.pi - beside, L=1, g=9.81, t_max=4.0)
+        assert (swept.route == 1).all()
+        assert swept.values == pytest.approx([float(value) for value in values], rel=1e-15)
+
+
 def test_an_arrival_after_the_last_time_is_none(module_of: ModuleOf) -> None:
     """What is reached in time is reached at the same time as without a last one."""
     circle, starts = module_of("circle"), np.array([0.4, 1.0, 2.0])
