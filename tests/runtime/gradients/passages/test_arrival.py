@@ -112,7 +112,7 @@ def test_towards_a_hilltop(launch: dict[str, float], place: float) -> None:
     """
     module, names = load(str(ROOT / "generated" / "double_well.py"), "double_well"), tuple(launch)
     swept = module.sweep("time_at", **launch, direction=-1, lam=place, gradient=names)
-    assert swept.route == ROUTES.index("single")
+    assert swept.route != ROUTES.index("solve")
     for name, value in zip(names, np.ravel(swept.gradient), strict=True):
         with mp.workdps(40):
             wanted = by_differences(times_from_inner_turn(place, turns=place > launch["lam0"]), launch, name, 15)[0]
