@@ -258,13 +258,20 @@ def libration_program(
     return assemble(op, [*rates, *powers, *ds_partials])
 
 
+def on_lap(
+    op: Recorder, source: Source, direction: int, share: TapeNumber
+) -> tuple[TapeNumber, TapeNumber, TapeNumber]:
+    """Return the length of a lap in lam, with the sign of the direction, and ds/dlam and V**2 at a share of the lap."""
+    p = op.values[: source.parameters]
+    lap = direction * op.number(source.domain(op, p)[2])
+    lam = op.values[source.variables] + lap * share
+    return lap, op.number(source.formulas.ds(op, lam, p)), 2 * source.half(op, lam)
+
+
 def lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, TapeNumber, TapeNumber, TapeNumber]:
     """Return a tape with the length of a lap in lam, and with ds/dlam, V**2 and dt/dshare at a share of the lap."""
     op = Recorder(source.variables + 1)
-    p = op.values[: source.parameters]
-    lap = direction * op.number(source.domain(op, p)[2])
-    lam = op.values[source.variables] + lap * op.place
-    ds, v2 = source.formulas.ds(op, lam, p), 2 * source.half(op, lam)
+    lap, ds, v2 = on_lap(op, source, direction, op.place)
     return op, lap, ds, v2, direction * lap * ds / op.sqrt(v2)
 
 

@@ -136,9 +136,11 @@ def fill_integrand(orbit, first, n, work, rates):  # type: ignore[no-untyped-def
 
 
 @Inner
-def has_converged(before, change):  # type: ignore[no-untyped-def]
-    """Return whether the trapezoidal rule has converged, judged by its last two relative changes."""
-    return (before <= MAX_CHANGE_BEFORE) & (change <= MAX_LAST_CHANGE)
+def has_converged(before, change, max_before):  # type: ignore[no-untyped-def]
+    """Return whether the trapezoidal rule has converged, judged by its last two relative changes; the first of them is
+    at most ``max_before``.
+    """
+    return (before <= max_before) & (change <= MAX_LAST_CHANGE)
 
 
 @Inner
@@ -171,7 +173,7 @@ def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-u
         new = total / n
         change = fabs(new - value) / new
         value = new
-        if has_converged(before, change):
+        if has_converged(before, change, MAX_CHANGE_BEFORE):
             return value
         before = change
     return np.nan

@@ -12,11 +12,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.gradients.evaluation import PROGRAM
-from gqm_sym.runtime.quadrature.trapezoid import (
-    MAX_LAST_CHANGE,
-    MIN_INTERVALS,
-    NODE_SHARES,
-)
+from gqm_sym.runtime.quadrature.trapezoid import MIN_INTERVALS, NODE_SHARES, has_converged
 
 # The largest numbers of intervals of the trapezoidal rule, in successive passes over the orbits that are left. More of
 # them would take longer than double-double arithmetic.
@@ -281,7 +277,7 @@ def judge(rule, lanes, sums, means, state, found):  # type: ignore[no-untyped-de
     some, soon = 0, 0
     for i in range(lanes):
         kind, is_clear = kinds[i], smallest[i] >= MIN_FACTOR_RATIO * largest[i]
-        has_settled = (before[i] < 0.0) | ((before[i] <= max_before) & (change[i] <= MAX_LAST_CHANGE))
+        has_settled = (before[i] < 0.0) | has_converged(before[i], change[i], max_before)
         is_answered = (kind == OPEN) & has_settled & (spread[i] <= nodes) & is_clear
         # Means have some digits from MIN_HOPE nodes on, by which the number of nodes is known that would suffice.
         has_hope = (nodes < MIN_HOPE) | ((nodes < most) & (spread[i] <= 2.0 * most) & (smallest[i] > 0.0))

@@ -230,10 +230,12 @@ def fill_by_stages(
         if stage.make is exact_swing_program:
             enough[:] = 0  # its errors are shares of the derivatives themselves
         numbers = enough[chosen]
-        known = np.unique(numbers).tolist() if numbers.any() else [0]  # what is sorted takes long
-        attempts = () if program is None else PASSES if has_levels else known
+        if has_levels or program is None:
+            attempts: Sequence[int] = PASSES if has_levels else ()
+        else:
+            attempts = np.unique(numbers).tolist() if numbers.any() else [0]  # sorting takes long
         for most in attempts:
-            part = chosen if has_levels or len(known) == 1 else chosen[numbers == most]
+            part = chosen if has_levels or len(attempts) == 1 else chosen[numbers == most]
             if not part.size:
                 break
             out, states = carried_out(stage, program, len(columns), (part, launches.kinds[part] >= EVEN), most)

@@ -25,7 +25,7 @@ from gqm_sym.runtime.gradients.lanes.assembly import LaneProgram, assemble, asse
 from gqm_sym.runtime.gradients.lanes.differences import Places
 from gqm_sym.runtime.gradients.lanes.operations import LaneRecorder, WithoutRuleError
 from gqm_sym.runtime.gradients.lanes.scaling import Plan, Terms, combined, terms_of
-from gqm_sym.runtime.gradients.programs import Program, Source
+from gqm_sym.runtime.gradients.programs import Program, Source, on_lap
 from gqm_sym.runtime.gradients.programs import assemble as in_double_double
 from gqm_sym.runtime.quadrature.trapezoid import COSINES_SQUARED, NODE_SHARES, SINES_SQUARED
 
@@ -147,11 +147,8 @@ def lap_program(source: Source, direction: int, plan: Plan) -> LaneProgram:
     """
     n, variables = source.parameters, source.variables
     op = LaneRecorder(variables + 1, 2, by_inverses=True)
-    inputs, share = op.values[:variables], op.places[0]
-    p, lap = inputs[:n], op.number(source.domain(op, inputs[:n])[2])
-    lam = op.values[variables] + direction * lap * share
-    v2 = 2 * source.half(op, lam)
-    rate, adjoints = quotient_with_root(op, (lap / op.pi) * op.number(source.formulas.ds(op, lam, p)), v2)
+    inputs, (lap, ds, v2) = op.values[:variables], on_lap(op, source, direction, op.places[0])
+    rate, adjoints = quotient_with_root(op, (direction * lap / op.pi) * ds, v2)
     moves = [[op.number(int(i == k)) for i in range(variables)] for k in plan.moves(n + 2)]
     rates = [rate, *changes(op, adjoints, inputs, moves)]
     terms = terms_of(op, source, plan, (inputs[n], inputs[n + 1]))

@@ -21,6 +21,7 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     COSINES_SQUARED,
     LIBRATION,
+    MAX_CHANGE_BEFORE,
     MAX_NODES,
     MIN_INTERVALS,
     NODE_SHARES,
@@ -236,7 +237,8 @@ def judge_level(rows, n, nodes, ratios, verdict):  # type: ignore[no-untyped-def
         high, at_turn = rows[FACTOR_HIGH, j], rows[FACTOR_AT_TURN, j]
         least = choose(rows[LAUNCH_V2, j] == 0.0, from_rest, thrown)
         clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > at_turns * high)
-        verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
+        settled = has_converged(before, change, MAX_CHANGE_BEFORE)
+        verdict[j] = choose(clear, choose(settled, CONVERGED, CONTINUES), FAILED)
 
 
 @Inner

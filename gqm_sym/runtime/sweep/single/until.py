@@ -146,9 +146,8 @@ def part_of_swing(orbit, panels, t_max, exact):  # type: ignore[no-untyped-def]
         first, last = 0.5 * launch / pi, 0.5 * phi / pi
         if v < 0:
             first = 1.0 - first
-        moves_up = (turns == 1) == (v < 0)
-        last = last + (0.0 if turns == 0 else 1.0) if moves_up else (1.0 if turns < 2 else 2.0) - last
-        return orbit, (first, last)
+        since_low = turns + (v < 0)  # turns since the lower turning point, at which the period began
+        return orbit, (first, (since_low + 1) // 2 + (last if since_low % 2 == 0 else -last))
     below, above = (high - low) * sin(0.5 * phi) ** 2, (high - low) * cos(0.5 * phi) ** 2
     end = low + below if below < above else high - above
     if turns == 0:
