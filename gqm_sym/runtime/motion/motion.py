@@ -44,11 +44,6 @@ class Motion(History, Derivatives):
         return ()
 
     @property
-    def t_end(self) -> float:
-        """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
-        return self._known_end()
-
-    @property
     def rest_position(self) -> float:
         """The place at which the body comes to rest, as a value of the curve parameter.
 
