@@ -39,8 +39,8 @@ def within_range(lam0, first, last, period, within):  # type: ignore[no-untyped-
     return first if isfinite(first) else low, last if isfinite(last) else high
 
 
-# The distance, in units of the larger of 1 and the size of the launch place, at which it is judged whether a motion goes
-# on for ever. `solve` follows it about as far.
+# The distance, in units of the larger of 1 and the size of the launch place, at which it is judged whether a motion
+# goes on for ever. `solve` follows it about as far.
 FAR = 1e3
 
 
