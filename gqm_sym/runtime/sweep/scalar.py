@@ -311,6 +311,21 @@ def fill_ends(orbit, quantity, out):  # type: ignore[no-untyped-def]
     return ANSWERED
 
 
+@Inner
+def without_period(orbit, asked):  # type: ignore[no-untyped-def]
+    """Return the status of the answer for a body that comes to a cusp, or goes on for ever to an infinite end of its
+    ``orbit``; ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side as in `GivenCurve`.
+    """
+    quantity, target, side = asked
+    if side != 0:
+        return UNDECIDED
+    if quantity in PERIODIC:
+        return NOT_PERIODIC
+    if isfinite(orbit.high - orbit.low) or target == orbit.lam0:
+        return UNDECIDED
+    return NEVER_THERE if quantity == ARRIVAL_TIME else NOT_PERIODIC
+
+
 @entry(
     types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, GIVEN),
     nogil=True,
@@ -370,6 +385,6 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         elif status == ANSWERED:
             status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
             status = checked_arrival(status, quantity, t_max, values[k])
-        elif status == NOT_PERIODIC and (quantity not in PERIODIC or side != 0):
-            status = UNDECIDED
+        elif status == NOT_PERIODIC:
+            status = without_period(orbit, (quantity, target, side))
         statuses[k], routes[k] = status, SINGLE
