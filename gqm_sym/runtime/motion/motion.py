@@ -121,7 +121,7 @@ class Motion(History, Derivatives):
             horizon, ``t_max``; or if it is so small that its square is beyond the range of doubles.
         """
         found = extreme(self, SPEED, 1)
-        if found.value < LEAST_SPEED and self.kind != "rest":
+        if found.value < LEAST_SPEED and self.kind != "rest" and self._known_end() > 0.0:
             raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
         return found
 
