@@ -22,6 +22,7 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.launch.request import LEAST_SPEED
 from gqm_sym.runtime.quadrature.trapezoid import trapezoid_rates, trapezoid_workspace
 from gqm_sym.runtime.sweep.extremes import (
     EXTREMES,
@@ -38,6 +39,7 @@ from gqm_sym.runtime.sweep.quantities import (
     ARRIVAL_TIME,
     END_TIME,
     HALF_PERIOD,
+    MAX_SPEED,
     MIN_SPEED,
     NEVER_THERE,
     NOT_PERIODIC,
@@ -167,7 +169,8 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
         if not value <= until:
             return NEVER_THERE if value > until else UNDECIDED
     out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
-    return ANSWERED if isfinite(value) else UNDECIDED
+    is_beyond_doubles = quantity == MAX_SPEED and value < LEAST_SPEED
+    return ANSWERED if isfinite(value) and not is_beyond_doubles else UNDECIDED
 
 
 @Inner

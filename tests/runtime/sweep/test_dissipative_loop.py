@@ -68,6 +68,11 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
     assert (module.sweep("v_min", starts, **given).values == 0.0).all()
     for quantity in ("normal_force_min", "normal_force_max"):
         assert module.sweep(quantity, starts, m=2, **given | {"k": 2 * k}).values == pytest.approx(2 * G, rel=FEW)
+    for quantity in ("half_period", "period", "turning_points"):  # each launch was solved to say that there is none
+        without = module.sweep(quantity, [*starts, math.nan], **given)
+        assert without.route_counts() == {"single": 50, "solve": 1}
+        assert np.isnan(without.values).all()
+        assert without.status.tolist() == [quantities.NOT_PERIODIC] * 50 + [quantities.REFUSED]
     # Friction holds a body at the middle, on whichever side of the line it is; from above the line supports it.
     for contact, sense in (("above", 1.0), ("below", math.nan)):
         held = {what: module.sweep(what, [0.0], t_max=2.0, contact=contact, **given) for what in HELD}
