@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 from mpmath import mp, mpf
@@ -237,6 +238,21 @@ def test_the_smallest_swings(size: float, module_of: Callable[[str], ModuleType]
     if size > 1e-150:  # V**2 is a double
         thrown = catenary.solve(0, size, c=2, g="9.81")
         assert thrown.turning_points == pytest.approx((end, -end), rel=1e-15, abs=0.0)
+
+
+def test_speeds_whose_square_is_beyond_doubles(module_of: Callable[[str], ModuleType]) -> None:
+    """Such a launch is refused, and there is no largest speed of a motion that reaches no other, in a sweep neither.
+    The speed had fewer digits or was 0, a throw counted as rest, and sweeps and motions differed.
+    """
+    circle = module_of("circle")
+    speeds = [1e-149, 1e-155, 1e-170]
+    swept = circle.sweep("v_max", 0.0, speeds, L=1)
+    np.testing.assert_array_equal(swept.values, [1e-149, np.nan, np.nan])
+    released = circle.sweep("v_max", [1e-100, 1e-155, 1e-170], L=1, g=9.81)
+    np.testing.assert_allclose(released.values, [math.sqrt(9.81) * 1e-100, np.nan, np.nan], rtol=1e-15)
+    for size in (1e-155, 1e-170):
+        with pytest.raises(SolutionError, match="v_max: the speed is below 1e-150 m/s"):
+            _ = circle.solve(size, L=1, g=9.81).v_max
 
 
 @pytest.mark.parametrize("v0", [1e-2, 1e-5, 1e-7, 1e-10])

@@ -18,8 +18,9 @@ MAX_POINT_DISTANCE_SHARE = 1e-6
 ONLY_SIGN = {"bilateral": 0, "above": 1, "below": -1}
 CONTACTS = tuple(ONLY_SIGN)
 
-# The largest speed in m/s. Its square is in the range of doubles, with room for the factors that multiply it.
-MAX_SPEED = 1e150
+# The largest speed in m/s, and the smallest one but 0. Their squares are in the range of doubles, with room for the
+# factors that multiply them, and have all digits.
+MAX_SPEED, LEAST_SPEED = 1e150, 1e-150
 
 # The largest launch place on a closed curve, in laps: beyond it, doubles resolve places to a thousandth of a lap or
 # worse.
@@ -99,6 +100,10 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: tuple[Any, ...]
         )
     if speed.value > MAX_SPEED:
         raise LaunchError(f"v0: must be at most {MAX_SPEED:g} m/s, because its square is computed, got {speed.text}")
+    if 0.0 < speed.value < LEAST_SPEED:
+        raise LaunchError(
+            f"v0: must be 0 or at least {LEAST_SPEED:g} m/s, because its square is computed, got {speed.text}"
+        )
     horizon = None if t_max is None else read_number(t_max, where="t_max", unit="s")
     if horizon is not None and not horizon.value > 0.0:
         raise LaunchError(f"t_max: must be positive, got {horizon.text}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from gqm_sym.errors import SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.launch.request import Launch, LaunchRequest
+from gqm_sym.runtime.launch.request import LEAST_SPEED, Launch, LaunchRequest
 from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.parts.derivatives import Derivatives
@@ -42,11 +42,6 @@ class Motion(History, Derivatives):
         A launch from rest counts as a turning point at t = 0.
         """
         return ()
-
-    @property
-    def t_end(self) -> float:
-        """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
-        return self._known_end()
 
     @property
     def rest_position(self) -> float:
@@ -123,9 +118,12 @@ class Motion(History, Derivatives):
         ------
         SolutionError
             If the motion goes on for ever in another way, or approaches the value without reaching it; give it a
-            horizon, ``t_max``.
+            horizon, ``t_max``; or if it is so small that its square is beyond the range of doubles.
         """
-        return extreme(self, SPEED, 1)
+        found = extreme(self, SPEED, 1)
+        if found.value < LEAST_SPEED and self.kind != "rest" and self._known_end() > 0.0:
+            raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
+        return found
 
     @property
     @locked

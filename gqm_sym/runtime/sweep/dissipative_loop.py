@@ -19,7 +19,7 @@ from gqm_sym.runtime.compiled.strided import (
     lay_out,
 )
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.request import ONLY_SIGN
+from gqm_sym.runtime.launch.request import MAX_SPEED, ONLY_SIGN
 from gqm_sym.runtime.legs import questions
 from gqm_sym.runtime.legs.answers import Track, drive_along
 from gqm_sym.runtime.legs.body import SIZE, STATUS, VALUE
@@ -34,8 +34,13 @@ if TYPE_CHECKING:
 # that are driven at a time; and the number from which on a thread is worth starting.
 MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
-# The question to the driver for each quantity, by its name. Motions that lose energy have no period.
+# The quantities of motions that repeat, and the time in s up to which others are followed to know that they do not.
+PERIODIC, BEGINNING = ("half_period", "period", "turning_points"), 1e-300
+
+# The question to the driver for each quantity, by its name. Motions that lose energy have no period, so that of these
+# quantities only the beginning of a motion is followed, which decides whether there is one.
 QUESTIONS = {
+    **dict.fromkeys(PERIODIC, questions.END_TIME),
     "t_end": questions.END_TIME,
     "rest_position": questions.REST_PLACE,
     "time_at": questions.ARRIVAL,
@@ -57,11 +62,33 @@ class Question(NamedTuple):
         The last time in s, infinite if there is none.
     only_sign : int
         The only sign that N can have; 0 if it can have both.
+    without_answer : bool
+        Whether no motion has the quantity, and the question is only whether there is a motion.
     """
 
     question: int
     horizon: float
     only_sign: int
+    without_answer: bool
+
+
+def is_read_from_vector(formulas: "Formulas") -> bool:
+    """Return whether the length of the contact force is that of the vector along a path in space.
+
+    Elsewhere the module has its square, or a law with friction has it in the rows of a leg; on a banked track these
+    hold the component along the upward direction of riders.
+    """
+    loss = formulas.dissipation
+    assert loss is not None
+    return formulas.path_in_space is not None and loss.squared_contact is None and (formulas.sided or not loss.friction)
+
+
+def is_length_known(formulas: "Formulas") -> bool:
+    """Return whether the length of the contact force is known all along a leg."""
+    loss = formulas.dissipation
+    assert loss is not None
+    is_in_rows = loss.friction and not formulas.sided
+    return is_in_rows or loss.squared_contact is not None or is_read_from_vector(formulas)
 
 
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Question | None:
@@ -71,12 +98,14 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
         return None
     question = QUESTIONS[quantity]
     if quantity.startswith("normal_force") and not formulas.signed:
-        # The rows of a leg hold the length of the contact force, or the module has its square.
-        if loss.squared_contact is None and (loss.linear or formulas.sided):
+        if not is_length_known(formulas):
             return None
         question = questions.LEAST_LENGTH if question == questions.LEAST_LOAD else questions.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
-    return Question(question, horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
+    if not horizon > 0.0:
+        return None
+    without_answer = quantity in PERIODIC
+    return Question(question, BEGINNING if without_answer else horizon, ONLY_SIGN[contact], without_answer)
 
 
 def answer_driven(
@@ -100,6 +129,10 @@ def answer_driven(
     """
     assert formulas.dissipation is not None
     dissipation = formulas.dissipation.addresses()
+    if asked.question >= questions.LEAST_LENGTH and is_read_from_vector(formulas):
+        assert formulas.path_in_space is not None
+        dissipation = dissipation._replace(path_in_space=formulas.path_in_space.address)
+    no_period = np.int8(quantities.NOT_PERIODIC)
     record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
     mass = PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
@@ -117,7 +150,7 @@ def answer_driven(
         rows = _rows(some[PARAMETERS:], track.chart)
         drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
-        if asked.question >= questions.LEAST_LOAD:
+        if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
             values *= some[mass]
         status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
         without = ended != questions.FOUND
@@ -128,6 +161,8 @@ def answer_driven(
             decided = ended != questions.LEFT
             values, status = values[decided], status[decided]
             chosen = np.flatnonzero(decided) if chosen is None else chosen[decided]
+        if asked.without_answer:
+            values, status = np.full(values.size, nan), np.where(status == quantities.ANSWERED, no_period, status)
         there = slice(None) if chosen is None else chosen
         found.values[there, 0], found.status[there], found.route[there] = values, status, quantities.SINGLE
 
@@ -138,7 +173,7 @@ def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
     for line in (*lines[: TARGET + 1], *lines[PARAMETERS:]):
         if line.size > 1 or not isfinite(line[0]):
             possible &= np.isfinite(line)
-    possible &= (lines[LAM0] >= lines[DOMAIN_LOW]) & (lines[LAM0] <= lines[DOMAIN_HIGH])
+    possible &= (lines[LAM0] >= lines[DOMAIN_LOW]) & (lines[LAM0] <= lines[DOMAIN_HIGH]) & (lines[V0] <= MAX_SPEED)
     return possible
 
 

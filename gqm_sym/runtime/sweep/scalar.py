@@ -22,6 +22,7 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.launch.request import LEAST_SPEED
 from gqm_sym.runtime.quadrature.trapezoid import trapezoid_rates, trapezoid_workspace
 from gqm_sym.runtime.sweep.extremes import (
     EXTREMES,
@@ -38,6 +39,7 @@ from gqm_sym.runtime.sweep.quantities import (
     ARRIVAL_TIME,
     END_TIME,
     HALF_PERIOD,
+    MAX_SPEED,
     MIN_SPEED,
     NEVER_THERE,
     NOT_PERIODIC,
@@ -167,7 +169,8 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
         if not value <= until:
             return NEVER_THERE if value > until else UNDECIDED
     out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
-    return ANSWERED if isfinite(value) else UNDECIDED
+    is_beyond_doubles = quantity == MAX_SPEED and value < LEAST_SPEED
+    return ANSWERED if isfinite(value) and not is_beyond_doubles else UNDECIDED
 
 
 @Inner
@@ -308,6 +311,21 @@ def fill_ends(orbit, quantity, out):  # type: ignore[no-untyped-def]
     return ANSWERED
 
 
+@Inner
+def without_period(orbit, asked):  # type: ignore[no-untyped-def]
+    """Return the status of the answer for a body that comes to a cusp, or goes on for ever to an infinite end of its
+    ``orbit``; ``asked`` is the quantity, the place for ARRIVAL_TIME, and the side as in `GivenCurve`.
+    """
+    quantity, target, side = asked
+    if side != 0:
+        return UNDECIDED
+    if quantity in PERIODIC:
+        return NOT_PERIODIC
+    if isfinite(orbit.high - orbit.low) or target == orbit.lam0:
+        return UNDECIDED
+    return NEVER_THERE if quantity == ARRIVAL_TIME else NOT_PERIODIC
+
+
 @entry(
     types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, GIVEN),
     nogil=True,
@@ -367,6 +385,6 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         elif status == ANSWERED:
             status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
             status = checked_arrival(status, quantity, t_max, values[k])
-        elif status == NOT_PERIODIC and (quantity not in PERIODIC or side != 0):
-            status = UNDECIDED
+        elif status == NOT_PERIODIC:
+            status = without_period(orbit, (quantity, target, side))
         statuses[k], routes[k] = status, SINGLE

@@ -22,7 +22,7 @@ from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.double_double.tapes import record
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
-from gqm_sym.runtime.launch.request import MAX_LAPS, ONLY_SIGN, LaunchRequest, check_contact
+from gqm_sym.runtime.launch.request import LEAST_SPEED, MAX_LAPS, MAX_SPEED, ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.legs.answers import Track
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -147,8 +147,9 @@ def sweep_with_columns(
                     refuse(some)
             if chosen is not None:
                 answers.put(chosen, some)
-    if domain and (far := _too_far(columns[0], domain[2])).any():
-        answers.status[np.broadcast_to(far.ravel(), size)] = quantities.UNDECIDED
+    beyond = [_beyond_doubles(columns[1])] + ([_too_far(columns[0], domain[2])] if domain else [])
+    for refused in (found for found in beyond if found.any()):
+        answers.status[np.broadcast_to(refused.ravel(), size)] = quantities.UNDECIDED
     values = answers.values[:, found.columns].copy() if width else answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
@@ -162,6 +163,12 @@ def refuse(answers: Answers) -> None:
     """Refuse all launches that are possible as such."""
     refused = ~np.isin(answers.status, (quantities.NOT_FINITE, quantities.OUTSIDE_DOMAIN))
     answers.values[refused], answers.status[refused] = nan, quantities.REFUSED
+
+
+def _beyond_doubles(v0: Array) -> NDArray[np.bool_]:
+    """Return which launches `solve` refuses because the square of the speed is beyond doubles."""
+    found: NDArray[np.bool_] = ((v0 > MAX_SPEED) & (v0 < inf)) | ((v0 > 0.0) & (v0 < LEAST_SPEED))
+    return found
 
 
 def _too_far(lam0: Array, period: Array) -> NDArray[np.bool_]:

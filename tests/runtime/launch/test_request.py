@@ -34,6 +34,7 @@ def arch(module_of: Callable[[str], ModuleType]) -> ModuleType:
         ({"direction": 0}, r"direction: must be 1 or -1 .* got 0"),
         ({"contact": "left"}, "contact: must be one of bilateral, above, below, got 'left'"),
         ({"v0": -1}, "v0: is a speed and cannot be negative, got -1; use direction=-1"),
+        ({"v0": 1e-155}, "v0: must be 0 or at least 1e-150 m/s, because its square is computed, got 1e-155"),
         ({"t_max": 0}, "t_max: must be positive, got 0"),
         ({"point": (0, 1)}, "point: circle has a parameter of its own; launch by lam0"),
     ],

@@ -10,6 +10,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym.runtime.sweep import quantities
 
 Build = Callable[..., ModuleType]
 
@@ -117,3 +118,35 @@ def test_over_a_hilltop_inside_an_arc(generated_folder: Path) -> None:
     assert fastest.route_counts() == {"single": 3}
     assert fastest.values == pytest.approx(np.sqrt(2.0 * G * drop), rel=4e-15)
     assert module.sweep("v_min", starts, 0.0).values.tolist() == [0.0] * 3
+
+
+def test_bodies_that_go_on_for_ever(generated_folder: Path) -> None:
+    """A body escapes from a valley between level plains exactly if its energy suffices; it has no period and no end
+    then, and is never at places behind it. All of this is decided in the loop over launches.
+    """
+    curve = gqm.Curve.space(x="u", y="u/2", z="u**2/(1 + u**2)", parameter="u")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="escape", folder=generated_folder)
+    lam0, v0 = np.linspace(-2.5, 2.5, 21), np.tile([0.0, 1.0, 4.0], 7)
+    escapes = v0 * v0 > 2.0 * G / (1.0 + lam0 * lam0)
+    expected = np.where(escapes, quantities.NOT_PERIODIC, quantities.ANSWERED)
+    assert 5 < escapes.sum() < 15
+    for name in ("half_period", "turning_points", "v_max", "normal_force_min", "t_end"):
+        swept = module.sweep(name, lam0, v0)
+        assert swept.route_counts().get("solve", 0) == 0
+        assert (swept.status == (quantities.NOT_PERIODIC if name == "t_end" else expected)).all()
+    behind = module.sweep("time_at", lam0[escapes], v0[escapes], 1, lam=lam0[escapes] - 0.5)
+    assert (behind.status == quantities.NEVER_THERE).all()
+    assert behind.route_counts().get("solve", 0) == 0
+
+
+def test_a_body_that_comes_to_the_centre_of_a_spiral(generated_folder: Path) -> None:
+    """The parameter grows without bound there, but not the time, which is that of a fall along the length of the arc:
+    on the spiral of slope -1 on a cone, that is from rest sqrt(2 l/(g sin(alpha))).
+    """
+    spiral = gqm.Curve.space(x="exp(-u)*cos(u)", y="exp(-u)*sin(u)", z="exp(-u)", parameter="u")
+    module = gqm.build(gqm.derive(spiral, gqm.Gravity()), name="cone_spiral", folder=generated_folder)
+    lam0 = np.array([-1.0, 0.0, 1.0])
+    length = np.sqrt(3.0) * np.exp(-lam0)
+    swept = module.sweep("t_end", lam0)
+    assert swept.values == pytest.approx(np.sqrt(2.0 * np.sqrt(3.0) * length / G), rel=1e-14)
+    assert (module.sweep("half_period", lam0).status == quantities.NOT_PERIODIC).all()

@@ -19,6 +19,7 @@ from gqm_sym.runtime.double_double.nodes import panel_rule
 from gqm_sym.runtime.gradients.evaluation import MEAN, fill_panel_means, values
 from gqm_sym.runtime.gradients.formula_orbit import PI, source_of, variables_of
 from gqm_sym.runtime.gradients.panels import UNDECIDED, rule_with_tails
+from gqm_sym.runtime.gradients.passages.beside_cusp import BesideCusp
 from gqm_sym.runtime.gradients.path import (
     CURVATURE,
     DS,
@@ -51,6 +52,9 @@ NEWTON_STEPS = 2
 # Changes along a motion are resolved if the last two Legendre coefficients on all panels of the phase are below this
 # share of the largest value; panels are doubled from the first to the second number.
 MAX_TAIL, MIN_PANELS, MAX_PANELS = 1e-14, 2, 128
+
+# The widest span that is tried for places beside a cusp.
+WIDEST_SPAN = 4.0**8
 
 # The length of a path changes by an integral on panels, which are halved until it changes by less than this share of
 # the largest; at most so many times.
@@ -106,6 +110,7 @@ class PassageChanges:
         has_to_turn = turn is not None and problem.w0 != 0.0
         self._side = -heading if has_to_turn else heading
         self._known: dict[float, PanelSeries | None] = {}
+        self._beside_cusp: dict[float, BesideCusp] = {}
         self._before_turn: Array | None = None
         self.source, self.variables = source_of(problem.formulas), variables_of(problem)
         self._parameters = np.ascontiguousarray(self.variables[:, : self.source.parameters])
@@ -182,6 +187,16 @@ class PassageChanges:
             self._known[span] = self._made(span)
         return self._known[span]
 
+    def _resolved(self, span: float) -> tuple[float, PanelSeries | None]:
+        """Return a span with its series: beside a cusp V**2 loses its digits, and ds too, and a wider span has its
+        nodes farther from there.
+        """
+        series, widest = self._series(span), min(abs(self._limit - self._base.high), WIDEST_SPAN)
+        while series is None and self._starts_at_cusp and 4.0 * span <= widest:
+            span *= 4.0
+            series = self._series(span)
+        return span, series
+
     def _made(self, span: float) -> PanelSeries | None:
         base, end = self._base, self._base.beside(self._base.high + self._side * span)
         a, b = (base, end) if self._side > 0 else (end, base)
@@ -204,6 +219,9 @@ class PassageChanges:
             tails = np.abs((samples @ to_legendre())[:, :, -2:]).max(axis=(1, 2))
             rounding = np.append(errors[1:].max(axis=1), np.zeros(len(arcs)))
             if (tails <= MAX_TAIL * sizes + rounding).all():
+                if self._starts_at_cusp:
+                    near = (samples / np.sin(phi).reshape(panels, -1))[:, 0 if self._side > 0 else -1]
+                    self._beside_cusp[span] = BesideCusp(edges[1], near[:, :: self._side])
                 return PanelSeries(edges, samples)
             panels *= 2
         return None
@@ -216,9 +234,10 @@ class PassageChanges:
         distances = np.maximum(0.0, side * ((lam - base.high) - base.low))
         slopes, arcs = np.zeros((self.source.variables, lam.size)), np.zeros((count, lam.size))
         spans = np.array([self._span(distance) if distance > 0.0 else 0.0 for distance in distances.tolist()])
-        for span in np.unique(spans[spans > 0.0]).tolist():
-            here = np.flatnonzero(spans == span)
-            series, near = self._series(span), distances[here]
+        for wanted in np.unique(spans[spans > 0.0]).tolist():
+            here = np.flatnonzero(spans == wanted)
+            span, series = self._resolved(wanted)
+            near = distances[here]
             if series is None:
                 for k in here.tolist():
                     slopes[:, k] = self._time(base, base.beside(float(lam[k])))
@@ -228,15 +247,26 @@ class PassageChanges:
             found = series(phi if side > 0 else np.pi - phi)[1]
             if side < 0:
                 found = series(np.array([np.pi]))[1] - found
+            if span in self._beside_cusp:
+                self._beside_cusp[span].fill(phi, found)
             slopes[:-1, here], arcs[:, here] = found[:-count], side * found[-count:]
         return slopes, arcs
+
+    @cached_property
+    def _launch_arcs(self) -> Array:
+        """The derivatives of the arc length from the base to the launch place; they are the same place after a release
+        at rest, whose second double would be a distance otherwise.
+        """
+        if self._base is self.launch:
+            return np.zeros((self.source.parameters, 1))
+        return self._from_base(np.array([self.launch.high]))[1]
 
     def arrivals(self, lam: Array, has_turned: Array) -> tuple[Array, Array]:
         """Return the derivatives of the times at which the body is at places that move with the base, and those of arc
         lengths from the launch at fixed places.
         """
         slopes, arcs = self._from_base(lam)
-        return self._since_launch(slopes, has_turned), arcs - self._from_base(np.array([self.launch.high]))[1]
+        return self._since_launch(slopes, has_turned), arcs - self._launch_arcs
 
     def _since_launch(self, slopes: Array, has_turned: Array) -> Array:
         """Return the derivatives of times from the launch, given those of the times between places and the base."""
@@ -259,6 +289,8 @@ class PassageChanges:
             delay = np.hypot.reduce(bends) / abs(half_bend)
         else:
             delay = np.nan  # in that direction the body would leave the curve
+        if self._starts_at_cusp:
+            slopes[self.source.parameters] = 0.0  # but for the rounding of the place
         slopes[self.source.parameters + 1] -= problem.launch.direction * self._heading * delay
         return slopes
 
@@ -285,6 +317,9 @@ class PassageChanges:
         """Return the derivatives of lam, s, x, z, v, N and y at fixed times: of shape (7, variables, times)."""
         slopes, arcs = self.arrivals(lam, has_turned)
         path, local = self._path(lam), self._local(lam)
+        if self._starts_at_cusp and self.launch.high != 0.0:
+            # The place is rounded, and beside the cusp V changes with it as much as ds.
+            v = np.where(local[0, 0] > 0.0, np.copysign(np.sqrt(2.0 * local[0, 0]), v), v)
         count, base = self.source.parameters, self._base.moves
         # At a launch from a cusp ds, V and the slope of V**2 vanish, so that the place does not change.
         is_at_cusp = np.logical_not(has_turned) & (lam == self.launch.high) & self._starts_at_cusp
@@ -299,6 +334,8 @@ class PassageChanges:
         change = total + (error + (rest + partials[:, 1]))
         ratio = np.divide(change, 2.0 * half, where=half > 0.0, out=np.zeros_like(change))
         faster = v * ratio - local[1, 0] / ds * slopes
+        if self._starts_at_cusp:
+            faster[count] = 0.0
         faster[count + 1] += self._problem.launch.direction * is_at_cusp
 
         def whole(row: int) -> Array:

@@ -10,6 +10,7 @@ from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import check_force
+from gqm_sym.runtime.gradients.passages.launch_limit import limit_at_launch
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
@@ -17,6 +18,9 @@ from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.parts.positions import Positions
+
+# The longest time in s after a launch from a cusp from which the derivatives of the contact force there follow.
+LONGEST_START = 16.0
 
 
 class Derivatives(Positions):
@@ -153,7 +157,8 @@ class Derivatives(Positions):
         """Return the derivatives of the state at given times with respect to launch and run-time parameters.
 
         For a periodic motion they are as accurate, and take as long, after a million periods as after one. With losses
-        they are passed on from leg to leg.
+        they are passed on from leg to leg. Those at t = 0 of a body that is released at rest from a cusp are the limits
+        just after the launch, because the curvature is infinite at the cusp.
 
         Parameters
         ----------
@@ -177,6 +182,12 @@ class Derivatives(Positions):
         check_force(self.problem.formulas, "sensitivity")
         found = self._sensitivity(t, wrt)
         self._check_known("sensitivity", found.wrt, found.lam)
+        at_launch = np.asarray(self._times(t)[0] == 0.0).reshape(found.lam.shape[1:])
+        if at_launch.any() and self.problem.w0 == 0.0 and is_cusp(self.problem, self.problem.lam0):
+            # The curvature is infinite there, and only the contact force after the launch has derivatives.
+            found.normal_force[:, at_launch] = limit_at_launch(
+                lambda times: self._sensitivity(times, wrt).normal_force, min(self.t_end, LONGEST_START)
+            )[:, np.newaxis]
         return found
 
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:

@@ -77,6 +77,11 @@ class Positions(ChecksArguments, ABC):
         """
         return self._horizon
 
+    @property
+    def t_end(self) -> float:
+        """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
+        return self._known_end()
+
     def _end_text(self) -> str:
         return "the horizon t_max"
 

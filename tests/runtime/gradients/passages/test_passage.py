@@ -201,8 +201,10 @@ def test_lifted_off_at_once(generated_folder: Path) -> None:
 def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None:
     """Along a cycloid released from its cusp, the angle of the wheel is sqrt(g/R) times the time, and does not
     change with the launch place in first order. With a launch speed v0 the body is earlier by v0/g. At the launch
-    itself place and speed change by the launch speed alone. With losses the derivatives with respect to the launch
-    speed were refused, and at the launch all of them. A launch out of the curve is refused.
+    itself place and speed change by the launch speed alone, and N = 2 m g sin(u/2), which changes with the angle u, by
+    m sqrt(g/R). With losses the derivatives with respect to the launch speed were refused, and at the launch all of
+    them. Without losses those at times up to 1e-6 s were refused, and those of N at the launch were NaN, or 0 with
+    losses. A launch out of the curve is refused.
     """
     wheel = {"x": "R*(u - sin(u))", "z": "R*(cos(u) - 1)", "parameter": "u", "domain": (0, 3)}
     curve = gqm.Curve.parametric(**wheel, parameters={"R": "1/2"})
@@ -221,10 +223,37 @@ def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None
     at_launch = motion.sensitivity(0.0, (*names, "v0"))
     np.testing.assert_array_equal([at_launch.lam, at_launch.x, at_launch.z], 0.0)
     assert at_launch.v.tolist() == [0.0, 0.0, 0.0, 1.0]
+    np.testing.assert_allclose(at_launch.normal_force, [0.0, 0.0, 0.0, rate], rtol=1e-13, atol=1e-13)
+    soon = motion.sensitivity([1e-7, 1e-6], (*names, "v0"))  # the place of the state has an error of 1e-17 there
+    angle = rate * np.array([1e-7, 1e-6])
+    wanted_soon = [-angle, 0.5 * angle / given[1], 0.0 * angle, np.full(2, rate / given[1])]
+    np.testing.assert_allclose(soon.lam, wanted_soon, rtol=1e-10)
+    np.testing.assert_allclose(soon.normal_force[3], rate, rtol=1e-10)
     motion = module.solve(0, 0, -1)
     for ask in (lambda: motion.gradient("time_at", lam=2), lambda: motion.sensitivity([0.1, 0.2])):
         with pytest.raises(SolutionError, match="respect to v0, because the body is released at rest from a cusp"):
             ask()
+
+
+@pytest.mark.extended
+def test_released_from_a_cusp_whose_place_is_rounded(generated_folder: Path) -> None:
+    """A body on a deltoid is released at a cusp at 2 pi/3. Its path depends on sqrt(g) t alone, and with a launch speed
+    it is earlier by that over the acceleration, g cos(30 degrees). All such derivatives were refused.
+    """
+    curve = gqm.Curve.parametric(x="2*cos(t) + cos(2*t)", z="2*sin(t) - sin(2*t)", parameter="t", period="2*pi")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="rounded_cusp", folder=generated_folder)
+    motion, times, names = module.solve("2*pi/3"), np.array([1e-6, 1e-3, 0.1, 0.5]), ("g", "lam0", "v0")
+    found, state = motion.sensitivity(times, names), motion.state(times)
+    pull = 9.81 * np.sqrt(0.75)
+    np.testing.assert_allclose(found.s[0], 0.5 * times * state.v / 9.81, rtol=1e-9)  # the place is rounded
+    np.testing.assert_allclose(found.s[0, 2:], 0.5 * times[2:] * state.v[2:] / 9.81, rtol=1e-13)
+    np.testing.assert_allclose(found.s[2], state.v / pull, rtol=1e-9)
+    np.testing.assert_allclose(found.s[2, 2:], state.v[2:] / pull, rtol=1e-13)
+    for row in (found.lam, found.v, found.normal_force):
+        np.testing.assert_array_equal(row[1], 0.0)
+    at_launch = motion.sensitivity([0.0, 1e-6], names)
+    np.testing.assert_allclose(at_launch.normal_force[:, 0], [0.5, 0.0, -1.18993761819214], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(at_launch.normal_force[:, 0], at_launch.normal_force[:, 1], rtol=4e-6, atol=1e-15)
 
 
 @pytest.mark.parametrize(
