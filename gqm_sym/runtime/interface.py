@@ -222,6 +222,8 @@ class Dissipation(NamedTuple):
         Whether it is linear in V**2.
     squared_contact : int
         The memory cell with the address of this function; 0 if there is none.
+    path_in_space : int
+        That of this function where the contact force is read by it, as a length in N; 0 elsewhere.
     """
 
     speed_equation: int
@@ -230,6 +232,7 @@ class Dissipation(NamedTuple):
     kinked: bool
     linear: bool
     squared_contact: int
+    path_in_space: int
 
 
 class DissipativeFunctions(NamedTuple):
@@ -246,7 +249,7 @@ class DissipativeFunctions(NamedTuple):
         """Return the memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         squared_contact = self.squared_contact.address if self.squared_contact else 0
-        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear, squared_contact)
+        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear, squared_contact, 0)
 
 
 class SeparatedTerms(NamedTuple):

@@ -92,7 +92,7 @@ from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS
 # has left the range of doubles.
 END_REST, END_LIFTOFF_AT_ONCE, END_OUT_OF_DOMAIN, END_OVERFLOW = range(10, 14)
 
-DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean, INTEGER), Dissipation)
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *(types.boolean,) * 3, INTEGER, INTEGER), Dissipation)
 
 # The width of the first panel as a share of the first step of a search. The narrower it is, the more digits early times
 # have.
@@ -257,7 +257,9 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     width = expected_width(body)
-    blocks, branch = blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
+    # One polynomial for a leg from turn to turn resolves functions of V**2, not of V.
+    has_v = reading.length and dissipation.path_in_space != 0
+    blocks, branch = 0 if has_v else blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
     # Along a chart, legs are followed by other data.
     may_divide = dissipation.kinked or dissipation.squared_contact != 0
     has_kinks = may_divide and dissipation.linear and joints.breaks.size == 0

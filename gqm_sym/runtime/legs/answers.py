@@ -116,9 +116,12 @@ class Track(NamedTuple):
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """Return the answer for one body with its status."""
     findings = Findings(inf, -inf)
-    reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     function, sign = sought_extreme(question)
-    has_length = function == LENGTH and dissipation.squared_contact != 0
+    has_vector = function == LENGTH and dissipation.path_in_space != 0
+    has_length = has_vector or (function == LENGTH and dissipation.squared_contact != 0)
+    # Such a length depends on V, which is smooth on panels alone.
+    extremes = PANELS if has_vector else PEAKS
+    reads = extremes if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     predicted, agreements = np.nan, 0
     for _ in range(MAX_LEGS if question > REST_PLACE or body[HORIZON] < inf else MOST_LEGS):
         reading, before = Reading(reads, function != SPEED, has_length, sign, findings.peak), body[LEG_BEFORE]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
-from gqm_sym.runtime.compiled.calls import call_squared_contact
+from gqm_sym.runtime.compiled.calls import call_path_in_space, call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.advance import END_LIFTOFF_AT_ONCE, END_REST
 from gqm_sym.runtime.legs.body import (
@@ -126,7 +126,7 @@ def has_passed(dissipation, p, breaks, body, question, peak, record):  # type: i
     if question < LEAST_LOAD:
         return True
     is_length, sign, point = question >= LEAST_LENGTH, sought_extreme(question)[1], point_buffer()
-    if is_length and dissipation.squared_contact == 0:
+    if is_length and (dissipation.squared_contact == 0 or dissipation.path_in_space != 0):
         return False
     forces = forces_on(dissipation, p, 1)
     count = PLACES + PLACES_PER_PANEL * int(record[AHEAD] + record[BACK]) + PLACES_PER_BREAK * breaks.size
@@ -181,8 +181,14 @@ def sought_extreme(question):  # type: ignore[no-untyped-def]
 
 @Inner
 def load_at(dissipation, p, question, place, direction, v2):  # type: ignore[no-untyped-def]
-    """Return the contact force per mass, or its length, on a body at a place."""
+    """Return the contact force per mass, or its length, on a body at a place; the length of the contact force itself
+    where `interface.Dissipation.path_in_space` gives it.
+    """
     point = point_buffer()
+    if question >= LEAST_LENGTH and dissipation.path_in_space != 0:
+        point[0], point[1] = place, v2
+        call_path_in_space(dissipation.path_in_space, 1, point, point[1:], float(direction), p, point[2:])
+        return sqrt(point[3] ** 2 + point[4] ** 2 + point[5] ** 2)
     if question >= LEAST_LENGTH and dissipation.squared_contact != 0:
         point[0] = place
         call_squared_contact(dissipation.squared_contact, 1, point, p, point[2:])

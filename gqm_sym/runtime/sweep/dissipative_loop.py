@@ -72,6 +72,25 @@ class Question(NamedTuple):
     without_answer: bool
 
 
+def is_read_from_vector(formulas: "Formulas") -> bool:
+    """Return whether the length of the contact force is that of the vector along a path in space.
+
+    Elsewhere the module has its square, or a law with friction has it in the rows of a leg; on a banked track these
+    hold the component along the upward direction of riders.
+    """
+    loss = formulas.dissipation
+    assert loss is not None
+    return formulas.path_in_space is not None and loss.squared_contact is None and (formulas.sided or not loss.friction)
+
+
+def is_length_known(formulas: "Formulas") -> bool:
+    """Return whether the length of the contact force is known all along a leg."""
+    loss = formulas.dissipation
+    assert loss is not None
+    is_in_rows = loss.friction and not formulas.sided
+    return is_in_rows or loss.squared_contact is not None or is_read_from_vector(formulas)
+
+
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Question | None:
     """Return the question to compiled code for a quantity; None if motions must be solved, or no energy is lost."""
     loss = formulas.dissipation
@@ -79,8 +98,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
         return None
     question = QUESTIONS[quantity]
     if quantity.startswith("normal_force") and not formulas.signed:
-        # The rows of a leg hold the length of the contact force, or the module has its square.
-        if loss.squared_contact is None and (loss.linear or formulas.sided):
+        if not is_length_known(formulas):
             return None
         question = questions.LEAST_LENGTH if question == questions.LEAST_LOAD else questions.MOST_LENGTH
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
@@ -111,6 +129,9 @@ def answer_driven(
     """
     assert formulas.dissipation is not None
     dissipation = formulas.dissipation.addresses()
+    if asked.question >= questions.LEAST_LENGTH and is_read_from_vector(formulas):
+        assert formulas.path_in_space is not None
+        dissipation = dissipation._replace(path_in_space=formulas.path_in_space.address)
     no_period = np.int8(quantities.NOT_PERIODIC)
     record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
     mass = PARAMETERS + list(formulas.parameters).index("m")
@@ -129,7 +150,7 @@ def answer_driven(
         rows = _rows(some[PARAMETERS:], track.chart)
         drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
-        if asked.question >= questions.LEAST_LOAD:
+        if asked.question >= questions.LEAST_LOAD and not dissipation.path_in_space:
             values *= some[mass]
         status = np.full(ended.size, quantities.ANSWERED, dtype=np.int8)
         without = ended != questions.FOUND

@@ -110,13 +110,21 @@ def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
 
 
 @pytest.mark.extended
+@pytest.mark.parametrize("roll", [None, "u/5"])
+@pytest.mark.parametrize("loss", ["mu", "b", "c"])
 @pytest.mark.parametrize("quantity", ["normal_force_max", "normal_force_min"])
-def test_the_contact_force_with_friction_in_a_rotating_frame(quantity: str, build: Build) -> None:
+def test_the_contact_force_with_losses_in_a_rotating_frame(
+    quantity: str, loss: str, roll: str | None, build: Build
+) -> None:
     """On a space curve N contains the Coriolis force, so it is not linear in V**2 and depends on the direction of
     motion. Newton's equations in the rotating frame are integrated beside, up to before the first turn.
+
+    The law contains N with friction only, and with a roll its rows hold N along the upward direction of riders.
     """
-    curve = gqm.Curve.space(x="u", y="u**2/3", z="u**2/2 + sin(2*u)/10", parameter="u")
-    module = build("rubbed_in_a_rotating_frame", curve, gqm.RotatingFrame(Omega="0.5") + gqm.CoulombFriction(mu="0.2"))
+    curve = gqm.Curve.space(x="u", y="u**2/3", z="u**2/2 + sin(2*u)/10", parameter="u", roll=roll)
+    forces = {"mu": gqm.CoulombFriction(mu="0.2"), "b": gqm.QuadraticDrag(b="0.2"), "c": gqm.LinearDrag(c="0.2")}
+    name = f"{loss}_in_a_rotating_frame{'_rolled' if roll else ''}"
+    module = build(name, curve, gqm.RotatingFrame(Omega="0.5") + forces[loss])
     starts, end, axis = np.array([-1.2, -0.7, 0.9]), 0.9, np.array([0.0, 0.0, 0.5])
     swept = module.sweep(quantity, starts, t_max=end)
     assert swept.route_counts() == {"single": 3}
@@ -134,7 +142,9 @@ def test_the_contact_force_with_friction_in_a_rotating_frame(quantity: str, buil
     def moving(_: float, state: Any, way: float) -> list[float]:
         u, rate = state
         along, load = contact(u, rate)
-        return [rate, along - way * 0.2 * load / math.hypot(1.0, 2 * u / 3, u + 0.2 * math.cos(2 * u))]
+        metric = math.hypot(1.0, 2 * u / 3, u + 0.2 * math.cos(2 * u))
+        slowed = {"mu": load, "b": (metric * rate) ** 2, "c": metric * abs(rate)}[loss]
+        return [rate, along - way * 0.2 * slowed / metric]
 
     sign, times = 1.0 if quantity.endswith("max") else -1.0, np.linspace(0.0, end, 400)
     for start, value in zip(starts.tolist(), swept.values.tolist(), strict=True):

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.runtime.compiled.calls import call_speed_equation, call_squared_contact
+from gqm_sym.runtime.compiled.calls import call_path_in_space, call_speed_equation, call_squared_contact
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import copied, fused, on_stack, over_rows
 from gqm_sym.runtime.compiled.types import Array
@@ -98,6 +98,7 @@ load_per_mass_row = over_rows(lambda n0, kappa, w: n0 + kappa * w, WIDE)
 load_size_row = over_rows(lambda ds, n0, kappa, w: abs(ds) * (abs(n0) + abs(kappa * w)), WIDE)
 root_row = over_rows(np.sqrt, WIDE)
 length_row = over_rows(lambda a, b, c, w: np.sqrt(a + w * (b + w * c) + LEAST_SQUARE), WIDE)
+vector_length_row = over_rows(lambda x, y, z: np.sqrt(x * x + y * y + z * z), WIDE)
 time_rate_row = over_rows(lambda ds, speed, factor: factor * ds / speed, WIDE)
 arc_rate_row = over_rows(lambda ds, y, slope, g: ds * (slope + 2.0 * g * y), WIDE)
 
@@ -125,7 +126,7 @@ class Forces(NamedTuple):
         As in `interface.Dissipation`.
     direction : int
         The sign of dlam/dt.
-    squared_contact : int
+    squared_contact, path_in_space : int
         As in `interface.Dissipation`.
     """
 
@@ -136,6 +137,7 @@ class Forces(NamedTuple):
     linear: bool
     direction: int
     squared_contact: int
+    path_in_space: int
 
 
 @Inner
@@ -149,6 +151,7 @@ def forces_on(dissipation, p, direction):  # type: ignore[no-untyped-def]
         dissipation.linear,
         direction,
         dissipation.squared_contact,
+        dissipation.path_in_space,
     )
 
 
@@ -290,9 +293,18 @@ def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_length(forces, march, panel, work):  # type: ignore[no-untyped-def]
-    """Replace the rows N0 and KAPPA of a computed panel by the length of the contact force per mass, and 0."""
-    if forces.linear:
+    """Replace the rows N0 and KAPPA of a computed panel by the length of the contact force per mass, and 0; by that of
+    the contact force itself where `interface.Dissipation.path_in_space` gives it.
+    """
+    if forces.linear or forces.path_in_space != 0:
         lay_places(march, panel, SERIES, work)
+    if forces.path_in_space != 0:
+        places, v2, out = work[SERIES : SERIES + WIDE], work[W : W + WIDE], work[AT_REST : AT_REST + 4 * WIDE]
+        call_path_in_space(forces.path_in_space, WIDE, places, v2, float(forces.direction), forces.params, out)
+        vector_length_row(work, N0, AT_REST + WIDE, AT_REST + 2 * WIDE, AT_REST + 3 * WIDE)
+        copy_row(work, KAPPA, 0.0)
+        return
+    if forces.linear:
         fill_square(forces, SERIES, work)
     length_row(work, N0, AT_REST, MIXED, TURNING, W)
     copy_row(work, KAPPA, 0.0)

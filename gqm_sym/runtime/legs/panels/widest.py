@@ -111,8 +111,9 @@ class PanelRequest(NamedTuple):
 
 
 @Inner
-def resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work):  # type: ignore[no-untyped-def]
-    """Decide whether a panel resolves time as far as that is required.
+def resolve_time(forces, march, panel, request, largest_v2, worst, is_tiny_part, work):  # type: ignore[no-untyped-def]
+    """Decide whether a panel resolves time, and the length of the contact force if that is read, as far as that is
+    required.
 
     ``worst`` is the ratio of middle coefficients of the other functions. If the panel is a very small part of a smooth
     one (``is_tiny_part``), only noise is unresolved, which the error of the time includes.
@@ -125,7 +126,7 @@ def resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work): 
         The factor by which the next panel may be wider, or to which this one must be reduced if it does not meet the
         requirement.
     timed : bool
-        Whether time is resolved.
+        Whether they are resolved.
     """
     top, end, factor = max(request.largest_v2, largest_v2), work[W + COUNT], growth(worst)
     is_high = end >= HIGH_V2_RATIO * top or panel.v2 < HIGH_V2_RATIO * top
@@ -135,6 +136,9 @@ def resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work): 
         fill_rates(march, panel, work)
         work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
         timed, ratio = are_resolved(work, TIME_RATE, LOAD)
+        if timed and request.resolve_length:  # in a rotating frame that depends on V, as time does
+            timed, of_length = is_length_resolved(forces, march, panel, work)
+            ratio = max(ratio, of_length)
     timed = timed or (needed and is_tiny_part and work[TAILS] < inf)
     # If only time needs narrow panels while V**2 decreases, there is a turn ahead.
     turning = end < panel.v2 and ratio > TURNING_RATIO * worst
@@ -213,13 +217,19 @@ def are_all_resolved(forces, march, panel, request, last, work):  # type: ignore
         if not load_fine and forces.friction and not forces.linear and is_constant(work):
             load_fine, ratio = True, 0.0
         fine, worst = fine and load_fine, max(worst, ratio)
-    if request.resolve_length:
-        fill_length(forces, march, panel, work)
-        product(work, MEAN, N0, N0)
-        size = size_of(work, MEAN)
-        tail, middle, _ = examine(work, MEAN, size)
-        fine, worst = fine and tail <= LENGTH_TAIL * size, max(worst, middle / size)
     return fine, worst
+
+
+@Inner
+def is_length_resolved(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Return whether the square of the length of the contact force is resolved, and the ratio of its middle
+    coefficients to its size; the rows N0 and KAPPA become the length and 0.
+    """
+    fill_length(forces, march, panel, work)
+    product(work, MEAN, N0, N0)
+    size = size_of(work, MEAN)
+    tail, middle, _ = examine(work, MEAN, size)
+    return tail <= LENGTH_TAIL * size, middle / size
 
 
 @Inner
@@ -314,7 +324,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
         if fine and jump[0] == 1.0 and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
             is_tiny_part = width <= NOISE_WIDTH_RATIO * widest
-            done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_tiny_part, work)
+            done, factor, timed = resolve_time(forces, march, panel, request, largest_v2, worst, is_tiny_part, work)
             if is_at_cusp(length, unit, work):
                 return 0.0, step, False
             if done and next_width > 0.0:
