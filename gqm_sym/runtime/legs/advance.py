@@ -257,7 +257,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     width = expected_width(body)
-    # One polynomial for a leg from turn to turn resolves functions of V**2, not of V.
+    # From the rows of a leg from turn to turn, functions of V**2 are read, not those of V.
     has_v = reading.length and dissipation.path_in_space != 0
     blocks, branch = 0 if has_v else blocks_to_try(body, width), BranchPoint(body[BRANCH], body[BRANCH_HEIGHT])
     # Along a chart, legs are followed by other data.

@@ -17,6 +17,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.gaps.passing import ROUNDINGS_OF_TIMES
+from gqm_sym.runtime.legs.kinks.curvature import curvature_sign
 from gqm_sym.runtime.legs.kinks.places import next_kink, note_kinks
 from gqm_sym.runtime.legs.leg_record import HEAD, KNOWN_PEAK, NO_VALUES, PASSAGE, PEAKS, RIGHT, TIME, TIME_ERROR, Y_ROW
 from gqm_sym.runtime.legs.panels.breaks import offset, place_after
@@ -53,7 +54,6 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     begin_leg,
     blocks_for,
     choose_variable,
-    curvature_sign,
     extent_of_row,
     fill_load,
     fill_times,

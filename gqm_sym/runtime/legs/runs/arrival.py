@@ -7,6 +7,7 @@ long as V**2 at the place is not small. The width is given, which takes fewer va
 """
 
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.kinks.curvature import curvature_sign
 from gqm_sym.runtime.legs.kinks.places import note_kinks
 from gqm_sym.runtime.legs.leg_record import ROWS_COUNT_AS, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before
@@ -34,7 +35,6 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     begin_leg,
     blocks_for,
     choose_variable,
-    curvature_sign,
     fill_load,
     fill_times,
     fill_v2,

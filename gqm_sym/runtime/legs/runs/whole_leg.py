@@ -18,6 +18,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.kinks.curvature import curvature_sign
 from gqm_sym.runtime.legs.kinks.places import note_kinks, note_place
 from gqm_sym.runtime.legs.leg_record import (
     EXTENT,
@@ -74,7 +75,6 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     begin_leg,
     blocks_for,
     choose_variable,
-    curvature_sign,
     fill_load,
     fill_times,
     fill_v2,

@@ -32,7 +32,6 @@ from gqm_sym.runtime.legs.panels.equation import (
     TAILS,
     TIME_RATE,
     W_FACTOR,
-    D,
     P,
     Q,
     W,
@@ -50,7 +49,6 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, ZERO_TOLERANCE
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, extent, extent_of_block, size_of, size_of_block
 from gqm_sym.runtime.legs.panels.resolution import (
-    CANCELLATION_NOISE,
     FAR_FROM_ZERO_RATIO,
     ONE_SIGN_RATIO,
     TAIL_RATIO,
@@ -90,8 +88,6 @@ LEBESGUE = 4.0
 slope_row = over_rows(lambda p, q, w, step: step * (p - q * w), WIDE)
 moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
 size_row = over_rows(lambda w: abs(w), WIDE)
-quotient_row = over_rows(lambda one, other: one / other, WIDE)
-quotient_before_end_row = over_rows(lambda one, y: one / (y - 1.0), WIDE)
 resistance_row = over_rows(lambda q, y, v: 2.0 * v * q * np.sqrt(y - y * y), WIDE)
 v2_row = over_rows(lambda factor, y, h, bend: factor * (h * (y + bend * (y * y))), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
@@ -375,29 +371,6 @@ def fill_lengths(forces, blocks, work):  # type: ignore[no-untyped-def]
         w = work[blocks * W + j]
         square = terms[j] + w * (terms[wide + j] + w * terms[2 * wide + j])
         work[blocks * N0 + j], work[blocks * KAPPA + j] = sqrt(max(square, 0.0)), 0.0
-
-
-@Inner
-def curvature_sign(is_stretched, blocks, kinks, work):  # type: ignore[no-untyped-def]
-    """Return `sign_of_row` for the curvature, with a ratio that is compared with TAIL_RATIO; 0 if it is resolved.
-
-    The law at the nodes has the curvature itself, and only its sign matters here. Along a graph its coefficients
-    decrease more slowly than those of all that the law is made of. ``kinks`` says of the start and of the end whether
-    the curvature vanishes there; it is divided by the place with respect to them.
-    """
-    for at in range(0, blocks * WIDE, WIDE):
-        product(work, blocks * LOAD + at, blocks * DS + at, blocks * KAPPA + at)
-        if is_stretched:  # without the factor J, the bound of the sign is closer
-            quotient_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * D + at)
-        if kinks[0]:
-            quotient_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * NODES + at)
-        if kinks[1]:
-            quotient_before_end_row(work, blocks * LOAD + at, blocks * LOAD + at, blocks * NODES + at)
-    size = size_of_row(blocks, work, LOAD)
-    sign = 1 if work[blocks * LOAD] > 0.0 else -1
-    fine, kept, ratio = sign_of_row(blocks, work, LOAD, sign, (size, CANCELLATION_NOISE * size))
-    # FAR_FROM_ZERO_RATIO is about the root of TAIL_RATIO.
-    return fine, kept, 0.0 if fine else ratio * ratio
 
 
 @Inner
