@@ -215,6 +215,8 @@ def is_law_constant(march, panel, work):  # type: ignore[no-untyped-def]
     low, high = inf, -inf
     for j in range(COUNT):
         here = work[P + j] - work[Q + j] * work[W + j]
+        if here != here:
+            return False  # beyond a turn, where a law that contains a root of V**2 has no values
         low, high = min(low, here), max(high, here)
     if not (high - low) * work[D + COUNT] <= CONSTANT * panel.v2:
         return False

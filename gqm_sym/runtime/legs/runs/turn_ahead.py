@@ -41,6 +41,18 @@ def slope_if_singular(forces, place, contact_sign):  # type: ignore[no-untyped-d
 
 
 @Inner
+def ends_at_turn(forces, place, contact_sign):  # type: ignore[no-untyped-def]
+    """Return whether the law is infinitely steep at rest, or has no values for V**2 < 0 because it contains a root of
+    V**2, if only with the coefficient 0: then no panel goes beyond a turn.
+    """
+    if forces.linear or forces.squared_contact != 0:
+        return False
+    point = point_buffer()
+    beyond = slope_of_v2(forces, place, -LEAST_V2, contact_sign, point)
+    return beyond != beyond or slope_if_singular(forces, place, contact_sign) != 0.0
+
+
+@Inner
 def distance_to_turn(forces, march, panel, run_length, limits, work, point):  # type: ignore[no-untyped-def]
     """Return the distance to the turn ahead of a body; NaN if no turn is found that a single panel resolves, on which N
     keeps its sign.
@@ -61,8 +73,9 @@ def distance_to_turn(forces, march, panel, run_length, limits, work, point):  # 
     """
     v, span, (d, room) = march.direction, panel.span, limits
     here = place_after(march.origin, v * run_length)
-    if not d > 0.0:
-        d = -panel.v2 / slope_of_v2(forces, within(here[0], span), panel.v2, panel.contact_sign, point)
+    linear = -panel.v2 / slope_of_v2(forces, within(here[0], span), panel.v2, panel.contact_sign, point)
+    # Next to the turn V**2 is nearly linear, and what was expected before may be farther off than the turn.
+    d = linear if not d > 0.0 else min(d, 2.0 * linear) if linear > 0.0 else d
     request = PanelRequest(inf, 0.0, 0.0, ALWAYS, True, False)
     for _ in range(MAX_TRIES):
         if not 0.0 < d < room:
@@ -115,7 +128,7 @@ def panel_or_end(forces, march, panel, request, start, limits, work, point):  # 
     """
     run_length, stop = limits
     here = within(march.origin[0] + march.direction * run_length, panel.span)
-    if request.timing != ALWAYS and panel.left > 0.0 and slope_if_singular(forces, here, panel.contact_sign) != 0.0:
+    if request.timing != ALWAYS and panel.left > 0.0 and ends_at_turn(forces, here, panel.contact_sign):
         expected = start.width - run_length if start.v2 == 0.0 else 0.0
         far = distance_to_turn(forces, march, panel, run_length, (expected, stop - run_length), work, point)
         if far == far:

@@ -1,9 +1,10 @@
-"""Turns by a law that contains the speed itself agree with closed forms."""
+"""Turns by a law that contains the speed itself."""
 
 from collections.abc import Callable
 from typing import Any
 
 import mpmath as mp
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mpmath import mpf
@@ -12,6 +13,9 @@ import gqm_sym as gqm
 
 Build = Callable[..., Any]
 ULP = 2.0**-52
+ELLIPSE = gqm.Curve.parametric(x="3/2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
+HELIX = gqm.Curve.space(x="cos(u)", y="sin(u)", z="u**2/5", parameter="u")
+FRICTION = gqm.Gravity() + gqm.CoulombFriction(mu="1/8")
 
 
 @settings(max_examples=40)
@@ -36,3 +40,28 @@ def test_turns_of_a_spring_with_linear_drag(build: Build, stiffness: float, rati
             assert abs(leg.lam_end - place) <= 4 * ULP * abs(before)
             assert abs(leg.t_end - t) <= 8 * ULP * t
             before = place
+
+
+@pytest.mark.parametrize(
+    ("curve", "term", "launches"),
+    [
+        (ELLIPSE, gqm.LinearDrag(c=0), [(0.7411654652888897, 0.0, 1), (0.9914846944768181, 0.0, 1)]),
+        (
+            ELLIPSE,
+            gqm.Kernel.law("-direction*k*W**(3/4)", parameters={"k": 0}),
+            [(-2.6068268445611213, 0.07900794932924482, -1)],
+        ),
+        (HELIX, gqm.RotatingFrame(Omega=0), [(-2.6917607456319788, 0.0, 1), (2.351478941983469, 0.0, 1)]),
+    ],
+    ids=["drag", "power", "frame"],
+)
+def test_a_root_of_v2_with_the_coefficient_zero_changes_nothing(curve, term, launches, tmp_path):
+    """The law has no values beyond the turn, which a panel did go beyond if V**2 > 0 at one of its nodes only."""
+    plain = gqm.build(gqm.derive(curve, FRICTION), name="without_root", folder=tmp_path)
+    with_root = gqm.build(gqm.derive(curve, FRICTION + term), name="with_root", folder=tmp_path)
+    for lam0, v0, direction in launches:
+        legs = with_root.solve(lam0, v0, direction=direction).legs
+        wanted = plain.solve(lam0, v0, direction=direction).legs
+        assert [leg.end for leg in legs] == [leg.end for leg in wanted]
+        assert [leg.lam_end for leg in legs] == pytest.approx([leg.lam_end for leg in wanted], rel=0.0, abs=4e-15)
+        assert [leg.t_end for leg in legs] == pytest.approx([leg.t_end for leg in wanted], rel=2e-15)
