@@ -227,6 +227,7 @@ TESTED_THROUGH = {
     "multiprecision/exact_problem.py": "claims/test_degenerate.py",
     "multiprecision/exact_tracks.py": "runtime/charts/test_exact_normals.py",
     "multiprecision/fixed_point.py": "runtime/charts/test_exact_normals.py",
+    "multiprecision/slow_rates.py": "runtime/multiprecision/test_exact_panels.py",
     "multiprecision/gauss_legendre.py": "runtime/charts/test_exact_normals.py",
     "quadrature/equilibrium.py": "claims/test_dissipative.py",
     "quadrature/integrands.py": "runtime/quadrature/test_time_panels.py",

@@ -57,6 +57,9 @@ DOMAIN_END_V2_SHARE, GAIN_SAMPLES = 1e-12, 5
 # share of the first step.
 NEAR_CUSP = 1e-3
 
+# The smaller distances, as shares of that distance, at which ds is compared on a curve of unknown size.
+NEARER_TO_CUSP = 2.0 ** (-10.0 * np.arange(1.0, 7.0))
+
 # ds has no bound next to a place if it grows by more than the first factor each time that the distance decreases by the
 # second one, twice, to the third as a share of the parameter. It grows by less next to the pole of a logarithm, and
 # next to that of a power above -1/8.
@@ -374,10 +377,18 @@ def too_steep(problem: Problem, place: float) -> SolutionError:
 
 
 def is_cusp(problem: Problem, place: float, share: float = 1e-10) -> bool:
-    """Return whether ds vanishes at a place, up to a share of its values nearby."""
-    f, near = problem.functions, NEAR_CUSP * starting_step(problem)
-    ds = path_and_force_at(f.addresses, f.p, place + near * np.array([0.0, -1.0, 1.0]), np.zeros(3))[2]
-    return bool(ds[0] <= share * np.nanmax(ds[1:]))
+    """Return whether ds vanishes at a place, up to a share of its values nearby.
+
+    Where the domain does not tell how large the curve is, ds is compared at smaller distances too: a tiny smooth curve
+    has the same ds at some of them as at the place itself.
+    """
+    f, near = problem.functions, np.array([NEAR_CUSP * starting_step(problem)])
+    if not (problem.period or isfinite(problem.high - problem.low)):
+        nearer = near * NEARER_TO_CUSP
+        near = np.append(near, nearer[nearer >= NEAR_CUSP * abs(place)])
+    offsets = np.concatenate([[0.0], -near, near])
+    ds = path_and_force_at(f.addresses, f.p, place + offsets, np.zeros(offsets.size))[2]
+    return bool((ds[0] <= share * np.fmax(ds[1 : near.size + 1], ds[near.size + 1 :])).all())
 
 
 def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:

@@ -254,16 +254,17 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
                 continue
             if not isfinite(v2_far) or is_pole(fns, p, lam0, w0, direction * near, direction * far, arrays):
                 return FoundEnd(NOT_FINITE, direction * near, direction * far)
-        size = max(size, terms)
+        reached = max(size, terms)
         positive = 1
         if not lower >= 0.0:
             if upper <= 0.0 and v2_far <= 0.0:
-                return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, (size, passed), arrays)
-            positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, size)
+                return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, (reached, passed), arrays)
+            positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, reached)
         if positive < 0:
             return FoundEnd(CRITICAL, direction * near, direction * far)
         if positive:
-            near, v2_near, last_ds, passed = far, v2_far, far_ds, max(passed, terms)
+            # What V**2 consists of beyond a step that is halved says nothing about its rounding before.
+            near, v2_near, last_ds, size, passed = far, v2_far, far_ds, reached, max(passed, terms)
             step = 2.0 * width
         else:
             step = 0.5 * width

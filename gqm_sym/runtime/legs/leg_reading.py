@@ -40,7 +40,7 @@ from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
 from gqm_sym.runtime.legs.runs.whole_rows import whole_time_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, to_coefficients
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -174,13 +174,32 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def time_to_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-def]
+def time_by_series_in_phase(terms, count, phase, backwards):  # type: ignore[no-untyped-def]
+    """Return the result of `time_to_phase` for the ``count`` coefficients of a series in the phase angle."""
+    x, odd = 2.0 / pi * phase - 1.0, -1.0 if backwards else 1.0
+    rate, rate_after, time, time_after, at_start, here, after = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(count, 0, -1):
+        before = terms[k - 1] if k % 2 == 1 else odd * terms[k - 1]
+        # The integral of the series has the coefficients (c_(k-1) - c_(k+1))/(2 k); c_0 counts twice.
+        area = 0.5 * ((2.0 * before if k == 1 else before) - after) / k
+        rate, rate_after = fma(2.0 * x, rate, here - rate_after), rate
+        time, time_after = fma(2.0 * x, time, area - time_after), time
+        at_start += area if k % 2 == 0 else -area
+        after, here = here, before
+    return 0.5 * pi * (fma(x, time, -time_after) - at_start), fma(x, rate, here - rate_after)
+
+
+@Inner
+def time_to_phase(terms, form, phase, backwards):  # type: ignore[no-untyped-def]
     """Return the time from the start, or ``backwards`` from the end, of a leg to a phase angle of at most pi/2, and its
     derivative.
 
-    ``terms`` begins with the ``count`` coefficients of the time per phase angle.
+    ``terms`` begins with the coefficients of the time per phase angle, whose number the ``form`` tells
+    (`runs.whole_tables`).
     """
-    sign = 1.0 if backwards else -1.0
+    sign, count = 1.0 if backwards else -1.0, blocks_of(form) * WIDE - 1
+    if form > MAX_BLOCKS:
+        return time_by_series_in_phase(terms, count, phase, backwards)
     # The sum of c_k cos(k phase), with the signs of c_k that the direction requires, and its integral.
     c, s = cos(phase), sin(phase)
     rate, rate_after, time, time_after = 0.0, 0.0, 0.0, 0.0
@@ -201,16 +220,16 @@ def variable_of_rows(record, width):  # type: ignore[no-untyped-def]
 @Inner
 def passage_of_rows(record, covered, left):  # type: ignore[no-untyped-def]
     """Return the time from the start of a leg whose record has rows to a place, given its distances from both ends."""
-    terms, count = record[HEAD:], int(record[WHOLE]) * WIDE - 1
+    terms, form = record[HEAD:], int(record[WHOLE])
     if record[EXTENT] > 0.0:
         # From here on these are the distances in the leg's variable.
         variable = variable_of_rows(record, covered + left)
         covered = share_at(variable, covered)[0]
         left = share_at(reversed_variable(variable), left)[0]
     if covered <= left:
-        return time_to_phase(terms, count, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
+        return time_to_phase(terms, form, 2.0 * asin(sqrt(covered / (covered + left))), False)[0]
     total = record[TIME_FROM_START] + record[TIME_FROM_END]
-    return total - time_to_phase(terms, count, 2.0 * asin(sqrt(left / (covered + left))), True)[0]
+    return total - time_to_phase(terms, form, 2.0 * asin(sqrt(left / (covered + left))), True)[0]
 
 
 @Inner
@@ -218,12 +237,12 @@ def phase_of_rows(record, terms, time):  # type: ignore[no-untyped-def]
     """Return the phase angle at a time from the start of a leg whose record has rows, from the nearer end, and whether
     that is the end of the leg.
     """
-    total, count = record[TIME_FROM_START] + record[TIME_FROM_END], int(record[WHOLE]) * WIDE - 1
+    total, form = record[TIME_FROM_START] + record[TIME_FROM_END], int(record[WHOLE])
     backwards = time > record[TIME_FROM_START]
     wanted = total - time if backwards else time
     phase = 0.5 * pi * wanted / (record[TIME_FROM_END] if backwards else record[TIME_FROM_START])
     for _ in range(MAX_STEPS):
-        there, rate = time_to_phase(terms, count, phase, backwards)
+        there, rate = time_to_phase(terms, form, phase, backwards)
         step = (there - wanted) / rate
         phase = min(max(phase - step, 0.0), 0.5 * pi)
         if fabs(step) <= LAST_PHASE:
@@ -234,7 +253,7 @@ def phase_of_rows(record, terms, time):  # type: ignore[no-untyped-def]
 @Inner
 def place_of_rows(record, time):  # type: ignore[no-untyped-def]
     """Return the result of `place_at` for a record with the rows of a solved motion (`runs.whole_panels`)."""
-    rows, blocks, h, v = rows_buffer(), int(record[WHOLE]), record[WHOLE_WIDTH], record[HEADING]
+    rows, blocks, h, v = rows_buffer(), blocks_of(int(record[WHOLE])), record[WHOLE_WIDTH], record[HEADING]
     wide = blocks * WIDE
     if not time <= record[TIME_FROM_START] + record[TIME_FROM_END]:
         return np.nan

@@ -14,8 +14,8 @@ HALF_C               c/2 of the march variable (`panels.equation.March`); inf wh
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
-WHOLE                0; or, if the record has no panels but rows of the whole leg from HEAD on, the number of blocks
-                     of a row (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of the
+WHOLE                0; or, if the record has no panels but rows of the whole leg from HEAD on, their form
+                     (`runs.whole_tables`). The rows are, as far as they are read, the coefficients of the
                      time per phase angle, V**2, and N per mass. Where panels are read, they are those of
                      `runs.whole_panels`
 WHOLE_WIDTH          the width of a leg with rows from which panels can be made, or with a stretched variable; else 0
@@ -56,6 +56,7 @@ from gqm_sym.runtime.legs.panels.equation import (
 )
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, to_tails
 from gqm_sym.runtime.legs.panels.resolution import tail_of
+from gqm_sym.runtime.legs.runs.whole_tables import blocks_of
 
 START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
@@ -112,7 +113,7 @@ def total_time(record, begin, count):  # type: ignore[no-untyped-def]
 @Inner
 def pack(record):  # type: ignore[no-untyped-def]
     """Move the changes of N's sign on a leg that turns directly behind its rows or panels, and set USED."""
-    changes, wide = int(record[CHANGE_COUNT]), int(record[WHOLE]) * WIDE
+    changes, wide = int(record[CHANGE_COUNT]), blocks_of(int(record[WHOLE])) * WIDE
     used = HEAD + (MAX_ROWS * wide if wide > 0 else int(record[AHEAD] + record[BACK]) * COLUMNS)
     for k in range(changes):
         record[used + k] = record[record.size - changes + k]

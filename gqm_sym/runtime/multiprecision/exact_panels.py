@@ -14,6 +14,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.panel_rates import panel_rates
 from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem, two_doubles
+from gqm_sym.runtime.multiprecision.slow_rates import SlowRates
 from gqm_sym.runtime.quadrature.kronrod import KRONROD_WEIGHTS, NODES
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
@@ -75,6 +76,8 @@ class _Rates:
         self.scale, self.kind, self.ends = exact.at(DIGITS), kind, ends
         self.launch, self.tape = (exact.lam0, exact.v0), exact.tape()
         self.segment = two_doubles(ends[0]), two_doubles(ends[1] - ends[0])
+        has_joints = bool(self.scale.track.joints(*ends))
+        self.slow = None if self.tape is None or has_joints else SlowRates(self.scale, kind, ends)
 
     def __call__(self, middle: Any, reach: Any) -> Array:
         """Return rows of dt/dphi, ds/dphi and the regular factor of the speed, as `panel_rates`."""
@@ -82,6 +85,8 @@ class _Rates:
         if self.tape is not None:
             panel = *self.segment, two_doubles(middle), two_doubles(reach)
             values = panel_rates(self.tape, self.launch, self.kind, panel, ALL_NODES)
+        if values is None and self.slow is not None:
+            values = self.slow(middle, reach, ALL_NODES)
         return self._by_mpmath(middle, reach) if values is None else values
 
     def _by_mpmath(self, middle: Any, reach: Any) -> Array:

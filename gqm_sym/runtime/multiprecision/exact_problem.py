@@ -99,9 +99,10 @@ class ExactProblem:
     def slope_sign(self) -> int:
         """Return the sign of the effective potential's slope at the launch place, which may be zero."""
         for digits in PRECISIONS:
-            a = self.at(digits)
+            a, finer = self.at(digits), self.at(digits + GUARD_DIGITS)
             slope = a.effective_potential_slope(a.lam0)
-            if abs(slope) > a.mpf(10) ** (GUARD_DIGITS - a.digits) * (a.mpf(0.5) + abs(a.effective_potential(a.lam0))):
+            error = abs(finer.effective_potential_slope(finer.lam0) - finer.mpf(slope))
+            if abs(slope) > a.mpf(10) ** GUARD_DIGITS * error:
                 return 1 if slope > 0 else -1
         return 0
 
@@ -207,9 +208,8 @@ class Arithmetic:
         return self.track.effective_potential_slope(lam)
 
     def potential_curvature(self, lam: Any) -> Any:
-        """Return the second derivative of U with respect to lam, to about half of the digits."""
-        h = self.mpf(10) ** (-(self.digits // 3))
-        return (self.effective_potential_slope(lam + h) - self.effective_potential_slope(lam - h)) / (2 * h)
+        """Return the second derivative of U with respect to lam."""
+        return self.context.diff(self.effective_potential_slope, lam)
 
     def ds(self, lam: Any) -> Any:
         """Return ds/dlam."""

@@ -1,5 +1,7 @@
 """Extended precision lays panels over slow passages of hilltops."""
 
+import math
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -10,7 +12,9 @@ from paths import ROOT
 import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.loading import load
+from gqm_sym.runtime.multiprecision.exact_panels import ALL_NODES, DIGITS, _Rates, exact_ends
 from gqm_sym.runtime.multiprecision.gauss_legendre import legendre_rule
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 
 ENERGY, USEFUL = 2e-14, 1e-11
 # A random run found these launches: from rest, and slightly faster than necessary at a hilltop.
@@ -62,3 +66,32 @@ def test_gauss_legendre_rules(count: int, digits: int) -> None:
         for x, _, last in rule[:: count // 8]:
             assert abs(mp.legendre(count, x)) <= tolerance * count
             assert abs(mp.legendre(count - 1, x) - last) <= tolerance
+
+
+@pytest.mark.parametrize(
+    ("lam0", "v0", "kind", "ends"),
+    [
+        (math.pi, 0.0, TURN_TURN, (-math.pi, math.pi)),  # released 1e-16 beside the hilltop
+        (0.0, 2.0 * math.sqrt(9.81), REGULAR, (0.0, 2.0 * math.pi)),  # passes it with 1e-8 m/s
+        (math.pi, 0.0, FROM_TURN, (math.pi, 1.0)),
+    ],
+)
+def test_the_integrands_where_the_body_is_slow(
+    lam0: float, v0: float, kind: int, ends: tuple[float, float], module_of: Callable[[str], ModuleType]
+) -> None:
+    """By polynomials of the distance from a turning point or a hilltop they are those of 80 digits, which took up to
+    half a second a motion.
+    """
+    problem = module_of("circle").solve(lam0, v0, L=1, g=9.81).problem
+    exact = problem.functions.exact
+    known = exact_ends(exact, DIGITS, kind, *ends, (None, None))
+    rates, scale = _Rates(exact, kind, known), exact.at(DIGITS)
+    assert rates.slow is not None
+    begin = scale.context.pi / 2 if kind == REGULAR else scale.mpf(0)
+    for size in (1e-9, 1e-7, 1e-5):
+        middle, reach = begin + scale.mpf(1.5 * size), scale.mpf(0.5 * size)
+        if kind == REGULAR:
+            middle = scale.mpf(0.5) + middle - begin
+        found = rates.slow(middle, reach, ALL_NODES)
+        assert found is not None
+        np.testing.assert_allclose(found, rates._by_mpmath(middle, reach), rtol=1e-15)

@@ -25,15 +25,20 @@ BITS = 240
 PI = 31415926535897932384626433832795028841971693993751058209749445923078164062862 * (1 << BITS) // 10**76
 
 
-def _share(m: int, nodes: int) -> float:
-    """Return ``sin(pi m/(4 nodes))**2`` correctly rounded, because an error of the nodes would be one of every turning
-    point.
-    """
-    square = (PI * m // (2 * nodes)) ** 2 >> BITS  # the cosine of twice the angle
+def share_at_angle(angle: int) -> int:
+    """Return ``sin(angle/2)**2`` in fixed-point arithmetic."""
+    square = angle**2 >> BITS
     total, term, n = 0, square // 2, 2
     while term:
         total, term, n = total + term, -(term * square >> BITS) // ((n + 1) * (n + 2)), n + 2
-    return total / (2 << BITS)
+    return total // 2
+
+
+def node(m: int, nodes: int) -> int:
+    """Return ``sin(pi m/(4 nodes))**2`` in fixed-point arithmetic, because an error of the nodes would be one of every
+    turning point.
+    """
+    return share_at_angle(PI * m // (2 * nodes))
 
 
 @cache
@@ -49,7 +54,7 @@ def tables(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     wave = [*quarter, *quarter[-2::-1]]
     sines = np.array([*wave, *(-value for value in wave[1:-1])])  # sin(pi m / (2 nodes))
     degree, odd = np.arange(nodes), 2 * np.arange(nodes) + 1
-    shares = np.array([_share(m, nodes) for m in odd.tolist()])
+    shares = np.array([node(m, nodes) / (1 << BITS) for m in odd.tolist()])
     # T_k at node j, with x = -cos(angle).
     at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + nodes) % (4 * nodes)]
     coefficients = at_nodes * (2.0 / nodes)

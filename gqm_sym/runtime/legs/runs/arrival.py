@@ -33,10 +33,12 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
     blocks_for,
+    choose_variable,
     curvature_sign,
     fill_load,
     fill_times,
     fill_v2,
+    form_of,
     keeps_sign,
     load_sign,
     sample_leg,
@@ -96,7 +98,7 @@ def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: i
 
 
 @Inner
-def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no-untyped-def]
+def run_to_target(forces, start, branch, slope_at_rest, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from a turn to the place whose passage is to be found, if it passes it fast on one polynomial.
 
     Parameters and Returns are those of `whole_leg.run_whole`; the end, if there is one, has the code END_PAUSE.
@@ -112,6 +114,7 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
         attempt = first_attempt(blocks, branch, march, h)
+        choose_variable(slope_at_rest * h, work)
         begin_leg(1, work)
         while attempt.blocks > 0:
             blocks, variable = attempt.blocks, attempt.variable
@@ -121,7 +124,7 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
             fine, onwards, ratio = is_resolved(forces, march, panel, blocks, variable, start.kinks, work)
             if fine:
                 what, v2 = END_PAUSE, work[blocks * W + blocks * WIDE - 1]
-                to_arrival_time(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
+                to_arrival_time(form_of(blocks, work), work, blocks * TIME_RATE, work, blocks * TAILS)
                 record[TIME_FROM_START], record[TIME_FROM_END] = work[blocks * TAILS], 0.0
                 break
             if onwards == HAS_KINKS:
@@ -131,7 +134,7 @@ def run_to_target(forces, start, branch, route, off, record):  # type: ignore[no
                 attempt = next_attempt(attempt, onwards, ratio, march, work)
             else:  # for a single leg, a map would take as long as more nodes
                 attempt = Attempt(onwards, variable, attempt.branch, NOT_TRIED, 1.0)
-            carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work)
+            carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, FROM_TURN, work)
             blocks = attempt.blocks
         branch = attempt.branch
     return End(what, place, v2, nu, h, 0.0, place, 0.0, 0, ROWS_COUNT_AS, upcoming), blocks, branch

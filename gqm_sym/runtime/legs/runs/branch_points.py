@@ -3,13 +3,13 @@
 If the forces are not linear in V**2, an attempt begins with V**2 from the one before.
 """
 
-from math import fabs, inf, log, sqrt
+from math import asin, cos, cosh, fabs, inf, log, pi, sin, sinh, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.registers import on_stack, over_rows
 from gqm_sym.runtime.legs.panels.equation import (
     DS,
     EXPM1_Q,
@@ -35,8 +35,16 @@ from gqm_sym.runtime.legs.runs.leg_variable import (
     unstretched,
     variable_for,
 )
-from gqm_sym.runtime.legs.runs.whole_rows import begin_leg, examine_row, size_of_row, size_row
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_tails
+from gqm_sym.runtime.legs.runs.whole_rows import (
+    VARIABLE,
+    begin_leg,
+    examine_row,
+    keep_positive,
+    size_of_row,
+    size_row,
+    v2_row,
+)
+from gqm_sym.runtime.legs.runs.whole_tables import IN_PHASE, MAX_BLOCKS, to_coefficients, to_nodes, to_tails
 
 # The largest number of steps of Newton's method to a branch point, and the last step as a share of its height. The map
 # need not be that of the exact place.
@@ -58,6 +66,8 @@ LEAST_PART = 0.1
 # A map must be expected to save this factor of nodes, because estimates are rough, and other branch points may be as
 # near.
 LEAST_GAIN = 1.05
+
+factor_of_v2_row = over_rows(lambda w, y, bend: w / (y + bend * (y * y)), WIDE)
 
 series_buffer, terms_buffer = on_stack(WIDE), on_stack(MAX_BLOCKS * WIDE)
 
@@ -139,6 +149,9 @@ def zero_beside(work):  # type: ignore[no-untyped-def]
     if y > 0.0:
         to_coefficients(1, work, SERIES, terms, 0)
         x, y = zero_of_series(terms, x, y)
+        if work[VARIABLE] == IN_PHASE:
+            phase, height = 0.5 * pi * (1.0 + x), 0.5 * pi * y
+            x, y = -cos(phase) * cosh(height), fabs(sin(phase) * sinh(height))
     return (x, y) if fabs(x) <= 1.0 and 0.0 < y <= MAX_HEIGHT else (np.nan, np.nan)
 
 
@@ -240,10 +253,18 @@ def next_attempt(attempt, onwards, ratio, march, work):  # type: ignore[no-untyp
 
 
 @Inner
-def carry_v2(forces, known, old, blocks, new, work):  # type: ignore[no-untyped-def]
+def fill_phases(work, row, shares):  # type: ignore[no-untyped-def]
+    """Fill a row with the phase angles at a row of shares of the way, as shares of pi."""
+    for j in range(WIDE):
+        work[row + j] = 2.0 / pi * asin(sqrt(min(work[shares + j], 1.0)))
+
+
+@Inner
+def carry_v2(forces, known, old, blocks, new, bend, work):  # type: ignore[no-untyped-def]
     """Fill in the nodes, and the row W as far as it is known; return whether it is.
 
-    It is not carried into a variable that is less stretched, nor if the forces are linear in V**2.
+    It is not carried into a variable that is less stretched, nor if the forces are linear in V**2. What is carried is
+    ``W/(y + bend y**2)``, because the law may depend on the digits of the root of W beside a turn.
 
     Parameters
     ----------
@@ -254,6 +275,8 @@ def carry_v2(forces, known, old, blocks, new, work):  # type: ignore[no-untyped-
         The variable of the leg for that.
     blocks, new
         The same for the rows to be filled.
+    bend : float
+        As in `whole_rows.fill_v2`.
     work : array
     """
     if blocks == 0:
@@ -262,22 +285,30 @@ def carry_v2(forces, known, old, blocks, new, work):  # type: ignore[no-untyped-
         begin_leg(blocks, work)
         return False
     terms = terms_buffer()
+    for at in range(0, known * WIDE, WIDE):
+        factor_of_v2_row(work, known * W + at, known * W + at, known * NODES + at, bend)
     to_coefficients(known, work, known * W, terms, 0)
     begin_leg(blocks, work)
+    to_nodes(blocks, work, 0, work, blocks * D)
     for at in range(0, blocks * WIDE, WIDE):
-        # Clenshaw's recurrence at the shares of the way that belong to the new nodes.
-        twice_x, one, other = blocks * D + at, blocks * MEAN + at, blocks * SPEED + at
-        if new.extent == old.extent:
-            linear_row(work, twice_x, blocks * NODES + at, -2.0, 4.0)
-        else:
-            grown_row(work, blocks * EXPM1_Q + at, blocks * NODES + at, new.extent)
-            stretched_row(work, twice_x, blocks * EXPM1_Q + at, new.rising, new.falling)
-            linear_row(work, twice_x, twice_x, -2.0, 4.0 / new.width)
+        # Clenshaw's recurrence at the places in [-1, 1] that belong to the new nodes.
+        twice_x, one, other, shares = blocks * D + at, blocks * MEAN + at, blocks * SPEED + at, blocks * NODES + at
+        if new.extent != old.extent:
+            shares = blocks * EXPM1_Q + at
+            grown_row(work, shares, blocks * NODES + at, new.extent)
+            stretched_row(work, shares, shares, new.rising, new.falling)
+            product(work, shares, shares, 1.0 / new.width)
+            copy_row(work, twice_x, shares)
+            if work[VARIABLE] == IN_PHASE:
+                fill_phases(work, twice_x, shares)
+        linear_row(work, twice_x, twice_x, -2.0, 4.0)
         copy_row(work, one, 0.0)
         copy_row(work, other, 0.0)
         for k in range(known * WIDE - 2, 0, -2):  # each sum replaces the last but one
             next_sum_row(work, other, twice_x, one, other, terms[k])
             next_sum_row(work, one, twice_x, other, one, terms[k - 1])
         last_sum_row(work, twice_x, twice_x, one, other, terms[0])
-        size_row(work, blocks * W + at, twice_x)
+        v2_row(work, blocks * W + at, twice_x, shares, 1.0, bend)
+        size_row(work, blocks * W + at, blocks * W + at)
+    keep_positive(blocks, work)
     return True

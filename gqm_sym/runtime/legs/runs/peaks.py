@@ -4,7 +4,7 @@ On a leg with a stretched variable (`leg_variable`), the contact force is resolv
 it is largest, because its singularities stay branches there. The law gives it at this place.
 """
 
-from math import cos, fabs, inf, nan, sqrt
+from math import cos, fabs, inf, nan, pi, sin, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -39,7 +39,7 @@ from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, WIDE, sum_and_slope
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable
 from gqm_sym.runtime.legs.runs.whole_rows import LEBESGUE, LOCATED_RATIO
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients, to_nodes
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, to_coefficients, to_nodes
 
 # Buffers for values at nodes of a panel or leg, their series and the nodes; and for a series.
 sample_buffer, speed_buffer = on_stack(3 * MAX_BLOCKS * WIDE), on_stack(MAX_BLOCKS * WIDE)
@@ -213,7 +213,8 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
 def place_in_rows(record, time):  # type: ignore[no-untyped-def]
     """Return the place in [-1, 1] at a time from the start of a leg whose record has rows, to some ten digits."""
     phase, backwards = phase_of_rows(record, record[HEAD:], time)
-    return cos(phase) if backwards else -cos(phase)
+    x = 2.0 / pi * phase - 1.0 if int(record[WHOLE]) > MAX_BLOCKS else -cos(phase)
+    return -x if backwards else x
 
 
 class Stretch(NamedTuple):
@@ -235,14 +236,17 @@ class Stretch(NamedTuple):
 
 
 @Inner
-def force_at(forces, stretch, blocks, v2, x):  # type: ignore[no-untyped-def]
+def force_at(forces, stretch, form, v2, x):  # type: ignore[no-untyped-def]
     """Return the contact force per mass at a place in [-1, 1], by the law; ``v2`` begins with V**2 at the nodes."""
-    (start, end, v, variable), point, speeds = stretch, point_buffer(), speed_buffer()
+    (start, end, v, variable), point, speeds, blocks = stretch, point_buffer(), speed_buffer(), blocks_of(form)
     to_coefficients(blocks, v2, 0, speeds, 0)
+    share = 0.5 * (1.0 - fabs(x))
+    if form > MAX_BLOCKS:
+        share = sin(0.5 * pi * share) ** 2
     if x <= 0.0:
-        place = start[0] + (start[1] + v * distance_at(variable, 0.5 * (1.0 + x)))
+        place = start[0] + (start[1] + v * distance_at(variable, share))
     else:
-        left = distance_at(reversed_variable(variable), 0.5 * (1.0 - x))
+        left = distance_at(reversed_variable(variable), share)
         place = end[0] + (end[1] - v * left)
     w = max(chebyshev_sum(speeds[: blocks * WIDE - 1], x), LEAST_V2) if -1.0 < x < 1.0 else LEAST_V2
     slope_of_v2(forces, place, w, 0, point)
@@ -250,11 +254,12 @@ def force_at(forces, stretch, blocks, v2, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def peak_of_force(forces, stretch, blocks, values, v2, last, sign, best):  # type: ignore[no-untyped-def]
+def peak_of_force(forces, stretch, form, values, v2, last, sign, best):  # type: ignore[no-untyped-def]
     """Return the larger of ``best`` and the largest value of ``sign`` times the contact force per mass up to a place in
     [-1, 1], given at nodes and with room behind as in `peak_of_values`; ``v2`` is as in `force_at`.
     """
-    size, count = 0.0, blocks * WIDE - 1
+    size, blocks = 0.0, blocks_of(form)
+    count = blocks * WIDE - 1
     if not may_exceed(blocks, values, sign, best)[0]:
         return best
     terms, shares = fill_series(blocks, values)
@@ -272,7 +277,7 @@ def peak_of_force(forces, stretch, blocks, values, v2, last, sign, best):  # typ
         if is_cut or (is_top and here + fabs((before - here) + (after - here)) + margin > best):
             value, x = peak(terms, lo, min(hi, last), sign)
             if value + margin > best:
-                best = max(best, sign * force_at(forces, stretch, blocks, v2, x))
+                best = max(best, sign * force_at(forces, stretch, form, v2, x))
     return best
 
 
@@ -300,7 +305,8 @@ def peak_of_part(forces, stretch, blocks, reading, best, work):  # type: ignore[
 @Inner
 def peak_of_rows(forces, record, until, asked, best):  # type: ignore[no-untyped-def]
     """Return `peak_of_leg` for a leg from turn to turn whose record has rows."""
-    values, (function, sign), blocks = sample_buffer(), asked, int(record[WHOLE])
+    values, (function, sign), form = sample_buffer(), asked, int(record[WHOLE])
+    blocks = blocks_of(form)
     if sign < 0.0 and function == SPEED:
         return max(best, 0.0)  # the body is slowest where it turns
     for at in range(0, blocks * WIDE, WIDE):
@@ -309,7 +315,7 @@ def peak_of_rows(forces, record, until, asked, best):  # type: ignore[no-untyped
     if function == LOAD and record[EXTENT] > 0.0:
         ends = (record[START], record[START_LOW]), (record[END], record[END_LOW])
         stretch = Stretch(*ends, record[HEADING], variable_of_rows(record, record[WHOLE_WIDTH]))
-        return peak_of_force(forces, stretch, blocks, values, record[HEAD + blocks * WIDE :], last, sign, best)
+        return peak_of_force(forces, stretch, form, values, record[HEAD + blocks * WIDE :], last, sign, best)
     if function != SPEED:
         return peak_of_function(blocks, values, (-1.0, last), asked, best)
     return max(best, sqrt(peak_of_values(blocks, values, -1.0, last, sign, max(best, 0.0) ** 2)))

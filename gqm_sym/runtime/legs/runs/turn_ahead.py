@@ -29,13 +29,15 @@ MAX_NOISE = 1e-12
 
 
 @Inner
-def is_singular_at_rest(forces, place, contact_sign):  # type: ignore[no-untyped-def]
-    """Return whether the derivative of the law with respect to V**2 is infinite for a body at rest."""
+def slope_if_singular(forces, place, contact_sign):  # type: ignore[no-untyped-def]
+    """Return the increase of V**2 with the distance for a body at rest, if the derivative of the law with respect to
+    V**2 is infinite there; otherwise 0.
+    """
     if forces.linear or forces.squared_contact != 0:
-        return False
+        return 0.0
     point = point_buffer()
-    slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
-    return fabs(point[4]) > LEAST_DERIVATIVE
+    slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
+    return slope if fabs(point[4]) > LEAST_DERIVATIVE else 0.0
 
 
 @Inner
@@ -113,7 +115,7 @@ def panel_or_end(forces, march, panel, request, start, limits, work, point):  # 
     """
     run_length, stop = limits
     here = within(march.origin[0] + march.direction * run_length, panel.span)
-    if request.timing != ALWAYS and panel.left > 0.0 and is_singular_at_rest(forces, here, panel.contact_sign):
+    if request.timing != ALWAYS and panel.left > 0.0 and slope_if_singular(forces, here, panel.contact_sign) != 0.0:
         expected = start.width - run_length if start.v2 == 0.0 else 0.0
         far = distance_to_turn(forces, march, panel, run_length, (expected, stop - run_length), work, point)
         if far == far:

@@ -73,10 +73,12 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     are_rows_resolved,
     begin_leg,
     blocks_for,
+    choose_variable,
     curvature_sign,
     fill_load,
     fill_times,
     fill_v2,
+    form_of,
     is_contact_force_resolved,
     keeps_sign,
     load_sign,
@@ -108,11 +110,12 @@ LAST_STEP = 1e-3
 # If the step itself changes by this little, the next one would be about its square.
 LAST_CHANGE = 1e-9
 
-# The largest step of Newton's method after which a width is close enough to begin with more nodes.
-ROUGH_STEP = 0.03
+# The largest step of Newton's method after which a width is close enough to begin with more nodes, for linear and for
+# other forces. For the latter V**2 must be close too, and steps with few nodes take less time.
+ROUGH_STEP, NEXT_STEP = 0.03, 1e-5
 
-# The change of V**2 found with fewer nodes, as a share of its largest value, that is the last one: its square is
-# rounding only.
+# The change of V**2 found with fewer nodes, or by a step with as many, as a share of its largest value, that is the
+# last one: its square is rounding only.
 CHECKED = 1e-9
 
 # What is sought of the variable of a leg: its width, roughly or to the last digit, or whether the one found with fewer
@@ -148,7 +151,7 @@ def factor_to_turn(blocks, start, work):  # type: ignore[no-untyped-def]
     ``start`` is V**2 at the start over the width.
     """
     at = blocks * MEAN
-    to_means(blocks, work, blocks * FORCE, work, at)
+    to_means(form_of(blocks, work), work, blocks * FORCE, work, at)
     for j in range(blocks * WIDE):
         mean = work[at + j] + start / work[blocks * NODES + j]
         if not mean > 0.0:
@@ -187,8 +190,8 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
             before = change
             change, size = fill_v2(blocks, h, BETWEEN_TURNS, work)
             settled = is_settled(change, before, size, forces.squared_contact != 0)
-            settled = settled or (aim == CHECK and before == 0.0 and change <= CHECKED * size)
-        to_end_terms(blocks, work, blocks * FORCE, work, at)
+            settled = settled or (aim == CHECK and change <= CHECKED * size)
+        to_end_terms(form_of(blocks, work), work, blocks * FORCE, work, at)
         work[at] += panel.v2 / h
         factor = 0.0
         if work[at + 1] < 0.0:
@@ -200,9 +203,12 @@ def variable_of_leg(forces, march, panel, blocks, room, variable, aim, work):  #
                 and fabs(step * work[at + 1]) <= rounding * size_of_row(blocks, work, FORCE)
             ):
                 return variable
+            is_near = fabs(step) <= ROUGH_STEP if forces.linear else fabs(step) <= NEXT_STEP or last <= LAST_STEP
             last = 0.0 if aim == CHECK and forces.linear else fabs(step)
             factor = 1.0 + step if fabs(step) <= MAX_STEP else 0.0
-            if aim == ROUGH and fabs(step) <= (ROUGH_STEP if forces.linear else LAST_STEP):
+            if aim == ROUGH and is_near and factor > 0.0:
+                if not forces.linear:
+                    move_v2(forces, blocks, h, step, work)
                 return lengthened(variable, factor, room)
         if factor == 0.0:
             factor = factor_to_turn(blocks, panel.v2 / h, work)
@@ -228,6 +234,10 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
         if curve_fine and not is_kept:
             return False, 0, 1.0
     fill_v2(blocks, h, BETWEEN_TURNS, work)
+    reads_force = reading.what >= PANELS or (reading.what == PEAKS and reading.force)
+    if reads_force and not forces.linear and size_of_row(blocks, work, KAPPA) == 0.0:
+        # The contact force may be that for V**2 before its last change.
+        sample_leg(forces, march, panel, blocks, variable, work)
     fill_load(blocks, work)
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
@@ -263,23 +273,37 @@ def note_branch_of_turning(forces, march, panel, blocks, variable, kinks, work):
 
 
 @Inner
+def first_width(start):  # type: ignore[no-untyped-def]
+    """Return the first width to try."""
+    return start.width if start.width > 0.0 else FIRST_WIDTH * start.step
+
+
+@Inner
 def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type: ignore[no-untyped-def]
     """Return the attempt that resolves a leg; it has 0 blocks if there is none."""
     most = 2 if reading.what == PASSAGE else MAX_BLOCKS
-    width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
-    attempt = first_attempt(start.blocks, branch, march, width)
+    attempt = first_attempt(start.blocks, branch, march, first_width(start))
     variable = attempt.variable
+    aim = FIND
     begin_leg(1, work)
     if 1 < attempt.blocks <= most:
         variable = variable_of_leg(forces, march, panel, 1, room, variable, ROUGH, work)
-        carry_v2(forces, 1, variable, attempt.blocks, variable, work)
-    aim = FIND
+        is_known = carry_v2(forces, 1, variable, attempt.blocks, variable, BETWEEN_TURNS, work)
+        aim = CHECK if is_known else FIND
     while 0 < attempt.blocks <= most and variable.width > 0.0:
         blocks = attempt.blocks
-        variable = variable_of_leg(forces, march, panel, blocks, room, variable, aim, work)
+        is_first = not forces.linear and blocks == 1 and aim == FIND
+        variable = variable_of_leg(forces, march, panel, blocks, room, variable, ROUGH if is_first else aim, work)
         if not variable.width > 0.0:
             break
-        fine, onwards, ratio = is_whole(forces, march, panel, blocks, variable, reading, start.kinks, work)
+        if is_first:
+            fine, ratio = are_rows_resolved(1, variable.width, work)
+            if fine:
+                aim = CHECK
+                continue
+            onwards = blocks_for(ratio, 1, variable.extent > 0.0)
+        else:
+            fine, onwards, ratio = is_whole(forces, march, panel, blocks, variable, reading, start.kinks, work)
         attempt = Attempt(blocks, variable, attempt.branch, attempt.plain_blocks, attempt.plain_ratio)
         if fine:
             return attempt
@@ -292,7 +316,8 @@ def solve_leg(forces, march, panel, room, start, branch, reading, work):  # type
             and note_branch_of_turning(forces, march, panel, blocks, variable, start.kinks, work)
         ):
             break
-        aim = CHECK if carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, work) else FIND
+        is_known = carry_v2(forces, blocks, variable, attempt.blocks, attempt.variable, BETWEEN_TURNS, work)
+        aim = CHECK if is_known else FIND
         variable = attempt.variable
     return Attempt(0, variable, attempt.branch, NOT_TRIED, 1.0)
 
@@ -309,7 +334,7 @@ def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
 def enter_rows(record, blocks, route, is_read, work):  # type: ignore[no-untyped-def]
     """Write what is read of a leg into the record as rows."""
     wide, reads = blocks * WIDE, route.reading.what
-    record[WHOLE] = blocks
+    record[WHOLE] = form_of(blocks, work)
     if is_read:
         to_coefficients(blocks, work, blocks * TIME_RATE, record, HEAD)
     if reads == PEAKS or reads >= PANELS:
@@ -327,7 +352,7 @@ def enter_rows(record, blocks, route, is_read, work):  # type: ignore[no-untyped
 def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore[no-untyped-def]
     """Write a leg into the record."""
     h = variable.width
-    to_half_times(blocks, work, blocks * TIME_RATE, work, blocks * TAILS)
+    to_half_times(form_of(blocks, work), work, blocks * TIME_RATE, work, blocks * TAILS)
     first, second = work[blocks * TAILS], work[blocks * TAILS + 1]
     enter_rows(record, blocks, route, is_read(route, origin, v, h, first + second), work)
     is_wanted = route.reading.what >= PANELS or (route.reading.what == PEAKS and variable.extent > 0.0)
@@ -337,10 +362,11 @@ def enter_leg(record, route, origin, v, blocks, variable, work):  # type: ignore
 
 
 @Inner
-def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-untyped-def]
+def run_whole(forces, start, branch, slope_at_rest, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from one turn to the next, if that takes one polynomial only.
 
-    The parameters are those of `runs.run.run`, and the branch point of ds that the leg may pass by.
+    The parameters are those of `runs.run.run`; the branch point of ds that the leg may pass by; and the slope of V**2
+    at the start, if the law is infinitely steep there, or else 0.
 
     Returns
     -------
@@ -361,6 +387,7 @@ def run_whole(forces, start, branch, route, off, record):  # type: ignore[no-unt
         nu = sign_of_load(forces, within(start.place, span), 0.0, point_buffer())
     if nu != 0 and nu != -route.only_sign and record.size >= HEAD + MAX_ROWS * MAX_BLOCKS * WIDE:
         work = whole_buffer()
+        choose_variable(slope_at_rest * first_width(start), work)
         panel = Panel(0.0, 0.0, nu, span)
         found = solve_leg(forces, march, panel, room, start, branch, route.reading, work)
         blocks, variable, branch, h = found.blocks, found.variable, found.branch, found.variable.width

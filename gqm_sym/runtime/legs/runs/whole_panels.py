@@ -7,11 +7,11 @@ polynomials of the leg, so that panels and leg are the same motion up to roundin
 (`leg_variable`), C, FORCE and ds are those with respect to it, and the middle is where it is 1/2.
 """
 
-from math import fabs, sqrt
+from math import asin, fabs, pi, sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed, fused, on_stack, over_rows
 from gqm_sym.runtime.compiled.types import VECTOR
 from gqm_sym.runtime.legs.leg_record import (
@@ -59,7 +59,7 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, size_of
 from gqm_sym.runtime.legs.panels.resolution import examine, growth, narrower
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, reversed_variable, share_at
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_coefficients
+from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, blocks_of, to_coefficients
 
 # The functions of a leg in its record, in the order of their rows.
 ROWS = W_FACTOR, FORCE, MEAN, DS
@@ -116,28 +116,38 @@ def fill_row(series, begin, count, work, row):  # type: ignore[no-untyped-def]
     last_sum_row(work, row, GRADED, after, before, series[begin])
 
 
+@Inlined
+def twice_phase(root):  # type: ignore[no-untyped-def]
+    """Return twice the place in [-1, 1] of a phase angle, given the root of its share of the way."""
+    return 8.0 / pi * asin(min(root, 1.0)) - 2.0
+
+
 @Inner
-def lay_part(variable, w, begin, end, work):  # type: ignore[no-untyped-def]
+def lay_part(form, variable, w, begin, end, work):  # type: ignore[no-untyped-def]
     """Fill the rows of a part between two shares that depend on the leg's variable alone: OFFSET, GRADED, and if it is
     stretched J (N0) and ``y (1 - y)`` times the width over the distance (KAPPA).
     """
     linear_row(work, OFFSET, NODES, begin, end - begin)
-    if variable.extent == 0.0:
+    if variable.extent == 0.0 and form <= MAX_BLOCKS:
         twice_place_row(work, GRADED, OFFSET)
+    elif variable.extent == 0.0:
+        for j in range(WIDE):
+            work[GRADED + j] = twice_phase(sqrt(0.5) * work[OFFSET + j])
     else:
         for j in range(WIDE):
             root = w * work[OFFSET + j]
             y, work[N0 + j] = share_at(variable, root * root)
-            work[GRADED + j], work[KAPPA + j] = 4.0 * y - 2.0, y * (1.0 - y) * variable.width / (root * root)
+            work[GRADED + j] = 4.0 * y - 2.0 if form <= MAX_BLOCKS else twice_phase(sqrt(y))
+            work[KAPPA + j] = y * (1.0 - y) * variable.width / (root * root)
 
 
 @Inner
-def fill_part(blocks, series, variable, w, force_size, begin, end, work):  # type: ignore[no-untyped-def]
+def fill_part(form, series, variable, w, force_size, begin, end, work):  # type: ignore[no-untyped-def]
     """Fill the rows of the part between two shares; return whether they are resolved, and the largest ratio of their
     middle coefficients to their sizes.
     """
-    wide, resolved, worst = blocks * WIDE, True, 0.0
-    lay_part(variable, w, begin, end, work)
+    wide, resolved, worst = blocks_of(form) * WIDE, True, 0.0
+    lay_part(form, variable, w, begin, end, work)
     fill_row(series, 0, wide - 1, work, W_FACTOR)
     fill_row(series, wide, wide - 1, work, FORCE)
     fill_row(series, 2 * wide, wide - 1, work, MEAN)
@@ -175,7 +185,7 @@ def enter_part(record, at, begin, end, w, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def lay_half(record, to, blocks, series, variable, force_size, time):  # type: ignore[no-untyped-def]
+def lay_half(record, to, form, series, variable, force_size, time):  # type: ignore[no-untyped-def]
     """Write panels from an end of a leg to its middle into the record; return their number.
 
     Parameters
@@ -183,8 +193,8 @@ def lay_half(record, to, blocks, series, variable, force_size, time):  # type: i
     record : array
     to : int
         The index from which on panels are written.
-    blocks : int
-        The number of blocks of a row.
+    form : int
+        The form of the rows (`whole_tables`).
     series : array
         As filled by `fill_series`, seen from the end at which the panels begin.
     variable : LegVariable
@@ -200,7 +210,7 @@ def lay_half(record, to, blocks, series, variable, force_size, time):  # type: i
     set_nodes(work)
     while begin < 1.0:
         end = 1.0 if 1.0 - begin <= stretch * width else begin + width
-        fine, ratio = fill_part(blocks, series, variable, w, force_size, begin, end, work)
+        fine, ratio = fill_part(form, series, variable, w, force_size, begin, end, work)
         factor = growth(ratio)
         if not fine and width > LEAST_SHARE:
             width, stretch = max(narrower(end - begin, factor), LEAST_SHARE), 1.0
@@ -217,16 +227,17 @@ def lay_half(record, to, blocks, series, variable, force_size, time):  # type: i
 def with_panels(record):  # type: ignore[no-untyped-def]
     """Return the record with panels in place of rows of the whole leg."""
     out, series = np.empty(HEAD + 2 * MAX_PARTS * COLUMNS), series_buffer()
-    blocks = int(record[WHOLE])
+    form = int(record[WHOLE])
+    blocks = blocks_of(form)
     variable = LegVariable(record[WHOLE_WIDTH], record[RISING], record[FALLING], record[EXTENT])
     for k in range(HEAD):
         out[k] = record[k]
     size = fill_series(record, blocks, series)
-    ahead = lay_half(out, HEAD, blocks, series, variable, size, record[TIME_FROM_START])
+    ahead = lay_half(out, HEAD, form, series, variable, size, record[TIME_FROM_START])
     reverse_series(blocks, series)
     if variable.extent > 0.0:
         variable = reversed_variable(variable)
-    back = lay_half(out, HEAD + ahead * COLUMNS, blocks, series, variable, size, record[TIME_FROM_END])
+    back = lay_half(out, HEAD + ahead * COLUMNS, form, series, variable, size, record[TIME_FROM_END])
     out[WHOLE], out[AHEAD], out[BACK] = 0.0, ahead, back
     return out[: HEAD + (ahead + back) * COLUMNS].copy()
 

@@ -1,7 +1,9 @@
 """Rows of a leg from turn to turn as one polynomial: how well they are resolved, and whether they keep their sign.
 
 Rows are those of a panel (`panels.equation`) with more nodes: with ``blocks`` blocks of numbers each (`whole_tables`),
-the row ``r`` of a panel begins at ``blocks * r``.
+the row ``r`` of a panel begins at ``blocks * r``. They are polynomials in the share of the way; or in the phase angle,
+if the law contains the speed itself, as linear drag does. Both V and the place are smooth in that angle, turns
+included, but V is not smooth in the place there.
 """
 
 from math import fabs, inf, log, pi, sqrt
@@ -45,7 +47,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     load_size_row,
     product,
 )
-from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, ZERO_TOLERANCE
 from gqm_sym.runtime.legs.panels.polynomials import WIDE, extent, extent_of_block, size_of, size_of_block
 from gqm_sym.runtime.legs.panels.resolution import (
     CANCELLATION_NOISE,
@@ -56,10 +58,13 @@ from gqm_sym.runtime.legs.panels.resolution import (
 )
 from gqm_sym.runtime.legs.runs.leg_variable import lay_places, stretch_law
 from gqm_sym.runtime.legs.runs.whole_tables import (
+    IN_PHASE,
+    IN_SHARE,
     MAX_BLOCKS,
     MIDDLE_DEGREES,
     to_coefficients,
     to_factors,
+    to_mean_rates,
     to_means,
     to_nodes,
     to_tails,
@@ -70,9 +75,11 @@ from gqm_sym.runtime.legs.runs.whole_tables import (
 # log(TAIL_RATIO)/log(LOCATED_RATIO).
 LOCATED_RATIO = 1e-10
 
-# The rows of a panel and of the leg, one after the other.
+# The rows of a panel and of the leg, one after the other; and two numbers behind them: IN_SHARE or IN_PHASE
+# (`whole_tables`), and the number c for which iterations begin with ``V**2 = c y (1 - y)``.
 ROWS = 22
-whole_buffer = on_stack(ROWS * MAX_BLOCKS * WIDE)
+VARIABLE, FIRST_V2, WORK = range(ROWS * MAX_BLOCKS * WIDE, ROWS * MAX_BLOCKS * WIDE + 3)
+whole_buffer = on_stack(WORK)
 
 # The rows of a module's function `squared_contact`.
 square_buffer = on_stack(4 * MAX_BLOCKS * WIDE)
@@ -85,6 +92,7 @@ moved_row = over_rows(lambda w, y, slope: w + y * slope, WIDE)
 size_row = over_rows(lambda w: abs(w), WIDE)
 quotient_row = over_rows(lambda one, other: one / other, WIDE)
 quotient_before_end_row = over_rows(lambda one, y: one / (y - 1.0), WIDE)
+resistance_row = over_rows(lambda q, y, v: 2.0 * v * q * np.sqrt(y - y * y), WIDE)
 v2_row = over_rows(lambda factor, y, h, bend: factor * (h * (y + bend * (y * y))), WIDE)
 whole_time_row = over_rows(lambda ds, factor, h: ds * np.sqrt(h / factor), WIDE)
 
@@ -150,13 +158,35 @@ def keeps_sign(blocks, work, row, sign, noise):  # type: ignore[no-untyped-def]
     return least > 0.125 * spacing * spacing * bend + noise
 
 
+@Inlined
+def form_of(blocks, work):  # type: ignore[no-untyped-def]
+    """Return the form of rows (`whole_tables`)."""
+    return blocks + int(work[VARIABLE])
+
+
+@Inner
+def choose_variable(first_v2, work):  # type: ignore[no-untyped-def]
+    """Choose the variable of the rows: the phase angle if V**2 to begin with, FIRST_V2, must not be zero."""
+    work[FIRST_V2], work[VARIABLE] = first_v2, IN_PHASE if first_v2 > 0.0 else IN_SHARE
+
+
 @Inner
 def begin_leg(blocks, work):  # type: ignore[no-untyped-def]
     """Fill in the nodes, and V**2 to begin with, once for all widths."""
     work[0] = 1.0
-    to_nodes(blocks, work, 0, work, blocks * NODES)
+    to_nodes(form_of(blocks, work), work, 0, work, blocks * NODES)
     for at in range(0, blocks * WIDE, WIDE):
-        copy_row(work, blocks * W + at, 0.0)
+        copy_row(work, blocks * SPEED + at, 1.0)
+        v2_row(work, blocks * W + at, blocks * SPEED + at, blocks * NODES + at, work[FIRST_V2], BETWEEN_TURNS)
+    keep_positive(blocks, work)
+
+
+@Inner
+def keep_positive(blocks, work):  # type: ignore[no-untyped-def]
+    """Keep V**2 from being zero at the end of a leg where the law is infinitely steep at rest."""
+    last = blocks * W + blocks * WIDE - 1
+    if work[VARIABLE] == IN_PHASE:
+        work[last] = max(work[last], LEAST_V2)
 
 
 @Inner
@@ -180,10 +210,13 @@ def sample_leg(forces, march, panel, blocks, variable, work):  # type: ignore[no
     if is_stretched:
         stretch_law(blocks, work)
     for at in range(0, wide, WIDE):
-        product(work, blocks * Q_RATE + at, blocks * Q + at, v)
+        if work[VARIABLE] == IN_PHASE:
+            resistance_row(work, blocks * Q_RATE + at, blocks * Q + at, blocks * NODES + at, v)
+        else:
+            product(work, blocks * Q_RATE + at, blocks * Q + at, v)
     # The product with the larger matrices is saved where nothing resists in proportion to V**2.
     if blocks == 1 or size_of_row(blocks, work, Q_RATE) != 0.0:
-        to_means(blocks, work, blocks * Q_RATE, work, blocks * SPEED)
+        to_mean_rates(form_of(blocks, work), work, blocks * Q_RATE, work, blocks * SPEED)
         for at in range(0, wide, WIDE):
             product(work, blocks * SPEED + at, blocks * SPEED + at, blocks * OFFSET + at)
         if not fabs(work[blocks * SPEED + wide - 1]) <= MAX_Q:
@@ -207,6 +240,7 @@ def replace_v2(blocks, work):  # type: ignore[no-untyped-def]
         difference_row(work, w, new, w)
         change = max(change, size_of_block(work, w))
         copy_row(work, w, new)
+    keep_positive(blocks, work)
     return change, extent_of_row(blocks, work, W)[1]
 
 
@@ -216,9 +250,9 @@ def fill_v2(blocks, h, bend, work):  # type: ignore[no-untyped-def]
     turn (FROM_TURN); return the largest change of W, and the largest W.
     """
     if bend == BETWEEN_TURNS:
-        to_factors(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+        to_factors(form_of(blocks, work), work, blocks * FORCE, work, blocks * W_FACTOR)
     else:
-        to_means(blocks, work, blocks * FORCE, work, blocks * W_FACTOR)
+        to_means(form_of(blocks, work), work, blocks * FORCE, work, blocks * W_FACTOR)
     for at in range(0, blocks * WIDE, WIDE):
         factor = blocks * W_FACTOR + at
         damped_row(work, factor, factor, blocks * EXPM1_Q + at)
@@ -231,17 +265,19 @@ def move_v2(forces, blocks, h, step, work):  # type: ignore[no-untyped-def]
     """Move the row W of a leg of the width ``h`` to the nodes of one that is wider by a share ``step`` of it.
 
     W is known from the nearer turn on: from the start in the first half, and from where the leg ended in the second.
+    There it changes by that at the end, damped by the resistance in between.
     """
-    v, last = float(forces.direction), blocks * WIDE - 1
+    v, last, growth = float(forces.direction), blocks * WIDE - 1, blocks * EXPM1_Q
     for at in range(0, last, WIDE):
         slope_row(work, blocks * SPEED + at, blocks * P + at, blocks * Q + at, blocks * W + at, v * h * step)
-    at_end = work[blocks * SPEED + last]
+    at_end = work[blocks * SPEED + last] * (1.0 + work[growth + last])
     for at in range(0, last, WIDE):
         moved_row(work, blocks * W + at, blocks * W + at, blocks * NODES + at, blocks * SPEED + at)
-    for j in range(blocks * W + last // 2 + 1, blocks * W + last + 1):
-        work[j] -= at_end
+    for j in range(last // 2 + 1, last + 1):
+        work[blocks * W + j] -= at_end / (1.0 + work[growth + j])
     for at in range(0, last, WIDE):
         size_row(work, blocks * W + at, blocks * W + at)
+    keep_positive(blocks, work)
 
 
 @Inner

@@ -11,8 +11,8 @@ from gqm_sym.runtime.legs.panels.equation import Forces, W
 from gqm_sym.runtime.legs.panels.polynomials import SHARES, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.legs.runs.branch_points import BranchPoint, carry_v2, first_guess, zero_of_series
 from gqm_sym.runtime.legs.runs.leg_variable import LegVariable, distance_at, unstretched, variable_for
-from gqm_sym.runtime.legs.runs.whole_rows import ROWS
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, nodes
+from gqm_sym.runtime.legs.runs.whole_rows import BETWEEN_TURNS, WORK, begin_leg, choose_variable
+from gqm_sym.runtime.legs.runs.whole_tables import nodes, phase_nodes
 
 CURVES: list[tuple[Callable[[Any], Any], tuple[float, float], tuple[str, str]]] = [
     (lambda x: 1 + 4 * x * x, (-1.1, 1.0), ("0", "0.5")),
@@ -38,22 +38,28 @@ NONLINEAR = Forces(0, np.zeros(1), True, False, False, 1, 0, 0)
 LINEAR = NONLINEAR._replace(linear=True)
 
 
-def _carried(forces: Forces, old: LegVariable, known: int, new: LegVariable, blocks: int) -> tuple[bool, Any]:
+def _carried(
+    forces: Forces, old: LegVariable, known: int, new: LegVariable, blocks: int, *, in_phase: bool
+) -> tuple[bool, Any]:
     """Return whether V**2 = d (2 - d) exp(d/5) is carried to another number of blocks, and its errors there."""
+    shares = phase_nodes if in_phase else nodes
 
     def v2(variable: LegVariable, blocks: int) -> Any:
-        distances = np.array([distance_at(variable, float(y)) for y in nodes(blocks)[0]])
+        distances = np.array([distance_at(variable, float(y)) for y in shares(blocks)[0]])
         return distances * (2.0 - distances) * np.exp(0.2 * distances)
 
-    work = np.zeros(ROWS * MAX_BLOCKS * WIDE)
+    work = np.zeros(WORK)
+    choose_variable(1.0 if in_phase else 0.0, work)
+    begin_leg(known, work)
     work[known * W : known * (W + WIDE)] = v2(old, known)
-    is_known = carry_v2(forces, known, old, blocks, new, work)
+    is_known = carry_v2(forces, known, old, blocks, new, BETWEEN_TURNS, work)
     return is_known, work[blocks * W : blocks * (W + WIDE)] - (v2(new, blocks) if is_known else 0.0)
 
 
-def test_v2_of_the_last_attempt() -> None:
+@pytest.mark.parametrize("in_phase", [False, True])
+def test_v2_of_the_last_attempt(*, in_phase: bool) -> None:
     """The next attempt begins with V**2 from fewer nodes, or from a variable that is less stretched; otherwise with
-    0.
+    0, or with a parabola if the law contains the speed.
     """
     plain, stretched = unstretched(2.0), variable_for(BranchPoint(0.9, 0.8), (0.0, 0.0), 1, 2.0)
     for old, known, new, blocks in (
@@ -63,10 +69,11 @@ def test_v2_of_the_last_attempt() -> None:
         (plain, 1, stretched, 1),
         (stretched, 1, stretched, 3),
     ):
-        is_known, errors = _carried(NONLINEAR, old, known, new, blocks)
+        # In the phase angle more nodes are needed, and some are so near to the end that the rounding of places shows.
+        is_known, errors = _carried(NONLINEAR, old, known + in_phase, new, blocks, in_phase=in_phase)
         assert is_known
-        assert np.abs(errors).max() <= 1e-14
+        assert np.abs(errors).max() <= (2e-12 if in_phase else 1e-14)
     for forces, old, new in ((LINEAR, plain, plain), (NONLINEAR, stretched, plain)):
-        is_known, v2 = _carried(forces, old, 1, new, 2)
+        is_known, v2 = _carried(forces, old, 1, new, 2, in_phase=in_phase)
         assert not is_known
-        assert not v2.any()
+        assert v2.any() == in_phase

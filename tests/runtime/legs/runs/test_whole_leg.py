@@ -16,7 +16,7 @@ import gqm_sym as gqm
 from gqm_sym.runtime.legs.panels.equation import NODES, Forces, P, Q, W
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs import whole_tables
-from gqm_sym.runtime.legs.runs.whole_rows import ROWS, move_v2
+from gqm_sym.runtime.legs.runs.whole_rows import WORK, move_v2
 
 # The tolerance includes that tables, and sums with them, are rounded.
 TABLE = 2e-15
@@ -55,7 +55,7 @@ def test_v2_on_a_wider_leg(blocks: int) -> None:
     forces, half = Forces(0, np.zeros(1), True, False, False, -1, 0, 0), blocks * WIDE // 2
     turn = 0.5 * np.pi
     for step in (0.02, -0.02):
-        h, work = turn / (1.0 + step), np.zeros(ROWS * whole_tables.MAX_BLOCKS * WIDE)
+        h, work = turn / (1.0 + step), np.zeros(WORK)
         row = {
             name: slice(blocks * at, blocks * (at + WIDE)) for name, at in (("y", NODES), ("p", P), ("q", Q), ("w", W))
         }
@@ -65,6 +65,37 @@ def test_v2_on_a_wider_leg(blocks: int) -> None:
         work[row["p"]] = -slope(h * y) - 0.1 * work[row["w"]]
         move_v2(forces, blocks, h, step, work)
         assert np.abs(work[row["w"]] - v2(turn * y)).max() <= 4.0 * step * step
+
+
+@pytest.mark.parametrize("blocks", whole_tables.BLOCKS)
+def test_tables_in_phase(blocks: int) -> None:
+    """The tables for nodes in the phase angle integrate exp(-phi/3), which is no polynomial in the share of the way."""
+    with mp.workdps(30):
+        decay = mpf(1) / 3
+        x = 2.0 * whole_tables.nodes(blocks)[0, :-1] - 1.0
+        phases = [*((1 + mpf(place)) * mp.pi / 2 for place in x), mp.pi]
+        shares = [mp.sin(phase / 2) ** 2 for phase in phases]
+        # The integrals of the function over phi, and times sin(phi).
+        plain = [(1 - mp.exp(-decay * phase)) / decay for phase in phases]
+        swinging = [
+            (1 - mp.exp(-decay * phase) * (mp.cos(phase) + decay * mp.sin(phase))) / (1 + decay**2) for phase in phases
+        ]
+        half = (1 - mp.exp(-decay * mp.pi / 2)) / decay
+        arrival = (decay + mp.exp(-decay * mp.pi) / 2) / (decay**2 + mpf(1) / 4)
+        values = np.array([float(mp.exp(-decay * phase)) for phase in phases[:-1]])
+        means = [float(area / (2 * share)) for area, share in zip(swinging, shares, strict=True)]
+        rates = [float(area / (2 * share)) for area, share in zip(plain, shares, strict=True)]
+        # 1 - y for a force that begins with 1 and ends with -1 is the one with C = 1.
+        force = np.array([float(mp.cos(phase)) for phase in phases[:-1]])
+    # The nodes of `nodes` are rounded.
+    assert whole_tables.phase_nodes(blocks)[0] == pytest.approx([float(share) for share in shares], abs=TABLE)
+    assert whole_tables.phase_means(blocks).T @ values == pytest.approx(means, abs=TABLE)
+    assert whole_tables.mean_rates(blocks).T @ values == pytest.approx(rates, rel=1e-11)
+    assert whole_tables.phase_half_times(blocks).T @ values == pytest.approx([float(half), float(plain[-1] - half)])
+    assert whole_tables.phase_arrival_time(blocks).T @ values == pytest.approx([float(arrival)], abs=TABLE)
+    assert whole_tables.phase_factors(blocks).T @ force == pytest.approx(np.ones(x.size), abs=TABLE)
+    ends = whole_tables.phase_end_terms(blocks).T @ values
+    assert ends == pytest.approx([means[-1], float(mp.exp(-mp.pi / 3)), 0.0, 0.0, 0.0, 0.0], abs=4.0 * TABLE * blocks)
 
 
 class Pendulum:
