@@ -150,3 +150,19 @@ def test_a_body_that_comes_to_the_centre_of_a_spiral(generated_folder: Path) -> 
     swept = module.sweep("t_end", lam0)
     assert swept.values == pytest.approx(np.sqrt(2.0 * np.sqrt(3.0) * length / G), rel=1e-14)
     assert (module.sweep("half_period", lam0).status == quantities.NOT_PERIODIC).all()
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize("roll", ["0", "u/5"])
+def test_contact_in_a_rotating_frame(roll: str, build: Build) -> None:
+    """Sweeps decide whether a body leaves a track that pushes upwards only, also where the rider does not lean and the
+    Coriolis force has no part along his upward direction, but for rounding.
+    """
+    hills = gqm.Curve.space(x="u", y="sin(u)/3", z="cos(2*u)", parameter="u", domain=("-4", "4"), roll=roll)
+    module = build(f"hills_in_a_frame_{len(roll)}", hills, gqm.RotatingFrame(Omega="7/10"))
+    lam0, v0 = np.linspace(-1.9, -1.3, 7), np.linspace(2.0, 9.0, 7)
+    swept = module.sweep("t_end", lam0, v0, 1, contact="above", t_max=2.0)
+    assert swept.route_counts() == {"single": 7}
+    motions = [module.solve(*launch, 1, contact="above", t_max=2.0) for launch in zip(lam0, v0, strict=True)]
+    assert 1 <= (swept.values < 2.0).sum() <= 6
+    assert swept.values == pytest.approx([motion.t_end for motion in motions], rel=1e-13)

@@ -87,6 +87,10 @@ MAX_PARTS = 4
 # The V**2 in m2/s2 at which the load at rest is less than the rounding of a load.
 FAST = 2.0**64
 
+# The size that what is added to N/m for each unit of ds/dt has at least, as a share of the load: a tail of some ten
+# roundings of the load then is none.
+ROUNDED_SIZE = 2.0
+
 
 class Source(NamedTuple):
     """The functions from which a table is made.
@@ -305,6 +309,10 @@ def scales_of(source, p, pieces):  # type: ignore[no-untyped-def]
         fill_terms_at(source, p, 1, pieces[k], pieces[k : k + 1], offset, out)
         for i in range(scales.size):
             scales[i] = max(scales[i], fabs(out[i if i < source.potentials else i + 2, 0]))
+    # The last is a difference of contact forces, and known to their roundings only: a rider without roll does not feel
+    # the Coriolis force along his upward direction.
+    if scales[-1] > 0.0:
+        scales[-1] = max(scales[-1], ROUNDED_SIZE * scales[source.potentials : scales.size - 1].max())
     return scales
 
 
