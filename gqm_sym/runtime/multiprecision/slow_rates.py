@@ -196,6 +196,8 @@ def _powers_of(*nodes: int) -> list[list[Fraction]]:
 
 def _value(terms: Array, x: Array, errors: Array | None = None) -> Array | None:
     """Return the values of a positive polynomial; None if its terms cancel, or more terms or digits would be needed."""
+    if not (np.isfinite(terms).all() and (errors is None or np.isfinite(errors).all())):
+        return None
     powers = x ** np.arange(terms.size)[:, np.newaxis]
     parts = terms[:, np.newaxis] * powers
     total, sizes = parts.sum(axis=0), np.abs(parts)

@@ -7,16 +7,16 @@ from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.panels.breaks import offset, span_before, within
 from gqm_sym.runtime.legs.panels.equation import March, marched
-from gqm_sym.runtime.legs.panels.point import LEAST_V2, sign_of_load, slope_of_v2
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, sign_of_load, slope_of_v2
 from gqm_sym.runtime.legs.runs.leg_variable import BranchPoint
 
 # The largest width of the first panel of a leg, and of the first one after a break, as a share of the distance over
 # which the acceleration there would stop the body.
 STOPPING_SHARE = 2.0
 
-# The share of a panel before a turn below which the panel is limited to the surroundings of the turn; the share to which
-# it is narrowed at once at most; and the least V**2 at its start, as a share of the largest before, that is known well
-# enough for that.
+# The share of a panel before a turn below which the panel is limited to the surroundings of the turn; the smallest
+# share of it that is tried next; and the least V**2 at its start, as a share of the largest before, for which that is
+# done.
 LEAST_SHARE_TO_TURN, NARROWER, KNOWN_V2_SHARE = 1.0 / 16.0, 2.0**-20, 2.0**-10
 
 # The number of integration steps to the place at which a slowly moving body would have been at rest.
@@ -217,12 +217,12 @@ def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-unt
 
 
 @Inner
-def limited(forces, march, panel, width, ahead, change, run_length, largest_v2, point):  # type: ignore[no-untyped-def]
+def limited(forces, march, panel, width, ahead, change, run_length, largest_v2):  # type: ignore[no-untyped-def]
     """Return the data ahead of a panel of a width that begins at the distance ``run_length`` and has these changes.
 
     V**2 at a break is as exact as at launch, so a panel after it that contains a turn is limited like the first one.
-    Where a turn lies next to the start of a panel, as that of a body thrown slowly from an equilibrium, the place of the
-    turn is known to the roundings of the whole width only, and the panel is limited to the surroundings of the turn.
+    Where a turn lies next to the start of a panel, as that of a body thrown slowly from an equilibrium, the place of
+    the turn is known to the roundings of the whole width only, and the panel is limited to the turn's surroundings.
     """
     x = min(change.turn, change.touch)
     if x > 1.0:
@@ -232,7 +232,7 @@ def limited(forces, march, panel, width, ahead, change, run_length, largest_v2, 
         widest = width * max(1.0 + x, NARROWER)
     if not ahead.is_limited:
         place = within(march.origin[0] + march.direction * run_length, panel.span)
-        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point_buffer())
         if slope < 0.0:
             widest = min(widest, marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left)
     elif widest == inf:

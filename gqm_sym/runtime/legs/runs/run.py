@@ -168,7 +168,7 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         what, run_length, v2 = turn_below_noise(forces, march, panel, change, run_length, point)
         if what == END_TURN:
             break
-        ahead = limited(forces, march, panel, width, ahead, change, run_length, largest_v2, point)
+        ahead = limited(forces, march, panel, width, ahead, change, run_length, largest_v2)
         if ahead.widest < width:
             continue
         if changes_at_once(march, panel, width, change, run_length):
