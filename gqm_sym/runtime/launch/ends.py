@@ -46,8 +46,9 @@ FLAT_SHARE = 1e-12
 # parameter), or beyond the second share of the way from one axis to the next: it may be an equilibrium there.
 NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
 
-# ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
-CUSP_SHARE = 1e-7
+# ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp; and ds at a launch,
+# as a share of its values nearby, up to which the launch is at a cusp.
+CUSP_SHARE, LAUNCH_CUSP_SHARE = 1e-7, 1e-10
 
 # The share of the gains and losses of V**2 on the way to an end of the domain above which V**2 at that end excludes a
 # turning point; and the number of places on the way at which the slope of the potential is evaluated.
@@ -376,14 +377,15 @@ def too_steep(problem: Problem, place: float) -> SolutionError:
     )
 
 
-def is_cusp(problem: Problem, place: float, share: float = 1e-10) -> bool:
+def is_cusp(problem: Problem, place: float, share: float = LAUNCH_CUSP_SHARE) -> bool:
     """Return whether ds vanishes at a place, up to a share of its values nearby.
 
     Where the domain does not tell how large the curve is, ds is compared at smaller distances too: a tiny smooth curve
-    has the same ds at some of them as at the place itself.
+    has the same ds at some of them as at the place itself. The end of a motion, for which ``share`` is larger, is not
+    known well enough for that.
     """
     f, near = problem.functions, np.array([NEAR_CUSP * starting_step(problem)])
-    if not (problem.period or isfinite(problem.high - problem.low)):
+    if share == LAUNCH_CUSP_SHARE and not (problem.period or isfinite(problem.high - problem.low)):
         nearer = near * NEARER_TO_CUSP
         near = np.append(near, nearer[nearer >= NEAR_CUSP * abs(place)])
     offsets = np.concatenate([[0.0], -near, near])
