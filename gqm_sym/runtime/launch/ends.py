@@ -46,20 +46,16 @@ FLAT_SHARE = 1e-12
 # parameter), or beyond the second share of the way from one axis to the next: it may be an equilibrium there.
 NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
 
-# ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp; and ds at a launch,
-# as a share of its values nearby, up to which the launch is at a cusp.
-CUSP_SHARE, LAUNCH_CUSP_SHARE = 1e-7, 1e-10
+# ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
+CUSP_SHARE = 1e-7
 
 # The share of the gains and losses of V**2 on the way to an end of the domain above which V**2 at that end excludes a
 # turning point; and the number of places on the way at which the slope of the potential is evaluated.
 DOMAIN_END_V2_SHARE, GAIN_SAMPLES = 1e-12, 5
 
 # The distance from a place at which ds is compared with ds at the place itself to decide whether that is a cusp, as a
-# share of the first step.
-NEAR_CUSP = 1e-3
-
-# The smaller distances, as shares of that distance, at which ds is compared on a curve of unknown size.
-NEARER_TO_CUSP = 2.0 ** (-10.0 * np.arange(1.0, 7.0))
+# share of the first step; and, on a curve of unknown size, smaller distances as shares of that one.
+NEAR_CUSP, NEARER_TO_CUSP = 1e-3, 2.0 ** (-10.0 * np.arange(1.0, 7.0))
 
 # ds has no bound next to a place if it grows by more than the first factor each time that the distance decreases by the
 # second one, twice, to the third as a share of the parameter. It grows by less next to the pole of a logarithm, and
@@ -377,20 +373,23 @@ def too_steep(problem: Problem, place: float) -> SolutionError:
     )
 
 
-def is_cusp(problem: Problem, place: float, share: float = LAUNCH_CUSP_SHARE) -> bool:
-    """Return whether ds vanishes at a place, up to a share of its values nearby.
+def is_cusp(problem: Problem, place: float) -> bool:
+    """Return whether ds vanishes at a place that is known to rounding.
 
     Where the domain does not tell how large the curve is, ds is compared at smaller distances too: a tiny smooth curve
-    has the same ds at some of them as at the place itself. The end of a motion, for which ``share`` is larger, is not
-    known well enough for that.
+    has the same ds at some of them as at the place itself.
     """
-    f, near = problem.functions, np.array([NEAR_CUSP * starting_step(problem)])
-    if share == LAUNCH_CUSP_SHARE and not (problem.period or isfinite(problem.high - problem.low)):
-        nearer = near * NEARER_TO_CUSP
-        near = np.append(near, nearer[nearer >= NEAR_CUSP * abs(place)])
-    offsets = np.concatenate([[0.0], -near, near])
-    ds = path_and_force_at(f.addresses, f.p, place + offsets, np.zeros(offsets.size))[2]
-    return bool((ds[0] <= share * np.fmax(ds[1 : near.size + 1], ds[near.size + 1 :])).all())
+    distances = [NEAR_CUSP * starting_step(problem)]
+    if not (problem.period or isfinite(problem.high - problem.low)):
+        distances += [d for d in distances[0] * NEARER_TO_CUSP if d >= NEAR_CUSP * abs(place)]
+    return all(vanishes(problem, place, 1e-10, distance) for distance in distances)
+
+
+def vanishes(problem: Problem, place: float, share: float, distance: float) -> bool:
+    """Return whether ds at a place is at most a share of its values at a distance from there."""
+    f, places = problem.functions, place + distance * np.array([0.0, -1.0, 1.0])
+    ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+    return bool(ds[0] <= share * np.nanmax(ds[1:]))
 
 
 def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:

@@ -8,7 +8,7 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, is_steep, starting_step, too_steep
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_steep, starting_step, too_steep, vanishes
 from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
@@ -40,7 +40,8 @@ def end_name(problem: Problem, what: int, record: Array) -> str:
     if what == END_LIMIT and not problem.period:
         return domain_end(problem, int(record[HEADING])).what
     if what == END_TOO_NARROW:
-        return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
+        near = NEAR_CUSP * starting_step(problem)
+        return "cusp" if vanishes(problem, float(record[END]), CUSP_SHARE, near) else "singular-point"
     return END_NAMES.get(what, "")
 
 

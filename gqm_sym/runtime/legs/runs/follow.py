@@ -291,10 +291,9 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
     """
     # Beside joints, curves are not evaluated at the ends of legs, as they are for legs that pass by a branch point.
     branch = start.branch if route.breaks.size == 0 else BranchPoint(0.0, inf)
-    width, slope = start.width, 0.0
-    if start.v2 == 0.0:
-        slope = slope_if_singular(forces, start.place, start.contact_sign)
-    if start.v2 == 0.0 and start.blocks > 0 and slope >= 0.0:
+    width, may_be_whole = start.width, start.v2 == 0.0 and start.blocks > 0
+    slope = slope_if_singular(forces, start.place, start.contact_sign) if may_be_whole else 0.0
+    if may_be_whole and slope >= 0.0:
         if route.reading.what == PASSAGE and not passes_kinks(start):
             end, blocks, branch = run_to_target(forces, start, branch, slope, route, off, record)
             if end.what == END_PAUSE:

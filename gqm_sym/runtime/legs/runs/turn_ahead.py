@@ -75,7 +75,8 @@ def distance_to_turn(forces, march, panel, run_length, limits, work, point):  # 
     here = place_after(march.origin, v * run_length)
     linear = -panel.v2 / slope_of_v2(forces, within(here[0], span), panel.v2, panel.contact_sign, point)
     # Next to the turn V**2 is nearly linear, and what was expected before may be farther off than the turn.
-    d = linear if not d > 0.0 else min(d, 2.0 * linear) if linear > 0.0 else d
+    if linear > 0.0:
+        d = min(d, 2.0 * linear) if d > 0.0 else linear
     request = PanelRequest(inf, 0.0, 0.0, ALWAYS, True, False)
     for _ in range(MAX_TRIES):
         if not 0.0 < d < room:
