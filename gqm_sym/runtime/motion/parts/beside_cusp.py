@@ -19,6 +19,7 @@ def force_beside_cusp(problem: Problem, cusp: float, direction: int) -> float:
 
     def at_rest(distances: Array) -> Array:
         places = cusp + direction * distances
-        return path_and_force_at(f.addresses, f.p, places, np.zeros_like(places))[4:]
+        forces: Array = path_and_force_at(f.addresses, f.p, places, np.zeros_like(places))[4:]
+        return forces
 
     return float(limit_at_launch(at_rest, starting_step(problem))[0])

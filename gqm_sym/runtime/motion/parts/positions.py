@@ -229,11 +229,10 @@ class Positions(ChecksArguments, ABC):
     def _state_at(self, found: tuple[float, ...]) -> State:
         """Return the state at one time from the time and the items of a column of `_rows_of_states`."""
         formulas = self.problem.formulas
-        is_at_cusp = found[0] == 0.0 and self._is_released_at_cusp
-        if formulas.path_in_space is None and not is_at_cusp:
-            return State(*found[:-1])
-        if formulas.rider_loads is not None or is_at_cusp:
+        if formulas.rider_loads is not None or (found[0] == 0.0 and self._is_released_at_cusp):
             return self._state_of(found[0], np.array(found[1:]).reshape(-1, 1))
+        if formulas.path_in_space is None:
+            return State(*found[:-1])
         t, lam, s, x, z, v, v2, kappa, force, error, place = found
         address = formulas.path_in_space.address
         *more, size = path_in_space_once(address, self.problem.functions.p, place, v2, v)
