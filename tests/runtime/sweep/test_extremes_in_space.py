@@ -128,7 +128,8 @@ def test_beside_a_turn_that_is_no_sample(build: Build, place: float, v0: float, 
     module = build("wavy_turning_extremes", WAVY, gqm.RotatingFrame(Omega="7/10"))
     swept = module.sweep("normal_force_min", [place], v0, way, t_max=t_max)
     least = module.solve(place, v0, way, t_max=t_max).normal_force_min
-    assert swept.route_counts() == {"single": 1} and 0.9 * t_max < least.t < t_max
+    assert swept.route_counts() == {"single": 1}
+    assert 0.9 * t_max < least.t < t_max
     assert swept.values[0] == pytest.approx(least.value, rel=2e-14)
 
 
