@@ -262,6 +262,7 @@ TESTED_THROUGH = {
     "sweep/tables/places.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/potential.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/rests.py": "runtime/sweep/tables/test_times.py",
+    "sweep/tables/stretches.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/tabulate.py": "runtime/sweep/tables/test_times.py",
     "sweep/tables/turning_points.py": "runtime/sweep/tables/test_times.py",
     "vocabulary.py": DIFFERENCES,
