@@ -100,6 +100,36 @@ def test_closed_forms_against_newton(roll: str, lossy: bool) -> None:
             assert max(abs(found[6 + k] - up[k]) for k in range(3)) < 1e-30
 
 
+def test_the_upright_force_in_a_rotating_frame() -> None:
+    """N/m along the upward direction is n0 + kappa*V**2 + c*V by Newton's law, and none of the three contains V.
+
+    On tracks without lateral force at a declared speed c contained it, and their modules could not be run.
+    """
+    model = gqm.derive(gqm.Curve.space(**WAY, roll=ROLLS["designed"]), gqm.Gravity() + gqm.RotatingFrame())
+    forms, rate, w, way = model.upright, mpf("0.7"), mpf("9.5"), -1
+    symbols = [sp.Symbol(name, real=True) for name in ("g", "Omega")]
+    assert all(form.free_symbols <= {model.parameter, *symbols} for form in forms)
+    with mp.workdps(40):
+        numbers = sp.lambdify((model.parameter, *symbols), forms, "mpmath")
+        for u in (mpf("0.3"), mpf("-1.7")):
+            first, second = rates(u)
+            tangent = first / mp.norm(first)
+            bend = (second - tangent * dot(tangent, second)) / mp.norm(first) ** 2
+            axis = mp.matrix([0, 0, rate])
+            applied = -mpf("9.81") * mp.matrix([0, 0, 1]) - cross(axis, cross(axis, place(u)))
+
+            def force(v: Any, parts: Any = (tangent, bend, axis, applied)) -> Any:
+                tangent, bend, axis, applied = parts
+                total = applied - 2 * v * cross(axis, tangent)
+                return v * v * bend - total + tangent * dot(tangent, total)
+
+            up = force(6 + u / 5) / mp.norm(force(6 + u / 5))
+            rest, turning, moving = numbers(u, mpf("9.81"), rate)
+            v = way * mp.sqrt(w)
+            true = dot(force(v), up)
+            assert abs(rest + turning * w + moving * v - true) < mpf("1e-35") * abs(true)
+
+
 @pytest.fixture(scope="module")
 def rough(built: Callable[..., ModuleType]) -> ModuleType:
     """Return the track above with friction and drag, banked by an angle."""

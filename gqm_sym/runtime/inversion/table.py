@@ -30,15 +30,21 @@ _HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 
 COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
 
 
-def _chebyshev() -> Array:
-    """Return the coefficients of the Chebyshev polynomials in powers of x: those of degree j in row j."""
-    rows = np.eye(TERMS)
+def _chebyshev(shift: float, rate: float) -> Array:
+    """Return the coefficients of the Chebyshev polynomials of shift + rate*x in powers of x: those of degree j in row
+    j.
+    """
+    rows = np.zeros((TERMS, TERMS))
+    rows[0, 0], rows[1, :2] = 1.0, (shift, rate)
     for j in range(2, TERMS):
-        rows[j] = np.append(0.0, 2.0 * rows[j - 1, :-1]) - rows[j - 2]
+        rows[j] = 2.0 * (shift * rows[j - 1] + rate * np.append(0.0, rows[j - 1, :-1])) - rows[j - 2]
     return rows
 
 
-CHEBYSHEV = _chebyshev()
+# In powers of the distance from the middle of a segment, in units of half its length, and of that from its beginning,
+# in units of its length, which are used for this share of the first one.
+BEGINNING = 1.0 / 32.0
+FROM_MIDDLE, FROM_BEGINNING = _chebyshev(0.0, 1.0), _chebyshev(-1.0, 2.0)
 
 # A fit is resolved when its last two coefficients are below this share of the largest phase angle.
 MAX_TAIL_RATIO = 2e-16
@@ -73,9 +79,10 @@ class Table(NamedTuple):
     Attributes
     ----------
     middles, lows : (n,) arrays
-        The middle of each segment in s, as two doubles.
+        The middle of each segment in s, as two doubles. The first one is the beginning of the second one, and has its
+        beginning here, so that small phase angles have all their digits.
     scales : (n,) array
-        One over half its length, in 1/s.
+        One over half its length, in 1/s; for the first one over the length of the second one.
     powers : (n, TERMS) array
         Coefficients of the phase angle in powers of ``(t - middle) * scale``.
     index : (k,) array of int
@@ -184,13 +191,7 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
                 if i < LAST and slope > 0.0:
                     next_guess = guess + scale * reach * (COSINES[1, i + 1] - COSINES[1, i]) / slope
                     guess = min(max(next_guess, -1.0), 1.0)
-            for j in range(TERMS):
-                total = 0.5 * (values[0] * COSINES[j, 0] + values[LAST] * COSINES[j, LAST])
-                for i in range(1, LAST):
-                    total += values[i] * COSINES[j, i]
-                c[j] = 2.0 * total / LAST
-            c[0] *= 0.5
-            c[LAST] *= 0.5
+            _fit(values, c)
             tail = half * max(fabs(c[LAST]), fabs(c[LAST - 1]))
             before = half * max(fabs(c[LAST - 4]), fabs(c[LAST - 5]))
             resolved = tail <= MAX_TAIL_RATIO * size or (before <= MAX_NOISE_RATIO * size and tail > 0.2 * before)
@@ -203,12 +204,14 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
                 middles, lows, scales = longer(middles, capacity), longer(lows, capacity), longer(scales, capacity)
                 ends, errors = longer(ends, capacity), longer(errors, capacity)
                 powers = with_rows(powers, capacity)
+            if count == 0:
+                _to_powers(c, FROM_BEGINNING, half, powers[0])
+                middles[0], lows[0], scales[0], powers[0, 0] = times[0], times_low[0], 1.0 / stop, edges[0]
+                ends[0], errors[0], count = times[0] + BEGINNING * stop, 0.0 if accepted else tail, 1
+            _to_powers(c, FROM_MIDDLE, half, powers[count])
             middles[count], low = two_sum(times[k], middle)
             lows[count], scales[count], ends[count] = low + times_low[k], 1.0 / reach, times[k] + stop
             errors[count] = 0.0 if accepted else tail
-            _to_powers(c, powers[count])
-            for j in range(TERMS):
-                powers[count, j] *= half
             powers[count, 0] += left + half
             count += 1
             done += 1
@@ -227,8 +230,21 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
 
 
 @Inner
-def _to_powers(c, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with coefficients of powers of x from Chebyshev coefficients ``c``.
+def _fit(values, c):  # type: ignore[no-untyped-def]
+    """Fill ``c`` with Chebyshev coefficients from the values at the nodes."""
+    for j in range(TERMS):
+        total = 0.5 * (values[0] * COSINES[j, 0] + values[LAST] * COSINES[j, LAST])
+        for i in range(1, LAST):
+            total += values[i] * COSINES[j, i]
+        c[j] = 2.0 * total / LAST
+    c[0] *= 0.5
+    c[LAST] *= 0.5
+
+
+@Inner
+def _to_powers(c, rows, size, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with coefficients of powers from Chebyshev coefficients ``c`` in units of 1/size, by the rows of the
+    polynomials in these powers.
 
     No digits are lost, because the coefficients fall fast.
     """
@@ -236,7 +252,7 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
         out[i] = 0.0
     for j in range(TERMS):
         for i in range(TERMS):
-            out[i] += c[j] * CHEBYSHEV[j, i]
+            out[i] += size * (c[j] * rows[j, i])
 
 
 @Inner

@@ -1,5 +1,6 @@
 """The motion of a conservative model that begins with a launch: its ends, its kind, and its segments."""
 
+from collections.abc import Callable
 from math import inf, isfinite, ulp
 
 import numpy as np
@@ -21,7 +22,6 @@ from gqm_sym.runtime.launch.ends import (
     too_steep,
 )
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import Launch
@@ -31,7 +31,7 @@ from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, OpenEnd
 from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
-from gqm_sym.runtime.motion.segments.kinds import between_turns, from_turn, through
+from gqm_sym.runtime.motion.segments.kinds import between_turns, from_cusp, from_turn, through
 from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.quadrature.substitution import REGULAR
@@ -244,13 +244,16 @@ def _from_cusp(problem: Problem) -> Motion:
         motion.add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
         return motion.finish()
     if front.what != "turn":
-        return _without_turn(problem, direction, front)
+        return _without_turn(problem, direction, front, from_cusp)
     if w0 == 0.0:
-        segment, sense = between_turns(f, lam0, front.place), 1
+        middle = 0.5 * (lam0 + front.place)
+        beside_cusp, beside_turn = from_cusp(f, lam0, middle), from_turn(f, front.place, middle)
+        parts = [(beside_cusp, 1, ""), (beside_turn, -1, "turn"), (beside_turn, 1, ""), (beside_cusp, -1, "cusp")]
     else:
-        segment, sense = from_turn(f, front.place, lam0), -1
-    motion.add(segment, sense, "turn")
-    motion.add(segment, -sense, "cusp")
+        whole = from_turn(f, front.place, lam0)
+        parts = [(whole, -1, "turn"), (whole, 1, "cusp")]
+    for segment, sense, end in parts:
+        motion.add(segment, sense, end)
     return motion.finish()
 
 
@@ -287,8 +290,10 @@ def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
         distance *= 1e-3  # the slower the launch is, the sooner the body turns
 
 
-def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
-    """Return a motion that has no turning point ahead."""
+def _without_turn(
+    problem: Problem, direction: int, front: EndOfMotion, from_rest: Callable[..., Segment] = from_turn
+) -> Motion:
+    """Return a motion that has no turning point ahead; ``from_rest`` makes the segment from a launch at rest."""
     f, lam0 = problem.functions, problem.lam0
     if front.place == lam0:
         raise leaving_at_once(problem, direction, front.what)
@@ -305,22 +310,25 @@ def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motio
         return motion.finish()
     if front.what == "equilibrium":
         middle = 0.5 * (lam0 + front.place)
-        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.add(from_rest(f, lam0, middle), 1, "")
         motion.approach(middle, front.place)
     elif front.what == "open":
         middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
-        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.add(from_rest(f, lam0, middle), 1, "")
         motion.leave_open(OpenEnd(middle, direction, front.place))
     else:
-        motion.add(_from_turn_to(f, lam0, front), 1, front.what)
+        _add_way_to_end(motion, from_rest, lam0, front)
     return motion.finish()
 
 
-def _from_turn_to(f: BoundFunctions, turn: float, end: EndOfMotion) -> Segment:
-    """Return the segment from a turning point to an end; if V**2 vanishes there too, it is a segment between two
-    turning points.
-    """
-    return between_turns(f, turn, end.place) if end.zero_v2 else from_turn(f, turn, end.place)
+def _add_way_to_end(motion: AperiodicMotion, from_rest: Callable[..., Segment], turn: float, end: EndOfMotion) -> None:
+    """Add the way from a place at rest to an end; V**2 vanishes there too if it is a cusp as high as that place."""
+    f, middle = motion.problem.functions, 0.5 * (turn + end.place)
+    if end.zero_v2:
+        motion.add(from_rest(f, turn, middle), 1, "")
+        motion.add(from_cusp(f, end.place, middle), -1, end.what)
+    else:
+        motion.add(from_rest(f, turn, end.place), 1, end.what)
 
 
 def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
@@ -362,5 +370,5 @@ def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: E
         motion.add(from_turn(f, front.place, middle), 1, "")
         motion.approach(middle, back.place)
     else:
-        motion.add(_from_turn_to(f, front.place, back), 1, back.what)
+        _add_way_to_end(motion, from_turn, front.place, back)
     return motion.finish()

@@ -13,7 +13,9 @@ from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
+from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
 from gqm_sym.runtime.motion.parts.searched import EQUAL_ROUNDINGS, samples, size_of, trajectory_with_extreme
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 if TYPE_CHECKING:
@@ -42,6 +44,9 @@ LEAST_JUMP = 1e-11
 # The distance from a sample at which a value belongs to its own side, if the quantity jumps at the sample; as a share
 # of the phase angle.
 BESIDE_JOINT = 64.0 * ULP
+
+# A body comes to rest at a cusp if V**2 there is at most so many roundings of its largest value.
+STOPPED_ROUNDINGS = 64.0
 
 # Where the contact force at a cusp is this many times its largest value before, it grows without bound there. The place
 # of a cusp is rounded, and the force there is a large number, unless that place is 0.
@@ -183,19 +188,23 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     for timed in trajectory.segments:
         if timed.t_start[0] >= end and best is not None:
             break
-        size, peaks = _on_segment(timed, trajectory, quantity, sign, end)
+        size, peaks = _on_segment(motion.problem, timed, trajectory, quantity, sign, end)
         for value, t, lam in peaks:
             if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
                 best = Extreme(value, min(t, end), lam)  # the time of the end itself may be rounded up
     assert best is not None
     if best.t == 0.0:  # as it was given, without rounding
-        launch = motion.problem.launch
-        return Extreme(launch.v0.value if quantity is SPEED else best.value, 0.0, launch.lam0.value)
+        launch, value = motion.problem.launch, best.value
+        if quantity is SPEED:
+            value = launch.v0.value
+        elif motion._is_released_at_cusp:  # where the force is the limit after the release
+            value = quantity.of_state(motion.state(0.0))
+        return Extreme(value, 0.0, launch.lam0.value)
     return best
 
 
 def _on_segment(
-    timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
+    problem: "Problem", timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
 ) -> tuple[float, list[Extreme]]:
     """Return the size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
     segment = timed.segment
@@ -208,12 +217,22 @@ def _on_segment(
 
     def signed(angles: Array) -> Array:
         values = sign * quantity.at(timed, angles)
+        values[np.abs(angles - stop) < clear] = limit
         return np.where(np.isnan(values), -np.inf, values)
 
-    values = signed(phi)
     at_cusp = -1 if stop > start else 0
     ends_at_cusp = timed.end == "cusp" and timed.t_stop[0] <= end and quantity is not SPEED
-    if ends_at_cusp and abs(values[at_cusp]) > UNBOUNDED_GROWTH * size_of(np.delete(values, at_cusp)):
+    stops_at_cusp = ends_at_cusp and _stops(segment, phi, at_cusp)
+    clear, limit = 0.0, 0.0
+    if stops_at_cusp:
+        cusp, heading = float(segment.places(np.array([stop]))[0]), timed.sense * segment.direction
+        clear, limit = END_SHARE * (high - low), sign * force_beside_cusp(problem, cusp, -heading)
+    values = signed(phi)
+    if (
+        ends_at_cusp
+        and not stops_at_cusp
+        and abs(values[at_cusp]) > UNBOUNDED_GROWTH * size_of(np.delete(values, at_cusp))
+    ):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
     size = size_of(values)
     for k in _peaks(values, size)[:MAX_PEAKS]:
@@ -234,6 +253,12 @@ def _on_segment(
         value = 0.0 if at_turn else sign * value
         found.append(_extreme_at(timed, trajectory, angle, value))
     return size, sorted(found, key=lambda peak: peak.t)
+
+
+def _stops(segment: Segment, phi: Array, end: int) -> bool:
+    """Return whether V**2 vanishes to rounding at one end of phase angles."""
+    speeds = segment.speeds(phi)
+    return bool(speeds[end] ** 2 <= STOPPED_ROUNDINGS * ULP * speeds.max() ** 2)
 
 
 def _limits_at_joints(

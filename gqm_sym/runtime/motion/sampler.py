@@ -128,6 +128,7 @@ class Sampler:
             # The part of the error that changes within an interval of the table is largest at one of its ends, where
             # the powers are those of -1 and 1.
             starts, stops = intervals @ ALTERNATING, intervals.sum(axis=1)
+            starts[0] = segment.edges[0]  # the powers of the first interval are those of 0 and 1
             both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
             self._sections |= {
                 records.LAUNCH: np.array([problem.lam0, self._v0, *self._of_states()], dtype=np.float64),

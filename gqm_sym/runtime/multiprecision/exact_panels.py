@@ -109,7 +109,9 @@ class _Rates:
 
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium")
-def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> tuple[Panels, Array]:
+def lay_exactly(
+    exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float, *, starts_at_cusp: bool = False
+) -> tuple[Panels, Array]:
     """Lay panels over a segment in extended precision.
 
     Parameters
@@ -122,6 +124,8 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         Its ends, from `exact_ends`.
     stop : float
         Its last phase angle.
+    starts_at_cusp : bool
+        Whether a REGULAR segment begins at a cusp where V**2 vanishes; the phase angle is then a factor of the speed.
 
     Returns
     -------
@@ -152,6 +156,8 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         high = end if right == stop else scale.mpf(right)
         reach, middle = (high - left) / 2, (high + left) / 2
         half, values = float(reach), rates_on(middle, reach)
+        if starts_at_cusp:
+            values[2] /= float(middle) + half * ALL_NODES
         series, terms = np.empty(DEGREE + 1), np.empty((3, DEGREE))
         speed_size, speed_tail, _ = antiderivative(values[2], half, series, terms[2])
         terms[2] = series[:DEGREE]

@@ -18,13 +18,9 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     point_buffer,
     sample_loads,
 )
-from gqm_sym.runtime.sweep.tables.extremes import (
-    passage_extreme,
-    stretch_after_turn,
-    stretch_before_turn,
-    stretch_of,
-)
+from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
+from gqm_sym.runtime.sweep.tables.stretches import stretch_after_turn, stretch_before_turn, stretch_of
 
 # The share up to which an extreme is taken for the value at the end of a motion.
 STOP_SHARE = 1e-3

@@ -128,7 +128,9 @@ def test_a_table_is_small_and_knows_its_error(name: str, table_of: Callable[[str
     assert len(middles) == len(scales) == len(powers) == len(ends)
     assert ends[-1] == table.whole
     assert (np.diff(ends) > 0).all()
-    assert middles - 1 / scales == pytest.approx(np.append(0, ends[:-1]), rel=0, abs=4 * math.ulp(table.whole))
+    assert (middles[0], 1 / scales[0]) == (0, pytest.approx(ends[1]))
+    begins = np.append(0, ends[1:-1])
+    assert middles[1:] - 1 / scales[1:] == pytest.approx(begins, rel=0, abs=4 * math.ulp(table.whole))
     slots = table.whole * np.arange(len(index)) / len(index)
     assert (index <= np.searchsorted(ends, slots, side="right")).all()
     assert len(ends) <= MOST_SEGMENTS

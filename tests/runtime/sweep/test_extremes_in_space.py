@@ -114,6 +114,25 @@ def test_as_solved_motions(build: Build, name: str, curve: Any, force: Any, low:
             assert abs(largest - force) <= 2e-13 * force
 
 
+WAVY = gqm.Curve.sampled(
+    [[u, 0.3 * np.sin(u), 0.5 * u * u + 0.01 * np.cos(3.0 * u)] for u in np.linspace(-2.0, 2.0, 81).tolist()]
+)
+
+
+@pytest.mark.extended
+@pytest.mark.parametrize(("place", "v0", "way", "t_max"), [(1.86, 0.0, -1, 1.287222), (3.28, 0.67, 1, 0.261904)])
+def test_beside_a_turn_that_is_no_sample(build: Build, place: float, v0: float, way: int, t_max: float) -> None:
+    """In a rotating frame the force changes with V, and is smallest a little before the body turns. In the first motion
+    it is almost as small at the launch, where the sample is smaller; the second one ends before the turn.
+    """
+    module = build("wavy_turning_extremes", WAVY, gqm.RotatingFrame(Omega="7/10"))
+    swept = module.sweep("normal_force_min", [place], v0, way, t_max=t_max)
+    least = module.solve(place, v0, way, t_max=t_max).normal_force_min
+    assert swept.route_counts() == {"single": 1}
+    assert 0.9 * t_max < least.t < t_max
+    assert swept.values[0] == pytest.approx(least.value, rel=2e-14)
+
+
 @pytest.mark.extended
 @pytest.mark.parametrize("name", ["rough_wire", "rough_track"])
 def test_with_friction_as_solved_motions(build: Build, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Limits at the launch of what is smooth in time from there on, but has no value at the launch itself."""
+"""Limits at the launch of what is smooth in time or distance from there on, but has no value at the launch itself."""
 
 from collections.abc import Callable
 
@@ -8,23 +8,25 @@ from numpy.polynomial.chebyshev import chebvander
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 
-# The number of times at which values are taken, at the nodes of Chebyshev polynomials on an interval from the launch.
+# The number of times or distances at which values are taken, at the nodes of Chebyshev polynomials on an interval from
+# the launch.
 NODES = 16
 
 # The last two coefficients, as a share of the largest one, at which the values are resolved, and at most. The interval
-# is halved until they are, at most so many times; they then decrease no further because the values are rounded.
-RESOLVED, MAX_TAIL, HALVINGS = 1e-15, 1e-11, 24
+# is halved until they are, at most so many times, or until they decrease by no more than this factor, because the
+# values are rounded: on shorter intervals roundings of the place would be larger shares of the distances.
+RESOLVED, MAX_TAIL, HALVINGS, SLOW_DECREASE = 1e-15, 1e-11, 24, 0.25
 
 
 def limit_at_launch(values: Callable[[Array], Array], end: float) -> Array:
-    """Return the limit of functions of time as time decreases to 0.
+    """Return the limit of functions of the time or the distance from the launch as that decreases to 0.
 
     Parameters
     ----------
     values : function
-        The values at times, a row for each function.
+        The values at times or distances, a row for each function.
     end : float
-        The longest time in s that is tried.
+        The longest one that is tried.
 
     Raises
     ------
@@ -39,11 +41,12 @@ def limit_at_launch(values: Callable[[Array], Array], end: float) -> Array:
         found = values(0.5 * end * (1.0 + places)) @ basis * weights
         sizes = np.abs(found).max(axis=1)
         tail = float(np.max(np.abs(found[:, -2:]).max(axis=1) / np.where(sizes > 0.0, sizes, 1.0)))
+        was_resolved = limit is not None and tail > SLOW_DECREASE * best
         if tail < best:
             best, limit = tail, found @ (-1.0) ** np.arange(NODES)
-        if tail <= RESOLVED:
+        if tail <= RESOLVED or was_resolved:
             break
         end *= 0.5
     if limit is None:
-        raise SolutionError("sensitivity: the derivatives of the contact force at t = 0 have no limit after the launch")
+        raise SolutionError("t = 0: the contact force, or one of its derivatives, has no limit after this release")
     return limit

@@ -142,10 +142,12 @@ def peak_of_values(blocks, values, first, last, sign, best):  # type: ignore[no-
         here, x = sign * values[j], 2.0 * shares[j] - 1.0
         if first < x < last:
             best = max(best, here)
-            if here >= before and here >= after and here + spread > best:
-                lo = 2.0 * shares[j - 1] - 1.0 if j > 0 else -1.0
-                hi = 2.0 * shares[j + 1] - 1.0 if j < count - 1 else 1.0
-                best = max(best, peak(terms, max(lo, first), min(hi, last), sign)[0])
+        if here >= before and here >= after and here + spread > best:
+            # The node may lie beyond an end of the part, and the extreme before that end.
+            lo = max(2.0 * shares[j - 1] - 1.0 if j > 0 else -1.0, first)
+            hi = min(2.0 * shares[j + 1] - 1.0 if j < count - 1 else 1.0, last)
+            if lo < hi:
+                best = max(best, peak(terms, lo, hi, sign)[0])
     return best
 
 

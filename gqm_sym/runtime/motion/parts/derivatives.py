@@ -1,10 +1,11 @@
 """Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from collections.abc import Iterable
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError
@@ -79,8 +80,13 @@ class Derivatives(Positions):
         """
         check_force(self.problem.formulas, quantity)
         if quantity in EXTREMES:
-            selected(self.problem.formulas.parameters, wrt)  # names are checked before anything is computed
-            if not isfinite(getattr(self, quantity).value):
+            names = selected(self.problem.formulas.parameters, wrt)  # checked before anything is computed
+            extreme = getattr(self, quantity)
+            if extreme.t == 0.0 and quantity.startswith("normal_force") and self._is_released_at_cusp:
+                kept = tuple(name for name in names if name not in ("lam0", "v0"))
+                changes = self._limit_of_sensitivity(self._sensitivity(0.0, kept), np.array(True), kept)
+                return dict.fromkeys(names, nan) | dict(zip(kept, changes.normal_force.tolist(), strict=True))
+            if not isfinite(extreme.value):
                 raise SolutionError(
                     f"gradient: {quantity} has none, because the contact force grows without bound towards the cusp at "
                     "which this motion ends"
@@ -101,11 +107,14 @@ class Derivatives(Positions):
             return
         unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
         if unknown and (charted or is_cusp(problem, problem.lam0)):
-            why = (
-                "the curve does not exist for neighbouring values (an exponent of a negative number must be an integer)"
-                if charted
-                else "the body is released at rest from a cusp, through which it would be thrown out of the curve"
-            )
+            if charted:
+                why = "the curve does not exist for neighbouring values (an exponent of a negative number must be an "
+                why += "integer)"
+            elif "normal_force" in what:
+                why = "the contact force jumps at the cusp from which the body is released, and has no bound there for "
+                why += "a body that moves"
+            else:
+                why = "the body is released at rest from a cusp, through which it would be thrown out of the curve"
             raise SolutionError(
                 f"{what}: there is no derivative with respect to {', '.join(unknown)}, because {why}; name the others "
                 "in wrt"
@@ -183,8 +192,13 @@ class Derivatives(Positions):
         found = self._sensitivity(t, wrt)
         self._check_known("sensitivity", found.wrt, found.lam)
         at_launch = np.asarray(self._times(t)[0] == 0.0).reshape(found.lam.shape[1:])
-        if at_launch.any() and self.problem.w0 == 0.0 and is_cusp(self.problem, self.problem.lam0):
-            # The curvature is infinite there, and only the contact force after the launch has derivatives.
+        return self._limit_of_sensitivity(found, at_launch, wrt) if at_launch.any() else found
+
+    def _limit_of_sensitivity(self, found: Sensitivity, at_launch: NDArray[np.bool_], wrt: Any) -> Sensitivity:
+        """Return derivatives of states with those of the contact force at a release from a cusp, where the curvature is
+        infinite, and only the force after the launch has derivatives.
+        """
+        if self._is_released_at_cusp:
             found.normal_force[:, at_launch] = limit_at_launch(
                 lambda times: self._sensitivity(times, wrt).normal_force, min(self.t_end, LONGEST_START)
             )[:, np.newaxis]

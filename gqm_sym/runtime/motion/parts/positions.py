@@ -13,12 +13,14 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space, path_in_space_once
 from gqm_sym.runtime.motion.events import Leg, passages
-from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.locking import computed_once, locked
+from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
 from gqm_sym.runtime.motion.riding.loads import loads_on_rider
 from gqm_sym.runtime.motion.sampler import STATE_ROWS
 from gqm_sym.runtime.motion.segments import errors
@@ -201,9 +203,22 @@ class Positions(ChecksArguments, ABC):
             return np.zeros(times.size, dtype=np.bool_)
         return times >= (last if self.legs[-1].end == "rest" else inf)
 
+    @computed_once
+    def _is_released_at_cusp(self) -> bool:
+        """Whether the body is released at rest from a cusp and moves."""
+        problem = self.problem
+        return problem.w0 == 0.0 and self.kind != "rest" and is_cusp(problem, problem.lam0)
+
+    @computed_once
+    def _force_beside_cusp(self) -> float:
+        """The contact force in N just after a release from a cusp."""
+        return force_beside_cusp(self.problem, self.problem.lam0, self.direction)
+
     def _state_of(self, t: Any, rows: Array) -> State:
         """Return the state at one time, or at an array of times, from the rows of `_rows_of_states`."""
-        kind, fields = State, (*rows[:STATE_ROWS],)
+        kind, fields, at_launch = State, (*rows[:STATE_ROWS],), np.asarray(t == 0.0).reshape(-1)
+        if at_launch.any() and self._is_released_at_cusp:
+            rows[7, at_launch] = self._force_beside_cusp
         if self.problem.formulas.path_in_space is not None:
             times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
             kind, more = self._in_space(times, rows[STATE_ROWS], rows[4], rows[5], rows[7])
@@ -214,10 +229,10 @@ class Positions(ChecksArguments, ABC):
     def _state_at(self, found: tuple[float, ...]) -> State:
         """Return the state at one time from the time and the items of a column of `_rows_of_states`."""
         formulas = self.problem.formulas
+        if formulas.rider_loads is not None or (found[0] == 0.0 and self._is_released_at_cusp):
+            return self._state_of(found[0], np.array(found[1:]).reshape(-1, 1))
         if formulas.path_in_space is None:
             return State(*found[:-1])
-        if formulas.rider_loads is not None:
-            return self._state_of(found[0], np.array(found[1:]).reshape(-1, 1))
         t, lam, s, x, z, v, v2, kappa, force, error, place = found
         address = formulas.path_in_space.address
         *more, size = path_in_space_once(address, self.problem.functions.p, place, v2, v)

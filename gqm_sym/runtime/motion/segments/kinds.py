@@ -49,6 +49,15 @@ def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:
     return Segment(functions=functions, kind=FROM_TURN, a=turn, b=end)
 
 
+def from_cusp(functions: BoundFunctions, cusp: float, end: float) -> Segment:
+    """Return a segment from a cusp at which V**2 vanishes, to a place where the speed is not zero.
+
+    The time from there grows as the distance, because ds/dlam vanishes too, so that the segment is as smooth as one
+    whose speed is not zero at either end.
+    """
+    return through(functions, cusp, end, cusp, 0.0)
+
+
 def through(
     functions: BoundFunctions,
     start: float,

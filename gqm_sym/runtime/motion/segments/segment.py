@@ -147,7 +147,9 @@ class Segment:
         if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
-            self.stored_panels, self.speed_terms = lay_exactly(f.exact, self.kind, self.ends, self.stop)
+            self.stored_panels, self.speed_terms = lay_exactly(
+                f.exact, self.kind, self.ends, self.stop, starts_at_cusp=self._starts_at_cusp
+            )
             self._from_multiprecision = True
         if self.stored_panels[7] == ILL_CONDITIONED:
             raise SolutionError(
@@ -251,9 +253,23 @@ class Segment:
             return 0.0
         return v2_correction(f.addresses, f.p, f.exact.lam0)
 
+    @property
+    def growth(self) -> tuple[float, float]:
+        """The coefficients of a factor of the speed, slope*phi + rest, which may vanish at the end ``a``."""
+        if self.kind == FROM_TURN:
+            slope = 1.0 if self.march_end is None else self.march_end
+            return slope, slope * self.turn_offset
+        return (1.0, 0.0) if self._starts_at_cusp else (0.0, 1.0)
+
+    @property
+    def _starts_at_cusp(self) -> bool:
+        """Whether V**2 vanishes at the end ``a``, a cusp (`kinds.from_cusp`)."""
+        return self.kind == REGULAR and self.march_end is None and (self.ref, self.ref_v2) == (self.a, 0.0)
+
     def _launch_condition_number(self) -> float:
         f, ref = self.functions, self.a if self.kind == FROM_TURN else self.ref
-        one_sided = self.kind in (FROM_TURN, REGULAR)
+        # A cusp is where it is, and V**2 beside it is as small as its distance: their rounding moves the place alone.
+        one_sided = self.kind in (FROM_TURN, REGULAR) and not self._starts_at_cusp
         return launch_condition_number(f.addresses, f.p, self.a, self.b, ref, self.ref_v2) if one_sided else 1.0
 
     @property
@@ -359,10 +375,8 @@ class Segment:
             speeds *= self.width_ratio
         else:
             speeds = read_off_many(self.edges, np.zeros_like(self.edges), self.speed_terms, phi)
-            if self.kind == FROM_TURN:
-                speeds *= (1.0 if self.march_end is None else self.march_end) * (phi + self.turn_offset)
-            elif self.kind == TURN_TURN:
-                speeds *= np.sin(phi)
+            slope, rest = self.growth
+            speeds *= np.sin(phi) if self.kind == TURN_TURN else slope * phi + rest
         return speeds
 
     def times(self, phi: Array) -> Array:

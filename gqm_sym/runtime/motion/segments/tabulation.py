@@ -1,7 +1,7 @@
 """The record of the timed segments of a motion for compiled code: tables of places, states and panels."""
 
 from collections.abc import Sequence
-from math import isnan, nan
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -81,8 +81,10 @@ class Timing(NamedTuple):
     ----------
     kind : float
         The kind of the segment.
-    last, turn_offset : float
-        As `march_end` (1 where there is none) and `turn_offset` of `Segment`.
+    growth, first_growth : float
+        As `growth` of `Segment`.
+    turn_offset : float
+        As `turn_offset` of `Segment`.
     error_a, error_b : float
         The errors of the ends that are turning points, in units of the curve parameter.
     lam_before : float
@@ -90,7 +92,8 @@ class Timing(NamedTuple):
     """
 
     kind: float
-    last: float
+    growth: float
+    first_growth: float
     turn_offset: float
     a: float
     a_low: float
@@ -161,7 +164,6 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
     is_from_turn = kind == FROM_TURN
     linear = 2.0 * timing.turn_offset * share if is_from_turn else 1.0
     direction = 1.0 if width > 0.0 else -1.0
-    growth = (timing.last, timing.last * timing.turn_offset) if is_from_turn else (0.0, 1.0)
     kept = 0
     for k in range(count):
         i = k if sense > 0.0 else count - 1 - k
@@ -175,6 +177,8 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         for m in range(TERMS):
             start, stop = start + (powers[i, m] if m % 2 == 0 else -powers[i, m]), stop + powers[i, m]
             row[leg_tables.POWERS + m] = powers[i, m]
+        if i == 0:
+            start = edges[0]
         row[leg_tables.UNTIL] = until
         row[leg_tables.MIDDLE], row[leg_tables.MIDDLE_LOW] = time_from_launch(middles[i], lows[i], timing)
         row[leg_tables.SCALE], row[leg_tables.STOP] = sense * scales[i], edges[-1]
@@ -186,7 +190,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
         panel = min(int(np.searchsorted(edges[1:-1], 0.5 * (start + stop), side="right")), panel_count - 1)
         state[leg_tables.PANEL], state[leg_tables.DIRECTION] = panel, direction
         state[leg_tables.HEADING], state[leg_tables.ARC_A] = sense * direction, timing.s_a
-        state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = growth
+        state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = timing.growth, timing.first_growth
         state[leg_tables.TIME_ERROR] = marks[4, panel]
         state[leg_tables.PLACE_ERROR] = largest_place_error(timing, start, stop, errors[i])
         kept += 1
@@ -211,7 +215,7 @@ def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
     else:
         series = [_of_full_width(terms) for terms in (time_terms, length_terms, segment.speed_terms)]
     timing = Timing(
-        *(float(segment.kind), 1.0 if isnan(last) else last, segment.turn_offset, segment.a, segment.low_parts[0]),
+        *(float(segment.kind), *segment.growth, segment.turn_offset, segment.a, segment.low_parts[0]),
         *(segment.b, segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a),
         *(*timed.r_start, *timed.t_start, timed.t_stop[0], *_errors_of_ends(segment)),
     )
@@ -265,8 +269,9 @@ def _speed_terms(segment: Segment, edges: Array) -> Array:
     """Return the Legendre coefficients of the regular factor of the speed on panels with these edges."""
     halves = 0.5 * np.diff(edges)
     phi = ((edges[:-1] + halves)[:, None] + halves[:, None] * NODES).ravel()
-    speeds, growth = segment.speeds(phi), {FROM_TURN: phi, TURN_TURN: np.sin(phi), TO_EQUILIBRIUM: np.exp(-phi)}
-    factors = (speeds / growth.get(segment.kind, np.ones_like(phi))).reshape(-1, WIDE)
+    slope, rest = segment.growth
+    growth = {TURN_TURN: np.sin(phi), TO_EQUILIBRIUM: np.exp(-phi)}.get(segment.kind, slope * phi + rest)
+    factors = (segment.speeds(phi) / growth).reshape(-1, WIDE)
     # Without the differences the rounding of the matrix would be that of the largest speed.
     middles = factors[:, WIDE // 2 :][:, :1]
     terms: Array = (factors - middles) @ TO_LEGENDRE

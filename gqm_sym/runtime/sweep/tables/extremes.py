@@ -1,10 +1,9 @@
 """The smallest and largest speed or contact force on a tabulated curve: the best sample, refined on its panel."""
 
-from math import asin, fabs, inf, pi, sqrt
-from typing import NamedTuple
+from math import asin, fabs, inf, nan, pi, sqrt
 
 from gqm_sym.runtime.arithmetic.elementary import sin
-from gqm_sym.runtime.compiled.calls import call_path_in_space
+from gqm_sym.runtime.compiled.calls import call_path_in_space, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.sweep.single.orbit_extremes import (
     FORCE,
@@ -30,7 +29,6 @@ from gqm_sym.runtime.sweep.tables.layout import (
     SAMPLE_POINTS,
     SAMPLES,
 )
-from gqm_sym.runtime.sweep.tables.liftoff import launch_on
 from gqm_sym.runtime.sweep.tables.panel_forces import AT_REST, FAR, LOAD, MOVING, NEAR, TURNING, VECTORS, prepare
 from gqm_sym.runtime.sweep.tables.passage import BOTH, LOWER, UPPER
 from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
@@ -44,77 +42,6 @@ CLEARANCE = 4e-16
 
 # The last step for the smallest square of a force. It may almost vanish, and then the force is not flat there.
 LAST_STEP_OF_SQUARE = 1e-8
-
-
-class Stretch(NamedTuple):
-    """The part of a passage along which a body moves.
-
-    Attributes
-    ----------
-    low, high : (j, x)
-        The panels of both ends, and the places on them.
-    begin : (j, x)
-        The end at which the body begins, with a speed that is known; j is -1 if it turns before it leaves the track, or
-        if it stays on it.
-    turns : bool
-        Whether the body is at a turning point, at which its speed is 0.
-    is_lap : bool
-        Whether it is a whole lap, the ends of which are the same place.
-    """
-
-    low: tuple[int, float]
-    high: tuple[int, float]
-    begin: tuple[int, float]
-    turns: bool
-    is_lap: bool
-
-
-@Inner
-def end_of(stop, onwards, begin):  # type: ignore[no-untyped-def]
-    """Return the panel of a `Stop` and the place there; the body stops before the load beyond a joint acts."""
-    end = stop.panel, stop.x
-    if stop.x == (-1.0 if onwards else 1.0) and begin != end:
-        return (stop.panel - 1, 1.0) if onwards else (stop.panel + 1, -1.0)
-    return end
-
-
-@Inner
-def stretch_of(curve, orbit, passage, stop):  # type: ignore[no-untyped-def]
-    """Return the `Stretch` of a body up to a `Stop`."""
-    low, high, begin, stops = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0), stop.panel >= 0
-    passes_once = orbit.circulates or orbit.leaves == orbit.direction
-    passes_once = stop.turns == 0 if stops else passes_once
-    upwards = orbit.direction > 0
-    if passes_once and (stops or not orbit.circulates):
-        begin = launch_on(curve, orbit, passage)
-        low, high = (begin, high) if upwards else (low, begin)
-    if stops and stop.turns < 2:
-        onwards = upwards == (stop.turns == 0)
-        end = end_of(stop, onwards, begin)
-        if stop.turns == 1 and upwards == (stop.place > orbit.lam0):  # it has not come back to its launch
-            end = launch_on(curve, orbit, passage)
-        low, high = (low, end) if onwards else (end, high)
-    return Stretch(low, high, begin, orbit.v2 == 0.0 or not passes_once, orbit.circulates and not stops)
-
-
-@Inner
-def stretch_before_turn(curve, orbit, passage):  # type: ignore[no-untyped-def]
-    """Return the `Stretch` of a body from its launch to the turning point ahead of it."""
-    launch = launch_on(curve, orbit, passage)
-    low, high = (0, passage.low_x), (passage.panels - 1, passage.high_x)
-    low, high = (launch, high) if orbit.direction > 0 else (low, launch)
-    return Stretch(low, high, launch, True, False)
-
-
-@Inner
-def stretch_after_turn(orbit, passage, stop):  # type: ignore[no-untyped-def]
-    """Return the `Stretch` of a body from its last turning point to a `Stop`, or to the end of its orbit."""
-    low, high, none = (0, passage.low_x), (passage.panels - 1, passage.high_x), (-1, 0.0)
-    if stop.panel >= 0:
-        onwards = (orbit.direction > 0) == (stop.turns != 1)
-        end = end_of(stop, onwards, none)
-        low, high = (low, end) if onwards else (end, high)
-    return Stretch(low, high, none, True, False)
 
 
 @Inlined
@@ -238,40 +165,50 @@ def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def place_at(u, ends, turns):  # type: ignore[no-untyped-def]
+def place_at(u, span, turns):  # type: ignore[no-untyped-def]
     """Return the place on a panel for the variable of `refined`."""
-    (low, high), (at_low, at_high) = ends, turns
+    (low, high), (at_low, at_high) = span, turns
     if not (at_low or at_high):
         return u
     share = sin(0.5 * pi * u) ** 2 if at_low and at_high else u * u
     return low + (high - low) * share if at_low else high - (high - low) * share
 
 
-@Inner
-def refined(curve, k, level, sought, sign, x, ends, turns):  # type: ignore[no-untyped-def]
-    """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by parabolas.
+@Inlined
+def variable_at(x, span, turns):  # type: ignore[no-untyped-def]
+    """Return the variable of `refined` for a place on a panel."""
+    (low, high), (at_low, at_high) = span, turns
+    if not (at_low or at_high):
+        return x
+    root = sqrt(min(max((x - low if at_low else high - x) / (high - low), 0.0), 1.0)) if high > low else 0.0
+    return 2.0 / pi * asin(root) if at_low and at_high else root
 
-    If one of the ends is a turning point next to which the force changes with V, which ``turns`` tells of both, the
-    variable is one in which V is smooth: the root of the distance from it, or the phase angle between two turning
-    points, as shares.
+
+@Inner
+def refined(curve, k, level, sought, sign, x, ends, variable):  # type: ignore[no-untyped-def]
+    """Return the largest (``sign`` 1) or smallest (-1) value near a place between two ends on panel k, by
+    parabolas, times ``sign``; and where it is.
+
+    The variable is the place, unless the force changes with V and the panel has a turning point. Then it is one in
+    which V is smooth: the root of the distance from it, or the phase angle between two turning points, as shares of a
+    span. ``variable`` has the span, and whether its lower and its upper end are turning points.
     """
     prepare(curve, k, NEAR)
-    low, high = ends
-    u, step = x, FIRST_STEP
-    if turns[0] or turns[1]:
-        share = min(max((x - low) / (high - low), 0.0), 1.0) if high > low else 0.0
-        root = sqrt(share if turns[0] else 1.0 - share)
-        u, low, high, step = 2.0 / pi * asin(root) if turns[0] and turns[1] else root, 0.0, 1.0, 0.5 * FIRST_STEP
-    best = load_on(curve, k, level, sought, x)
+    span, turns = variable
+    u, low, high = variable_at(x, span, turns), variable_at(ends[0], span, turns), variable_at(ends[1], span, turns)
+    low, high, step = min(low, high), max(low, high), 0.5 * FIRST_STEP if turns[0] or turns[1] else FIRST_STEP
+    best = sign * load_on(curve, k, level, sought, x)
     last = LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED and sign < 0.0 else LAST_STEP
     for _ in range(MAX_PARABOLAS):
         before_step = u
         left, right = max(u - step, low), min(u + step, high)
         if not left < u < right:
             u = 0.5 * (left + right)
-        x0, x1, x2 = place_at(left, ends, turns), place_at(u, ends, turns), place_at(right, ends, turns)
+        x0, x1, x2 = place_at(left, span, turns), place_at(u, span, turns), place_at(right, span, turns)
         f0, f1, f2 = loads_on(curve, k, level, sought, x0, x1, x2)
-        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2)
+        for place, value in ((x0, sign * f0), (x1, sign * f1), (x2, sign * f2)):
+            if value > best:
+                best, x = value, place
         before, after = (u - left) * (f1 - f2), (u - right) * (f1 - f0)
         if before != after:
             vertex = u - 0.5 * ((u - left) * before - (u - right) * after) / (before - after)
@@ -279,66 +216,140 @@ def refined(curve, k, level, sought, sign, x, ends, turns):  # type: ignore[no-u
         if step <= last:
             break
         step = min(step, max(step / STEP_RATIO, fabs(u - before_step)))
-    return sign * max(sign * best, sign * load_on(curve, k, level, sought, place_at(u, ends, turns)))
+    place = place_at(u, span, turns)
+    value = sign * load_on(curve, k, level, sought, place)
+    return (value, place) if value > best else (best, x)
+
+
+@Inner
+def sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples):  # type: ignore[no-untyped-def]
+    """Fill places on panel j of a passage, and what `load_on` returns there; outside of the stretch it is NaN.
+
+    ``samples`` contains both rows.
+    """
+    k, slack, squared = (passage.first + j) % curve.levels.size, half_v2_at_edges[j], sought[0] == FORCE_SQUARED
+    (places, values), (first, low_x), (last, high_x) = samples, stretch.low, stretch.high
+    low, high, inside = low_x if j == first else -1.0, high_x if j == last else 1.0, first < j < last
+    prepare(curve, k, (FAR | LOAD if sought[0] == FORCE else FAR) | (0 if inside else NEAR))
+    if inside or squared:
+        fill_samples(curve, k, slack, sought, values)
+    for i in range(SAMPLES):
+        places[i] = SAMPLE_POINTS[i]
+        if not inside and (i == SAMPLES - 1 or not squared or i == 0):
+            # The end itself is sampled, because the next panel shares it.
+            places[i] = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
+            values[i] = load_on(curve, k, level_on(passage, half_v2_at_edges, j), sought, places[i])
+        if not low <= places[i] <= high:
+            values[i] = nan
+
+
+@Inner
+def limit_beside(values, sign, i):  # type: ignore[no-untyped-def]
+    """Return a number that ``sign`` times a function does not exceed next to sample i of a panel; minus infinity if one
+    of its neighbours is larger, beside which it is looked for then.
+
+    Between samples the function exceeds them by less than they differ from those around.
+    """
+    here, drop = sign * values[i], 0.0
+    for k in range(max(i - 2, 0), min(i + 3, SAMPLES)):
+        other = sign * values[k]
+        if other > here and abs(k - i) == 1:
+            return -inf
+        drop = max(drop, here - other) if other == other else drop
+    return here + drop
 
 
 @Inner
 def best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
-    """Return the largest value of ``sign`` times what `load_on` returns at the samples, its panel, and its place
-    there.
+    """Return the largest value of ``sign`` times what `load_on` returns at the samples, its panel, and its place there;
+    and the largest `limit_beside` the other samples.
     """
-    samples, count, squared = line_buffer(), curve.levels.size, sought[0] == FORCE_SQUARED
-    best, best_j, best_x = -inf, 0, 0.0
-    (first, low_x), (last, high_x) = stretch.low, stretch.high
-    for j in range(first, last + 1):
-        k, slack, inside = (passage.first + j) % count, half_v2_at_edges[j], first < j < last
-        low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
-        prepare(curve, k, (FAR | LOAD if sought[0] == FORCE else FAR) | (0 if inside else NEAR))
-        if inside or squared:
-            fill_samples(curve, k, slack, sought, samples)
+    samples = line_buffer(), line_buffer()
+    best, best_j, best_x, limit, rival = -inf, 0, 0.0, -inf, -inf
+    for j in range(stretch.low[0], stretch.high[0] + 1):
+        sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples)
         for i in range(SAMPLES):
-            x, value = SAMPLE_POINTS[i], samples[i]
-            is_end = i == SAMPLES - 1 or (squared and i == 0)
-            if not inside and (is_end or not squared):
-                # The end itself is sampled, because the next panel shares it.
-                x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
-                value = load_on(curve, k, level_on(passage, half_v2_at_edges, j), sought, x)
-            if sign * value > best and low <= x <= high:
-                best, best_j, best_x = sign * value, j, x
-    return best, best_j, best_x
+            value = sign * samples[1][i]
+            if value > best:
+                rival = max(rival, limit)
+                best, best_j, best_x, limit = value, j, samples[0][i], limit_beside(samples[1], sign, i)
+            elif value == value:
+                rival = max(rival, limit_beside(samples[1], sign, i))
+    return best, best_j, best_x, rival
+
+
+@Inner
+def refined_beside(curve, passage, stretch, half_v2_at_edges, sought, sign, sample):  # type: ignore[no-untyped-def]
+    """Return ``sign`` times the extreme next to a sample, which is a panel and a place there; and where it is.
+
+    It is refined on the panel itself, and on the panel with which it shares the place: at a joint the values on both
+    sides are compared.
+    """
+    (sample_j, sample_x), low, high, last = sample, stretch.low, stretch.high, passage.panels - 1
+    best, best_k, best_x = -inf, 0, 0.0
+    for step in range(-1, 2):
+        j, x, shared = sample_j + step, sample_x, step == 0
+        if step != 0 and sample_x == float(step):
+            x, shared = -sample_x, low[0] <= j <= high[0]
+        if stretch.is_lap and step != 0 and not 0 <= j <= last:
+            j, shared = last - sample_j, sample_x in (passage.low_x, passage.high_x)
+        if shared:
+            ends = low[1] if j == low[0] else -1.0, high[1] if j == high[0] else 1.0
+            k = (passage.first + j) % curve.levels.size
+            level, turns, is_directed = level_on(passage, half_v2_at_edges, j), passage.turns, sought[1] != 0
+            at_low = is_directed and turns in (BOTH, LOWER) and j == 0
+            at_high = is_directed and turns in (BOTH, UPPER) and j == last
+            span = passage.low_x if at_low else ends[0], passage.high_x if at_high else ends[1]
+            value, x = refined(curve, k, level, sought, sign, x, ends, (span, (at_low, at_high)))
+            if value > best:
+                best, best_k, best_x = value, k, x
+    return best, best_k, best_x
+
+
+@Inner
+def by_formulas(curve, orbit, function, k, x):  # type: ignore[no-untyped-def]
+    """Return V**2, or the contact force per unit mass, at a place of panel k, to the last digits of the largest V**2.
+
+    The curvature of a panel has fewer.
+    """
+    places, offsets, rows, v2, frame = point_buffer(), point_buffer(), line_buffer(), point_buffer(), frame_buffer()
+    places[0] = place_on(curve, k, x)
+    offsets[0] = places[0] - orbit.lam0
+    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, orbit.lam0, places, offsets, curve.p, rows)
+    v2[0] = max(orbit.v2 - 2.0 * offsets[0] * rows[0], 0.0)
+    if function == V2:
+        return v2[0]
+    fill_force(curve, FORCE, 1, places, v2, frame, rows)
+    return rows[0] / curve.mass
 
 
 @Inner
 def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
-    """Return the result of `orbit_extremes.extreme` on a stretch of a tabulated curve: the best of all samples, refined
-    on the panels to which it belongs.
-
-    At a joint the values on both sides are compared.
+    """Return the result of `orbit_extremes.extreme` on a stretch of a tabulated curve: the best of all samples,
+    refined, and others beside which the function may be larger than that.
     """
-    count, last, force = curve.levels.size, passage.panels - 1, sought[0] != V2
-    is_directed, low, high = sought[1] != 0, stretch.low, stretch.high
-    if stretch.turns and not (force or sign > 0.0):
+    function, edges, k, x = sought[0], half_v2_at_edges, -1, 0.0
+    if stretch.turns and function == V2 and sign < 0.0:
         return 0.0
-    best, best_j, best_x = best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign)
-    if sought[0] == FORCE_SQUARED:
-        best = -inf  # the sample is computed once more, to the last digits
-    if not force and (best_j, best_x) == stretch.begin:
-        return sqrt(orbit.v2)
-    for step in range(-1, 2):
-        # The extreme is refined on the panel itself, and on the panel with which it shares the place.
-        j, x, shared = best_j + step, best_x, step == 0
-        if step != 0 and best_x == float(step):
-            x, shared = -best_x, low[0] <= j <= high[0]
-        if stretch.is_lap and step != 0 and not 0 <= j <= last:
-            j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
-        if shared:
-            ends = low[1] if j == low[0] else -1.0, high[1] if j == high[0] else 1.0
-            k = (passage.first + j) % count
-            level, turns = level_on(passage, half_v2_at_edges, j), passage.turns
-            at_low = is_directed and turns in (BOTH, LOWER) and (j, ends[0]) == (0, passage.low_x)
-            at_high = is_directed and turns in (BOTH, UPPER) and (j, ends[1]) == (last, passage.high_x)
-            best = max(best, sign * refined(curve, k, level, sought, sign, x, ends, (at_low, at_high)))
+    best, best_j, best_x, rival = best_sample(curve, stretch, passage, edges, sought, sign)
+    if function == V2 and (best_j, best_x) == stretch.begin:
+        best = sign * orbit.v2
+    else:
+        # A sample of squares is computed once more, to the last digits.
+        best, k, x = refined_beside(curve, passage, stretch, edges, sought, sign, (best_j, best_x))
+    if rival > best:
+        samples = line_buffer(), line_buffer()
+        for j in range(stretch.low[0], stretch.high[0] + 1):
+            sample_panel(curve, stretch, passage, edges, sought, j, samples)
+            for i in range(SAMPLES):
+                at = j, samples[0][i]
+                if limit_beside(samples[1], sign, i) > best and at != (best_j, best_x):
+                    other, other_k, other_x = refined_beside(curve, passage, stretch, edges, sought, sign, at)
+                    if other > best:
+                        best, k, x = other, other_k, other_x
     value = sign * best
-    if sought[0] == V2:
+    if k >= 0 and (function == FORCE or (function == V2 and sign > 0.0)):
+        value = by_formulas(curve, orbit, function, k, x)
+    if function == V2:
         return sqrt(max(value, 0.0))
-    return curve.mass * (value if sought[0] == FORCE else sqrt(max(value, 0.0)))
+    return curve.mass * (value if function == FORCE else sqrt(max(value, 0.0)))
