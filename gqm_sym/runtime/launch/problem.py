@@ -126,7 +126,10 @@ class Problem:
         margins.
         """
         exact = self.functions.exact
-        return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
+        if exact is not None:
+            return exact
+        domain = (0.0, self.period) if self.period else (self.low, self.high)
+        return RoundedProblem(self.functions, self.lam0, self.w0, domain)
 
     @property
     def lam0(self) -> float:

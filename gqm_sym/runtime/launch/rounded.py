@@ -1,15 +1,20 @@
 """Decisions within rounding margins, for curves that are known in doubles only."""
 
 from dataclasses import dataclass
+from math import inf, isfinite
 
 import numpy as np
 
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.launch.speed import potential_at, speed_squared_at
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
 from gqm_sym.runtime.multiprecision.exact_problem import End
 
 # V**2, or a slope of the effective potential, counts as zero below this share of the size of its terms.
 ZERO_SHARE = 2e-14
+
+# The slope counts as zero below this share of the slopes and forces nearby, some units in the last place. They are
+# taken at this share of the length on which the curve changes its direction.
+LEVEL_SHARE, ASIDE = 1e-15, 1.0 / 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,11 +24,22 @@ class RoundedProblem:
     functions: BoundFunctions
     lam0: float
     w0: float
+    domain: tuple[float, float] = (-inf, inf)
 
     def slope_sign(self) -> int:
-        """Return the sign of the effective potential's slope at the launch place; 0 if it is zero within rounding."""
+        """Return the sign of the effective potential's slope at the launch place; 0 if it is zero within rounding.
+
+        Its terms are as large as the force across the curve, which a rounding of the tangent turns along it, as the
+        slope at some distance, and as the potential over the length on which the curve changes its direction.
+        """
+        f, place = self.functions, np.array([self.lam0])
+        _, _, ds, bend, load = np.abs(path_and_force_at(f.addresses, f.p, place, np.zeros(1))[:, 0]).tolist()
+        length = min(self.domain[1] - self.domain[0], 1.0 / bend if bend > 0.0 else inf)
         value, slope = self._potential(self.lam0)
-        return 0 if abs(slope) <= ZERO_SHARE * (0.5 + abs(value)) else int(np.sign(slope))
+        sides = (min(max(self.lam0 + side * ASIDE * length, self.domain[0]), self.domain[1]) for side in (-1.0, 1.0))
+        beside = [abs(self._potential(place)[1]) for place in sides if isfinite(place)]
+        limit = LEVEL_SHARE * max(ds * load / f.mass, *beside, 0.0) + ZERO_SHARE * abs(value) / length
+        return 0 if abs(slope) <= limit else int(np.sign(slope))
 
     def resolve(self, near: float, far: float, direction: int) -> End:
         """Decide whether a turning point, an equilibrium or neither lies between two places with nearly vanishing

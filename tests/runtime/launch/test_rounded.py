@@ -80,6 +80,15 @@ def test_released_on_top_it_rests(hill: ModuleType) -> None:
         assert side * motion.state(0.3).x > 1e-3
 
 
+@pytest.mark.parametrize("power", [-100, -10, 0, 10, 100])
+def test_released_on_top_in_any_units(power: int, hill: ModuleType) -> None:
+    """Whether a body stays on the top does not depend on the unit of time. A slope of 1e-14 m/s**2 counted as none, so
+    that bodies moved away from the top or stayed beside it.
+    """
+    motions = [hill.solve(way(X0) - aside, g=G * 2.0**power) for aside in (0.0, 1e-13, -1e-13)]
+    assert [(motion.kind, motion.direction) for motion in motions] == [("rest", 1), ("transit", -1), ("transit", 1)]
+
+
 @pytest.mark.parametrize("size", [1.0, 1e-8, 1e8])
 def test_a_break_is_seen_at_any_size(size: float, tmp_path: Path) -> None:
     """The curvature jumps once, at the top, whatever the size of the hill."""
