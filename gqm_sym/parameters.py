@@ -166,17 +166,16 @@ def read_parameters(
         declared = dict(given)
     else:
         declared = dict.fromkeys(names(given, where=f"{where}: parameters"))
-    for name in declared:
+    pairs: list[tuple[str, Value | None]] = []
+    for name in (*declared, *(name for name in order if name not in declared)):
         if not isinstance(name, str):
             raise DeclarationError(f"{where}: parameters: {name!r:.60} is not a name; names are text")
+        check_parameter(name, where=where)
         if name not in order:
             raise DeclarationError(
                 f"{where}: parameter {short(name)} is declared but not used; "
                 f"remove it or use it (in use: {', '.join(order) or 'none'})"
             )
-    pairs: list[tuple[str, Value | None]] = []
-    for name in (*declared, *(name for name in order if name not in declared)):
-        check_parameter(name, where=where)
         value = declared.get(name, COMMON_DEFAULTS.get(name))
         pairs.append((name, None if value is None else read_value(value, where=f"{where}: {name}")))
     return tuple(pairs)

@@ -54,3 +54,10 @@ def test_names_alone(parameters: Any) -> None:
     assert gqm.Curve.graph("a*x**2", parameters=parameters).defaults == (("a", None),)
     with pytest.raises(DeclarationError, match=r"'a' is declared but not used; remove it or use it \(in use: b\)"):
         gqm.Curve.graph("b*x**2", parameters=parameters)
+
+
+@pytest.mark.parametrize(("name", "value"), [("e", "2.71828"), ("pi", "3.14159")])
+def test_a_constant_is_no_parameter(name: str, value: str) -> None:
+    """Who declares a constant as a parameter is told so, and not that the parameter is not used."""
+    with pytest.raises(GQMError, match=rf"'{name}' cannot be a name: it is a constant \({value}\)"):
+        gqm.Curve.graph(f"{name}*x**2", parameters={name: 1})

@@ -174,6 +174,8 @@ TESTED_THROUGH = {
     "legs/frames/tiny_legs.py": "runtime/sweep/test_planes_with_friction.py",
     "legs/gaps/blocks.py": "runtime/legs/gaps/test_passing.py",
     "legs/gaps/data.py": "claims/test_space_curves.py",
+    "legs/gaps/places.py": "runtime/legs/gaps/test_flows.py",
+    "legs/gaps/turn_flows.py": "runtime/legs/gaps/test_flows.py",
     "legs/gaps/rooms.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/inherited.py": "runtime/legs/test_leg_errors.py",
     "legs/kinks/places.py": "runtime/legs/kinks/test_parts.py",

@@ -2,12 +2,14 @@
 
 numba keeps the order in which a dot product is summed, so it is not vectorised. Here eight results are summed side by
 side, row by row of the transposed matrix. Since each sum must wait for the one before, several of them, over
-alternating rows, run at the same time.
+alternating rows, run at the same time. The products are loops: written out for each matrix and each place where it is
+used, they would take most of the time in which legs are compiled, and no less time when they run.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial, reduce
-from typing import Any
+from functools import cache, partial, reduce
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -32,64 +34,102 @@ from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, in_python
 # The number of sums that run at the same time.
 PARALLEL_SUMS = 6
 
-
-# The largest number of products of registers that are written out; more of them are done in a loop over the rows.
-MAX_WRITTEN_OUT = 128
-
-
-def _padded(table: Any) -> Any:
-    """Return a table whose rows are padded with zeros to whole registers, and the number of sums for each result."""
-    table = np.pad(table, ((0, 0), (0, -table.shape[1] % LANES)))
-    return table, max(PARALLEL_SUMS // (table.shape[1] // LANES), 1)
+# Integers of numba's functions.
+WHOLE = ir.IntType(64)
 
 
-def _emit(builder: Any, values: Any, out: Any, table: Any) -> None:
-    """Emit the product of the numbers at the address ``values`` with a table."""
-    table, chains = _padded(table)
-    rows, width = table.shape
-    blocks = range(width // LANES)
-    numbers = ir.Constant(ir.ArrayType(REAL, table.size), table.ravel().tolist())
-    held = global_constant(builder, "table", numbers)
+class _Layout(NamedTuple):
+    """How tables of the same height of a *block* are read.
+
+    Attributes
+    ----------
+    registers : int
+        The width of a block in registers. Several blocks side by side are multiplied one after another.
+    chains : int
+        The number of sums for each result, over alternating rows.
+    rest : int
+        The number of rows that are left over where the rows are taken by as many as there are chains.
+    """
+
+    registers: int
+    chains: int
+    rest: int
+
+
+def _laid_out(tables: Sequence[Any]) -> tuple[_Layout, list[Any]]:
+    """Return the layout of tables whose blocks have the width of the first table, and the tables by block, row and
+    column, padded with zeros to whole registers.
+    """
+    padded = [np.pad(table, ((0, 0), (0, -table.shape[1] % LANES))) for table in tables]
+    width = padded[0].shape[1]
+    chains = max(PARALLEL_SUMS // (width // LANES), 1)
+    rests = {len(table) % chains for table in padded}
+    assert len(rests) == 1, "the tables leave over different numbers of rows"
+    blocks = [table.reshape(len(table), -1, width).transpose(1, 0, 2) for table in padded]
+    return _Layout(width // LANES, chains, rests.pop()), blocks
+
+
+def _constant(builder: Any, kind: Any, values: Any) -> Any:
+    """Return the address of the first of some constants in memory."""
+    held = global_constant(builder, "table", ir.Constant(ir.ArrayType(kind, len(values)), values))
     held.align = 8 * LANES
-    # LLVM would turn the entries of a constant table into single constants: it would load each from an address of its
-    # own, and keep all of them on the stack during a loop. An empty piece of assembly hides the table.
-    opaque = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
-    entries = builder.asm(opaque, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
-    zero = ir.Constant(REGISTER, [0.0] * LANES)
+    return builder.bitcast(held, kind.as_pointer())
 
-    def add(row: Any, line: Any, sums: list[Any]) -> list[Any]:
+
+def _opaque(builder: Any, value: Any) -> Any:
+    """Return a value about which LLVM knows nothing, by an empty piece of assembly.
+
+    Otherwise it would write out a loop over the rows, make single constants of a table's entries, load each from an
+    address of its own, and keep all of them on the stack during a loop around it.
+    """
+    return builder.asm(ir.FunctionType(value.type, [value.type]), "", "=r,0", [value], side_effect=False)
+
+
+def _emit(builder: Any, values: Any, out: Any, layout: _Layout, entries: Any, groups: Any, blocks: Any) -> None:
+    """Emit the product of the numbers at the address ``values`` with a table.
+
+    The table begins at the address ``entries``. It has ``blocks`` blocks, each with ``groups`` groups of as many rows
+    as there are chains, and then the rest.
+    """
+    width, zero = layout.registers * LANES, ir.Constant(REGISTER, [0.0] * LANES)
+    held = [[alloca_once_value(builder, zero) for _ in range(layout.registers)] for _ in range(layout.chains)]
+    whole_rows = builder.mul(groups, ir.Constant(WHOLE, layout.chains))
+    rows = builder.add(whole_rows, ir.Constant(WHOLE, layout.rest))
+
+    def add(block: Any, first: Any, number: int) -> None:
+        row = builder.add(first, ir.Constant(WHOLE, number))
         each = broadcast(builder, builder.load(builder.gep(values, [row])))
-        loaded = [builder.load(register(builder, line, block * LANES), align=8 * LANES) for block in blocks]
-        return [operation(builder, "fma", each, entry, total) for entry, total in zip(loaded, sums, strict=True)]
+        at = builder.mul(builder.add(builder.mul(block, rows), row), ir.Constant(WHOLE, width))
+        line = builder.gep(entries, [at])
+        for k, place in enumerate(held[number]):
+            entry = builder.load(register(builder, line, k * LANES), align=8 * LANES)
+            builder.store(operation(builder, "fma", each, entry, builder.load(place)), place)
 
-    totals = [[zero] * len(blocks) for _ in range(chains)]
-    if rows * len(blocks) <= MAX_WRITTEN_OUT:
-        for row in range(rows):
-            line = builder.gep(entries, [ir.Constant(INDEX, row * width)])
-            totals[row % chains] = add(ir.Constant(INDEX, row), line, totals[row % chains])
-    else:
-        assert chains == 1
-        held_sums = [alloca_once_value(builder, zero) for _ in blocks]
-        with for_range(builder, ir.Constant(ir.IntType(64), rows)) as loop:
-            line = builder.gep(entries, [builder.mul(loop.index, ir.Constant(ir.IntType(64), width))])
-            for held_sum, total in zip(
-                held_sums, add(loop.index, line, list(map(builder.load, held_sums))), strict=True
-            ):
-                builder.store(total, held_sum)
-        totals = [list(map(builder.load, held_sums))]
-    for block, parts in enumerate(zip(*totals, strict=True)):
-        builder.store(reduce(builder.fadd, parts), register(builder, out, block * LANES), align=8)
+    with for_range(builder, blocks) as block:
+        for place in chain.from_iterable(held):
+            builder.store(zero, place)
+        with for_range(builder, groups) as group:
+            first = builder.mul(group.index, ir.Constant(WHOLE, layout.chains))
+            for k in range(layout.chains):
+                add(block.index, first, k)
+        for k in range(layout.rest):
+            add(block.index, whole_rows, k)
+        line = builder.gep(out, [builder.mul(block.index, ir.Constant(WHOLE, width))])
+        for k, parts in enumerate(zip(*held, strict=True)):
+            total = reduce(builder.fadd, map(builder.load, parts))
+            builder.store(total, register(builder, line, k * LANES), align=8)
 
 
-def _add_up(values: Any, at: int, out: Any, to: int, table: Any) -> None:
+def _add_up(values: Any, at: int, out: Any, to: int, layout: _Layout, table: Any) -> None:
     """Do in Python what `_emit` emits."""
     go_on()
-    table, chains = _padded(table)
-    rows, width = table.shape
-    fma, totals = fma_of_arrays(), [np.zeros(width)] * chains
-    for row, value in enumerate(values.reshape(-1)[at : at + rows]):
-        totals[row % chains] = fma(value, table[row], totals[row % chains])
-    out.reshape(-1)[to : to + width] = reduce(np.add, totals)
+    fma, (_, rows, width) = fma_of_arrays(), table.shape
+    for block in table:
+        totals = [np.zeros(width)] * layout.chains
+        for row, value in enumerate(values.reshape(-1)[at : at + rows]):
+            totals[row % layout.chains] = fma(value, block[row], totals[row % layout.chains])
+        out.reshape(-1)[to : to + width] = reduce(np.add, totals)
+        to += width
 
 
 def _addresses(context: Any, builder: Any, kinds: Any, args: Any) -> tuple[Any, Any]:
@@ -105,9 +145,13 @@ def multiply(table: Any) -> Any:
     padded with zeros to whole registers. The arrays are read as sequences of numbers from the given indices on, because
     a slice would take longer than the sums. Nothing is checked.
     """
+    layout, (laid_out,) = _laid_out([table])
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        _emit(builder, *_addresses(context, builder, signature.args, args), table)
+        entries = _opaque(builder, _constant(builder, REAL, laid_out.ravel().tolist()))
+        groups = _opaque(builder, ir.Constant(WHOLE, len(table) // layout.chains))
+        addresses = _addresses(context, builder, signature.args, args)
+        _emit(builder, *addresses, layout, entries, groups, ir.Constant(WHOLE, 1))
         return context.get_dummy_value()
 
     @intrinsic
@@ -117,7 +161,7 @@ def multiply(table: Any) -> Any:
 
     @in_python(sums)
     def add_up(values: Any, at: int, out: Any, to: int) -> None:
-        _add_up(values, at, out, to, table)
+        _add_up(values, at, out, to, layout, laid_out)
 
     return sums
 
@@ -126,14 +170,29 @@ def multiply_one_of(tables: Sequence[Callable[[], Any]]) -> Any:
     """Return the compiled function ``f(which, values, at, out, to)`` that multiplies a vector with one of some constant
     matrices, as that of `multiply` does; ``which`` counts from 1.
 
-    A matrix is the result of a function, which is called when the product is compiled or Python runs it.
+    The width of each matrix, padded to whole registers, is a multiple of that of the first, so that one piece of code
+    serves all of them. A matrix is the result of a function, which is called when the product is compiled or Python
+    runs it.
     """
 
+    @cache
+    def laid_out() -> tuple[_Layout, list[Any]]:
+        return _laid_out([table() for table in tables])
+
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        layout, blocks = laid_out()
+        entries = np.concatenate([table.ravel() for table in blocks])
+        starts = np.cumsum([0, *(table.size for table in blocks[:-1])])
+        which = builder.sub(args[0], ir.Constant(WHOLE, 1))
+
+        def of_table(numbers: Any) -> Any:
+            held = _constant(builder, WHOLE, [int(number) for number in numbers])
+            return builder.load(builder.gep(held, [which]))
+
+        start = builder.gep(_constant(builder, REAL, entries.tolist()), [of_table(starts)])
+        groups = of_table([table.shape[1] // layout.chains for table in blocks])
         addresses = _addresses(context, builder, signature.args[1:], args[1:])
-        for k, table in enumerate(tables):
-            with builder.if_then(builder.icmp_signed("==", args[0], ir.Constant(args[0].type, 1 + k))):
-                _emit(builder, *addresses, table())
+        _emit(builder, *addresses, layout, start, groups, of_table([len(table) for table in blocks]))
         return context.get_dummy_value()
 
     @intrinsic
@@ -143,7 +202,8 @@ def multiply_one_of(tables: Sequence[Callable[[], Any]]) -> Any:
 
     @in_python(sums)
     def add_up(which: int, values: Any, at: int, out: Any, to: int) -> None:
-        _add_up(values, at, out, to, tables[which - 1]())
+        layout, blocks = laid_out()
+        _add_up(values, at, out, to, layout, blocks[which - 1])
 
     return sums
 

@@ -152,12 +152,11 @@ def room_ahead(breaks: int) -> int:
 
 
 @Inner
-def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
+def gaps_on_leg(joints, reading):  # type: ignore[no-untyped-def]
     """Return the data kept of the gaps between breaks; empty if a leg cannot be followed by them, because its panels
-    are read, or the law is neither linear nor friction of the contact force in space.
+    are read.
     """
-    is_possible = dissipation.linear or dissipation.squared_contact != 0
-    return joints.gaps if reading.what != PANELS and is_possible else joints.gaps[:0]
+    return joints.gaps if reading.what != PANELS else joints.gaps[:0]
 
 
 @Inner
@@ -244,7 +243,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     """
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
-    gaps = gaps_on_leg(dissipation, joints, reading)
+    gaps = gaps_on_leg(joints, reading)
     limit = place + direction * (LAPS_AHEAD * period if joints.gaps.size == 0 else body[REACH]) if period > 0.0 else end
     liftoff_corners, _ = breaks_before(joints.liftoff_corners, joints.ahead, period, direction, place, limit)
     limit = liftoff_corners[0] if liftoff_corners.size else limit

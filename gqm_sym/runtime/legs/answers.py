@@ -104,7 +104,7 @@ class Track(NamedTuple):
 
     def is_kept(self, dissipation: Dissipation) -> bool:
         """Return whether data of the gaps between breaks are kept, by which most legs are followed."""
-        is_possible = dissipation.linear or dissipation.squared_contact != 0
+        is_possible = dissipation.linear or dissipation.squared_contact != 0 or self.keeps_blocks
         return is_possible and self.breaks.size > 0 and self.chart.size > 0
 
     def has_kinks(self, dissipation: Dissipation) -> bool:

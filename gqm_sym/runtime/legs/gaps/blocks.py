@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     widen_range,
 )
 from gqm_sym.runtime.legs.gaps.octaves import forget_octaves
+from gqm_sym.runtime.legs.gaps.places import fill_places, has_flows
 from gqm_sym.runtime.legs.panels.breaks import clearance
 from gqm_sym.runtime.legs.panels.equation import March, Panel
 
@@ -55,7 +56,11 @@ def fill_kept_gap(forces, route, gap, v, contact_sign, at, work):  # type: ignor
     low, high = ends_of_gap(route.all_breaks, route.period, gap)
     off, begin_at = clearance(low, high), low if v > 0 else high
     panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
-    fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, high - low, route.gaps, at, work)
+    march = March((begin_at, 0.0), v, 0.0, 1.0)
+    if has_flows(forces):
+        fill_places(forces, march, panel, high - low, route.gaps, at, work)
+    else:
+        fill_gap(forces, march, panel, high - low, route.gaps, at, work)
 
 
 @Inner

@@ -62,6 +62,7 @@ from gqm_sym.runtime.legs.panels.polynomials import (
     to_tails,
 )
 from gqm_sym.runtime.legs.panels.resolution import (
+    FAR_FROM_ZERO_RATIO,
     ONE_SIGN_RATIO,
     are_resolved,
     examine,
@@ -101,11 +102,22 @@ FIRST_SQUARE = FIRST_ROW + len(GAP_ROWS) * WIDE
 FIRST_OF_FEW = FIRST_SQUARE + len(SQUARE_ROWS) * WIDE
 FIRST_OF_BLOCK = FIRST_OF_FEW + ROOM_FOR_FEW
 FIRST_OF_OCTAVES = FIRST_OF_BLOCK + FIRST_ROW
-GAP_COLUMNS = FIRST_OF_OCTAVES + OCTAVES_OF_GAP * OCTAVE_COLUMNS
+
+# For laws that depend on the speed, the places of the nodes (`places`), and the lines of `flows`.
+LINES, LINE_COLUMNS = 33, 13 + 2 * WIDE
+TAG, FIRST_LINE = 0, FIRST_ROW + WIDE
+
+# V**2 above which bodies do not reach a turn on the next gaps, as far as lines show.
+FASTEST = 1
+
+GAP_COLUMNS = max(FIRST_OF_OCTAVES + OCTAVES_OF_GAP * OCTAVE_COLUMNS, FIRST_LINE + LINES * LINE_COLUMNS)
 FILLED, REFUSED = 1.0, 2.0
 
 # The share of the square of the contact force in its terms below which it loses digits.
 LEAST_SHARE = 1e-2
+
+# N on a gap is far from zero if it is more than this share of the largest values of its parts.
+FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
 
 # The part of a gap on which a turn is sought is longer than the estimated distance of the turn by this factor.
 ENOUGH = 1.03

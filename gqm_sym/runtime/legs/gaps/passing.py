@@ -26,6 +26,7 @@ from gqm_sym.runtime.legs.gaps.data import (
     END_EXPM1,
     END_GAINED,
     FACTORS,
+    FAR_SHARE,
     FILLED,
     FIRST_OF_BLOCK,
     FIRST_OF_FEW,
@@ -48,7 +49,10 @@ from gqm_sym.runtime.legs.gaps.data import (
     read_rows,
     solve_on_gap,
 )
+from gqm_sym.runtime.legs.gaps.flows import pass_by_flow
 from gqm_sym.runtime.legs.gaps.octaves import pass_by_octave
+from gqm_sym.runtime.legs.gaps.places import has_flows, solve_on_places
+from gqm_sym.runtime.legs.gaps.turn_flows import reach_by_flow
 from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
@@ -84,7 +88,6 @@ from gqm_sym.runtime.legs.panels.equation import (
 from gqm_sym.runtime.legs.panels.few_nodes import SQUARED, V2, few_buffer, pass_few, rises
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent, size_of
 from gqm_sym.runtime.legs.panels.resolution import (
-    FAR_FROM_ZERO_RATIO,
     examine,
     keeps_sign,
 )
@@ -93,9 +96,6 @@ from gqm_sym.runtime.legs.runs.route import CurveAhead, Reading
 # The ratio of V**2 to the largest V**2 so far above which gaps are passed by kept data. Near a turn a rounding of the
 # largest V**2 has a larger effect on the time, but panels laid one by one take far longer.
 GAP_V2_RATIO = 2.0**-6
-
-# N on a gap is far from zero if it is more than this share of the largest values of its parts.
-FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
 
 
 @Inner
@@ -138,6 +138,9 @@ def pass_by_rows(forces, v2, contact_sign, width, gaps, at, work):  # type: igno
         return nan, nan, nan, nan
     if forces.linear:
         read_rows(v2, width, gaps, at, work)
+    elif has_flows(forces):
+        if not solve_on_places(forces, v2, width, contact_sign, gaps, at, work):
+            return nan, nan, nan, nan
     elif not solve_on_gap(forces, v2, width, gaps, at, work):
         return nan, nan, nan, nan
     fill_load(work)
@@ -270,6 +273,27 @@ class Passed(NamedTuple):
 
 
 @Inner
+def pass_next_by_flow(forces, route, reading, body, upcoming, spent, work):  # type: ignore[no-untyped-def]
+    """Do the work of `pass_next` by what is kept of laws that are not linear (`gaps.flows`), or by a single panel."""
+    breaks, (v2, v, contact_sign), at = route.breaks, body, 0
+    count, time, end, top, lost, has_values = BLOCK, nan, v2, v2, 0.0, False
+    while count > 0 and not time > 0.0:
+        trip = pass_by_flow(forces, route, upcoming, v2, contact_sign, count, work)
+        if trip.time > 0.0 and not (reading.what == PEAKS and may_be_peak(reading, trip.bounds)):
+            time, end, top = trip.time, trip.end, max(v2, trip.end)
+            if count > 1 and is_read_inside(route, (breaks[upcoming], breaks[upcoming + count]), (spent, spent + time)):
+                time = nan
+        count = count if time > 0.0 else (1 if count > 1 else 0)
+    if not time > 0.0:
+        (at, width), count = kept_gap(forces, route, upcoming, v, contact_sign, work), 1
+        time, end, top, lost = pass_by_rows(forces, v2, contact_sign, width, route.gaps, at, work)
+        has_values = reading.what == PEAKS
+    places, times = (breaks[upcoming], breaks[upcoming + count]), (spent, spent + time)
+    count = count if time > 0.0 and not is_read_inside(route, places, times) else 0
+    return Passed(count, time, end, top, lost, has_values, at)
+
+
+@Inner
 def pass_next(forces, route, reading, body, upcoming, spent, work):  # type: ignore[no-untyped-def]
     """Pass the block ahead of the break at ``upcoming``, or the gap.
 
@@ -287,6 +311,8 @@ def pass_next(forces, route, reading, body, upcoming, spent, work):  # type: ign
         The time up to there.
     """
     breaks, (v2, v, contact_sign) = route.breaks, body
+    if has_flows(forces):
+        return pass_next_by_flow(forces, route, reading, body, upcoming, spent, work)
     time, end, top, lost = pass_block(forces, route, reading, v2, v, contact_sign, upcoming, work)
     if time > 0.0 and not is_read_inside(route, (breaks[upcoming], breaks[upcoming + BLOCK]), (spent, spent + time)):
         return Passed(BLOCK, time, end, top, lost, False, 0)
@@ -313,10 +339,13 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
     to, total, total_low, may_join = HEAD + count * COLUMNS, 0.0, 0.0, False
     for k in range(count):
         spent += record[HEAD + k * COLUMNS + TIME]
-    while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
+    is_flow = has_flows(forces)
+    while gaps.size > 0 and upcoming + 1 < breaks.size and (is_flow or v2 >= GAP_V2_RATIO * largest_v2):
         # If a panel is laid once more, the break may lie behind already.
         is_ahead = offset(breaks[upcoming], march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
+            break
+        if is_flow and reach_by_flow(forces, route, upcoming, v2, contact_sign, work).gap_count != 0:
             break
         passed = pass_next(forces, route, reading, (v2, v, contact_sign), upcoming, spent, work)
         if passed.gap_count == 0:

@@ -29,7 +29,10 @@ from gqm_sym.runtime.legs.gaps.data import (
     solve_on_gap,
     solve_towards_turn,
 )
+from gqm_sym.runtime.legs.gaps.flows import MAX_LEFT
 from gqm_sym.runtime.legs.gaps.passing import RunState, is_load_far, is_read_inside, may_be_peak
+from gqm_sym.runtime.legs.gaps.places import has_flows
+from gqm_sym.runtime.legs.gaps.turn_flows import leave_by_flow, reach_by_flow
 from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     NO_VALUES,
@@ -105,6 +108,18 @@ class TurnOnGaps(NamedTuple):
 
 
 @Inner
+def turn_by_flow(forces, march, route, v2, contact_sign, ahead, work):  # type: ignore[no-untyped-def]
+    """Do the work of `turn_on_gaps` by what is kept of laws that are not linear (`gaps.flows`)."""
+    reached = reach_by_flow(forces, route, ahead.upcoming, v2, contact_sign, work)
+    if reached.gap_count <= 0:
+        return TurnOnGaps(0.0, nan, ahead)
+    far = offset(route.breaks[ahead.upcoming + reached.gap_count - 1], march.origin, march.direction) + reached.distance
+    is_read = route.reading.what == PEAKS and may_be_peak(route.reading, reached.bounds)
+    time = nan if is_read else reached.time
+    return TurnOnGaps(far, time, CurveAhead(ahead.upcoming + reached.gap_count, ahead.span, inf, True))
+
+
+@Inner
 def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type: ignore[no-untyped-def]
     """Return the turn of a body that becomes slower, by the rows kept of the next gaps, if these show one and N does
     not change its sign before.
@@ -126,6 +141,8 @@ def turn_on_gaps(forces, march, route, timed, largest_v2, ahead, work):  # type:
     # If a panel is laid once more, the break at which the body is lies behind already.
     if offset(breaks[first], march.origin, v) != timed.distance:
         return none
+    if has_flows(forces):
+        return turn_by_flow(forces, march, route, v2, nu, ahead, work)
     for k in range(min(GAPS_TO_TURN, breaks.size - 1 - first)):
         begin = offset(breaks[first + k], march.origin, v)
         at, width = kept_gap(forces, route, first + k, v, nu, work)
@@ -205,6 +222,25 @@ def pass_after_turn(forces, v2, far, width, gaps, at, work):  # type: ignore[no-
 
 
 @Inner
+def begin_by_flow(forces, march, route, contact_sign, before, to, record, work):  # type: ignore[no-untyped-def]
+    """Do the work of `begin_on_gaps` by what is kept of laws that are not linear (`gaps.flows`); ``to`` is the distance
+    of the next break.
+    """
+    upcoming, breaks, here = before.ahead.upcoming, route.breaks, march.origin[0]
+    for count in range(min(MAX_LEFT, breaks.size - upcoming), 0, -1):
+        trip, last = leave_by_flow(forces, route, upcoming, to, count, contact_sign, work), upcoming + count - 1
+        if not trip.time > 0.0 or is_read_inside(route, (here, breaks[last]), (0.0, trip.time)):
+            continue
+        if route.reading.what == PEAKS and may_be_peak(route.reading, trip.bounds):
+            continue
+        passed = offset(breaks[last], march.origin, march.direction)
+        left = marched(passed, march)
+        record[HEAD + RIGHT], record[HEAD + TIME], record[HEAD + TIME_ERROR] = left, trip.time, NO_VALUES
+        return RunState(left, passed, trip.end, trip.end, CurveAhead(last, before.ahead.span, inf, True), 1)
+    return before
+
+
+@Inner
 def begin_on_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
     """Leave a turn by the rows kept of the gap in which it is, and of the next one; the state is as ``before`` if this
     is not possible.
@@ -216,6 +252,8 @@ def begin_on_gaps(forces, march, route, contact_sign, before, record, work):  # 
     low, high = ends_of_gap(route.all_breaks, route.period, gap_behind(route, upcoming - 1, v))
     if not 0.0 < to < high - low:
         return before
+    if has_flows(forces):
+        return begin_by_flow(forces, march, route, contact_sign, before, to, record, work)
     at, width = kept_gap(forces, route, upcoming - 1, v, contact_sign, work)
     if route.gaps[at] != FILLED:
         return before

@@ -20,7 +20,7 @@ from gqm_sym.runtime.legs.leg_record import WHOLE as WHOLE_LEG
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT
 from gqm_sym.runtime.legs.runs.whole_panels import with_panels
-from gqm_sym.runtime.legs.variations.chain import CUSP_SHARE, FOLLOWED, SIGMA, follow
+from gqm_sym.runtime.legs.variations.chain import CUSP_SHARE, FOLLOWED, follow
 from gqm_sym.runtime.legs.variations.divided import MAX_DIVISIONS, divided, joined_law, states_of_parts
 from gqm_sym.runtime.legs.variations.equation import (
     MARKS,
@@ -153,9 +153,28 @@ def panelled(records, begins):  # type: ignore[no-untyped-def]
     return line, starts
 
 
-@Inner
-def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed):  # type: ignore[no-untyped-def]
-    """Return the panels of runs, and the changes on them, as `chain.follow` does."""
+@entry(
+    types.Tuple((WHOLE, MATRIX, FOLLOWED))(
+        *(VECTOR, WHOLE, PROGRAMS, MATRIX, types.Tuple((REAL, REAL, types.boolean)), VECTOR, VECTOR, types.boolean)
+    ),
+    checked=False,
+)
+def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap, timed):  # type: ignore[no-untyped-def]
+    """Return the panels of runs (`equation.lay_panels`), and the changes on them (`chain.follow`).
+
+    Parameters
+    ----------
+    records, begins
+        As for `equation.lay_panels`; the records may have rows of whole legs.
+    programs : PROGRAMS
+        `programs.law_in_doubles`, `programs.law_program` and `programs.rates_program`.
+    inputs : (3, n + 2) array
+        The inputs of the latter two; the last two are set here.
+    launch : (float, float, bool)
+        The launch speed, the chosen direction, and whether the law may have kinks within panels.
+    moves, lap, timed
+        As for `chain.follow`. Without changes of times the first program is that without ds/dlam.
+    """
     records, begins = panelled(records, begins)
     first, panels = lay_panels(records, begins)
     states, (v0, direction, is_rough) = lay_states(records, begins, first, panels), launch
@@ -178,37 +197,3 @@ def along_formulas(records, begins, programs, inputs, launch, moves, lap, timed)
     laid = records, begins, first, panels
     thrown = v0, direction, other_force
     return first, panels, follow(laid, law, moves, thrown, lap, np.empty(0), timed)
-
-
-# The arguments of the functions below.
-RUNS = VECTOR, WHOLE, PROGRAMS, MATRIX, types.Tuple((REAL, REAL, types.boolean)), VECTOR, VECTOR
-
-
-@entry(types.Tuple((WHOLE, MATRIX, FOLLOWED))(*RUNS), checked=False)
-def changes_along_formulas(records, begins, programs, inputs, launch, moves, lap):  # type: ignore[no-untyped-def]
-    """Return the panels of runs (`equation.lay_panels`), and the changes on them (`chain.follow`).
-
-    Parameters
-    ----------
-    records, begins
-        As for `equation.lay_panels`; the records may have rows of whole legs.
-    programs : PROGRAMS
-        `programs.law_in_doubles`, `programs.law_program` and `programs.rates_program`.
-    inputs : (3, n + 2) array
-        The inputs of the latter two; the last two are set here.
-    launch : (float, float, bool)
-        The launch speed, the chosen direction, and whether the law may have kinks within panels.
-    moves, lap
-        As for `chain.follow`.
-    """
-    return along_formulas(records, begins, programs, inputs, launch, moves, lap, True)
-
-
-@entry(MATRIX(*RUNS), checked=False)
-def turns_along_formulas(records, begins, programs, inputs, launch, moves, lap):  # type: ignore[no-untyped-def]
-    """Return the changes of the places at which runs end, as far as they turn there: a row for each.
-
-    The arguments are those of `changes_along_formulas`, except that the first program is that without ds/dlam.
-    """
-    ends = along_formulas(records, begins, programs, inputs, launch, moves, lap, False)[2][2]
-    return ends[:, SIGMA].copy()

@@ -19,11 +19,11 @@ from gqm_sym.runtime.legs.leg_record import HEADING
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.panels.point import LEAST_V2
 from gqm_sym.runtime.legs.runs.ends import END_ASYMPTOTE
-from gqm_sym.runtime.legs.variations.chain import divide, follow_changes, join_law, lay
+from gqm_sym.runtime.legs.variations.chain import SIGMA, divide, follow_changes, join_law, lay
 from gqm_sym.runtime.legs.variations.divided import MAX_DIVISIONS
 from gqm_sym.runtime.legs.variations.equation import MARKS
 from gqm_sym.runtime.legs.variations.force_errors import ROUNDING_RATIO, force_errors_on
-from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas, turns_along_formulas
+from gqm_sym.runtime.legs.variations.formula_changes import changes_along_formulas
 from gqm_sym.runtime.legs.variations.programs import (
     force_program,
     law_in_doubles,
@@ -261,22 +261,25 @@ class FormulaLaw(Law):
         self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array, breaks: Array
     ) -> Followed:
         """See `Law`. Along formulas this is one call of compiled code."""
-        thrown = launch.v0.value, float(launch.direction), self.is_rough
-        first, panels, found = changes_along_formulas(
-            records, begins, self._programs, self._inputs, thrown, self.launch_changes, lap
-        )
-        return Followed((records, begins, first, panels), *found)
+        return self._changes(records, begins, launch, lap, timed=True)
 
     def turns(self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array) -> Array:
         """Return the changes of the labels of the turns at which runs end: a row for each run.
 
         The arguments are those of `followed`. Changes of times are not needed for this, so that it takes less.
         """
+        return self._changes(records, begins, launch, lap, timed=False).ends[:, SIGMA]
+
+    def _changes(
+        self, records: Array, begins: NDArray[np.int64], launch: Launch, lap: Array, *, timed: bool
+    ) -> Followed:
+        """Return what compiled code finds along formulas, with or without the changes of times."""
         thrown = launch.v0.value, float(launch.direction), self.is_rough
-        found: Array = turns_along_formulas(
-            records, begins, self._untimed, self._inputs, thrown, self.launch_changes, lap
+        programs = self._programs if timed else self._untimed
+        first, panels, found = changes_along_formulas(
+            records, begins, programs, self._inputs, thrown, self.launch_changes, lap, timed
         )
-        return found
+        return Followed((records, begins, first, panels), *found)
 
     @computed_once
     def _programs(self) -> tuple[Any, ...]:
