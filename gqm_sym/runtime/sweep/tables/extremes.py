@@ -244,19 +244,20 @@ def sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples):
 
 
 @Inner
-def limit_beside(values, sign, i):  # type: ignore[no-untyped-def]
+def limit_beside(values, sign, i, is_end):  # type: ignore[no-untyped-def]
     """Return a number that ``sign`` times a function does not exceed next to sample i of a panel; minus infinity if one
     of its neighbours is larger, beside which it is looked for then.
 
-    Between samples the function exceeds them by less than they differ from those around.
+    Between samples the function exceeds them by less than they differ from those around; at an end of the stretch,
+    beside which it may change with the root of the distance, from the next two.
     """
-    here, drop = sign * values[i], 0.0
-    for k in range(max(i - 2, 0), min(i + 3, SAMPLES)):
-        other = sign * values[k]
-        if other > here and abs(k - i) == 1:
-            return -inf
-        drop = max(drop, here - other) if other == other else drop
-    return here + drop
+    here, before, after = sign * values[i], sign * values[max(i - 1, 0)], sign * values[min(i + 1, SAMPLES - 1)]
+    if before > here or after > here:
+        return -inf
+    if is_end:  # samples beyond it are NaN
+        before, after = min(sign * values[max(i - 2, 0)], before), min(sign * values[min(i + 2, SAMPLES - 1)], after)
+    drop = here - before if before == before else 0.0
+    return here + max(drop, here - after if after == after else 0.0)
 
 
 @Inner
@@ -266,15 +267,26 @@ def best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign):  # typ
     """
     samples = line_buffer(), line_buffer()
     best, best_j, best_x, limit, rival = -inf, 0, 0.0, -inf, -inf
-    for j in range(stretch.low[0], stretch.high[0] + 1):
+    (first, _), (last, _) = stretch.low, stretch.high
+    for j in range(first, last + 1):
         sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples)
+        top, bottom = -inf, inf
+        for i in range(SAMPLES):
+            value = sign * samples[1][i]
+            if value > top:
+                top = value
+            if value < bottom:
+                bottom = value
+        if not top + (top - bottom) > best:
+            continue
         for i in range(SAMPLES):
             value = sign * samples[1][i]
             if value > best:
                 rival = max(rival, limit)
-                best, best_j, best_x, limit = value, j, samples[0][i], limit_beside(samples[1], sign, i)
+                best, best_j, best_x = value, j, samples[0][i]
+                limit = limit_beside(samples[1], sign, i, j in (first, last))
             elif value == value:
-                rival = max(rival, limit_beside(samples[1], sign, i))
+                rival = max(rival, limit_beside(samples[1], sign, i, j in (first, last)))
     return best, best_j, best_x, rival
 
 
@@ -343,7 +355,10 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
             sample_panel(curve, stretch, passage, edges, sought, j, samples)
             for i in range(SAMPLES):
                 at = j, samples[0][i]
-                if limit_beside(samples[1], sign, i) > best and at != (best_j, best_x):
+                if limit_beside(samples[1], sign, i, j in (stretch.low[0], stretch.high[0])) > best and at != (
+                    best_j,
+                    best_x,
+                ):
                     other, other_k, other_x = refined_beside(curve, passage, stretch, edges, sought, sign, at)
                     if other > best:
                         best, k, x = other, other_k, other_x

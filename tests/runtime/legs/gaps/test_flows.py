@@ -5,6 +5,7 @@ lines.
 from pathlib import Path
 
 import numpy as np
+import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
@@ -71,3 +72,24 @@ def test_bodies_that_stay_on_a_plane(tmp_path: Path) -> None:
         assert difference(module.sweep("t_end", lam0=START, v0=SPEEDS).values, [time for _, time in turns]) <= 4
         places = [far + mpf(START) for far, _ in turns]
         assert difference(module.sweep("rest_position", lam0=START, v0=SPEEDS).values, places) <= 4
+
+
+@pytest.mark.extended
+def test_a_turn_between_arcs(tmp_path: Path) -> None:
+    """Bodies that rise on a circle of several arcs, turn, and pass a place on the other side: a pendulum."""
+    arcs = [gqm.arc(radius="2", angle=angle) for angle in ("pi/4", "pi/6", "pi/3", "pi/4")]
+    curve = gqm.Curve.piecewise(arcs, start=("0", "0"), heading="-pi/2")
+    model = gqm.derive(curve, gqm.Gravity() + gqm.LinearDrag(c="0.4"))
+    module = gqm.build(model, name="arcs_with_drag", folder=tmp_path)
+    with mp.workdps(25):
+        begin, end, speeds = mpf("2.5"), mpf(4), [3.4, 3.8, 4.2, 4.6]
+        times = []
+        for v0 in speeds:
+            # The angle from the bottom is s/2 - pi/2.
+            swing = mp.odefun(
+                lambda _t, y: [y[1], -G / 2 * mp.sin(y[0]) - DRAG * y[1]], 0, [begin / 2 - mp.pi / 2, -mpf(v0) / 2]
+            )
+            guess = next(mpf(k) / 20 for k in range(60) if swing(mpf(k) / 20)[0] > end / 2 - mp.pi / 2)
+            times.append(mp.findroot(lambda t, swing=swing: swing(t)[0] - (end / 2 - mp.pi / 2), guess))
+    swept = module.sweep("time_at", lam0=2.5, v0=np.array(speeds), direction=-1, lam=4.0)
+    assert difference(swept.values, times) <= 6
