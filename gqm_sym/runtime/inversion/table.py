@@ -252,7 +252,9 @@ def _to_powers(c, rows, size, out):  # type: ignore[no-untyped-def]
         out[i] = 0.0
     for j in range(TERMS):
         for i in range(TERMS):
-            out[i] += size * (c[j] * rows[j, i])
+            out[i] += c[j] * rows[j, i]
+    for i in range(TERMS):
+        out[i] *= size
 
 
 @Inner
