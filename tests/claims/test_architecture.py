@@ -188,7 +188,6 @@ TESTED_THROUGH = {
     "legs/panels/resolution.py": "runtime/legs/panels/test_polynomials.py",
     "legs/panels/widest.py": "claims/test_dissipative.py",
     "legs/questions.py": "runtime/sweep/test_dissipative_loop.py",
-    "legs/runs/ends.py": "runtime/legs/test_dissipative.py",
     "legs/runs/rest_on_corners.py": "runtime/sweep/test_planes_with_friction.py",
     "legs/runs/run.py": "claims/test_dissipative.py",
     "legs/runs/whole_panels.py": "runtime/legs/runs/test_whole_leg.py",

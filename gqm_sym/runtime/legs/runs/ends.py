@@ -1,6 +1,6 @@
 """The end of a run: its code and its place."""
 
-from math import fabs, inf
+from math import fabs, inf, log1p
 from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.jit import Inner
@@ -53,6 +53,9 @@ CLOSE_SHARE, CUSP_SHARE = 2.0**-10, 2.0**-5
 # speed. If it falls to this share where V**2 is smaller by the factor, V**2 vanishes like the square of the distance,
 # and the body never comes to where it does.
 SHARE_AT_REST, SLOWER_FACTOR, SLOWER_SHARE = 1e-6, 2.0**-4, 0.2501
+
+# A resistance below this share of the force on a body at rest does not count next to a turn.
+LEAST_RESISTANCE = 1e-6
 
 
 class LastTimed(NamedTuple):
@@ -111,6 +114,21 @@ class End(NamedTuple):
 
 
 @Inner
+def short_way_to_turn(v2, slope, at_rest):  # type: ignore[no-untyped-def]
+    """Return the distance to a turn next to which a constant force and a resistance in proportion to speed act, from
+    V**2, its slope, and its slope for a body at rest.
+
+    The time would be that of ``dV/dt = -a - r V``. Where the resistance is much the larger one, the distance is nearly
+    twice that by the slope alone.
+    """
+    resistance = at_rest - slope
+    if resistance <= LEAST_RESISTANCE * -at_rest:
+        return -v2 / slope
+    ratio = resistance / -at_rest
+    return 2.0 * v2 / resistance * (1.0 - log1p(ratio) / ratio)
+
+
+@Inner
 def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
     """Return the end of a run at a place where no panel is possible, with its distance and V**2; it is a turn if one is
     near.
@@ -126,7 +144,9 @@ def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-unt
             at_rest = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point)
             slower = slope_of_v2(forces, place, SLOWER_FACTOR * panel.v2, panel.contact_sign, point)
             goes_on = at_rest > 0.0 or (at_rest >= SHARE_AT_REST * slope and slower >= SLOWER_SHARE * slope)
-            return (END_ASYMPTOTE, run_length, panel.v2) if goes_on else (END_TURN, run_length - panel.v2 / slope, 0.0)
+            if goes_on:
+                return END_ASYMPTOTE, run_length, panel.v2
+            return END_TURN, run_length + short_way_to_turn(panel.v2, slope, at_rest), 0.0
     return END_TOO_NARROW, run_length, panel.v2
 
 
