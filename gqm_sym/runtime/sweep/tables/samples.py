@@ -206,16 +206,17 @@ def limit_beside(samples, sign, i, is_rooted):  # type: ignore[no-untyped-def]
     """Return a number that ``sign`` times a function does not exceed next to sample i of a panel; minus infinity if one
     of its neighbours is larger, beside which it is looked for then.
 
-    Between samples the function exceeds them by less than they differ from those around; where it may change with the
-    root of the distance from an end of the stretch (``is_rooted``), from the next two.
+    Between samples the function exceeds them by less than they differ from those around; at an end, and where
+    it may change with the root of the distance from an end of the stretch (``is_rooted``), from the next two.
     """
     values, last = samples[1], SAMPLES - 1
-    here, drop, reach = sign * values[i], 0.0, 2 if is_rooted else 1
+    here, drop = sign * values[i], 0.0
     begins, ends = i == 0 or values[i - 1] != values[i - 1], i == last or values[i + 1] != values[i + 1]
     if (not begins and sign * values[i - 1] > here) or (not ends and sign * values[i + 1] > here):
         return -inf
     if begins != ends and not is_rooted and rises_to(samples, sign, i, 1 if begins else -1):
         return here
+    reach = 2 if is_rooted or begins or ends else 1
     for j in range(max(i - reach, 0), min(i + reach, last) + 1):
         if here - sign * values[j] > drop:  # not NaN
             drop = here - sign * values[j]
