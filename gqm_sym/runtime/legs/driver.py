@@ -237,7 +237,7 @@ class Driver:
             # A lap is long enough for a pause too, where the run comes to the end of the leg but for a rounding.
             part = abs(float(record[0, END] - record[0, START]))
             if what in PASSED or (what == END_PAUSE and abs(left - part) <= ULP * self.problem.period):
-                return run.with_panels([*parts, panelled(record[0])], self._horizon)
+                return run.with_panels([*parts, panelled(record[0])], self._horizon, self.problem.period)
             if what == END_RECORD_FULL:
                 space *= 4
             elif what in (END_PAUSE, END_SLOW):

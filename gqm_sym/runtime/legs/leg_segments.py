@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
@@ -127,15 +127,17 @@ class Run(NamedTuple):
     before: Array | None = None
     passed: Array | None = None
 
-    def with_panels(self, records: list[Array], until: float) -> "list[Run]":
+    def with_panels(self, records: list[Array], until: float, lap: float) -> "list[Run]":
         """Return the run as parts with panels, the last of which ends at the same place and time up to rounding.
 
-        ``until`` is the last time of the motion.
+        ``until`` is the last time of the motion, and ``lap`` the curve's period, or 0. A part may begin laps later than
+        the run, without which it has its places.
         """
         own, last, passed = self.record, records[-1], self._passed(until)
         clock = [BEGIN, BEGIN_LOW, TIME_FROM_START, TIME_FROM_END]
         last[TIME_FROM_END if last[BACK] else TIME_FROM_START] += sum((own[clock] - last[clock]).tolist())
-        last[[END, END_LOW]] = own[[END, END_LOW]]
+        last[END], low = two_sum.py_func(own[END], (own[LAPS_BEFORE] - last[LAPS_BEFORE]) * lap)
+        last[END_LOW] = own[END_LOW] + low
         earlier = [Run(record, END_PAUSE, "", None, None, passed) for record in records[:-1]]
         return [*earlier, self._replace(record=last, before=None, passed=passed)]
 
