@@ -1,9 +1,9 @@
 """The smallest and largest speed or contact force on a tabulated curve: the best sample, refined on its panel."""
 
-from math import asin, fabs, inf, nan, pi, sqrt
+from math import asin, fabs, inf, pi, sqrt
 
 from gqm_sym.runtime.arithmetic.elementary import sin
-from gqm_sym.runtime.compiled.calls import call_path_in_space, call_potential_divdiff1
+from gqm_sym.runtime.compiled.calls import call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.sweep.single.orbit_extremes import (
     FORCE,
@@ -11,157 +11,33 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     STEP_RATIO,
     V2,
     fill_force,
-    fill_squares,
     frame_buffer,
     line_buffer,
     point_buffer,
-    vector_buffer,
 )
-from gqm_sym.runtime.sweep.tables.layout import (
-    HALF,
-    KAPPA_SAMPLES,
-    KAPPA_TERMS,
-    LEFT_TERMS,
-    LOAD_SAMPLES,
-    LOAD_TERMS,
-    POTENTIAL_SAMPLES,
-    RIGHT_TERMS,
-    SAMPLE_POINTS,
-    SAMPLES,
-)
-from gqm_sym.runtime.sweep.tables.panel_forces import AT_REST, FAR, LOAD, MOVING, NEAR, TURNING, VECTORS, prepare
+from gqm_sym.runtime.sweep.tables.layout import SAMPLES
+from gqm_sym.runtime.sweep.tables.panel_forces import NEAR, prepare
 from gqm_sym.runtime.sweep.tables.passage import BOTH, LOWER, UPPER
-from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
+from gqm_sym.runtime.sweep.tables.samples import (
+    best_sample,
+    is_same_joint,
+    level_on,
+    limit_beside,
+    load_on,
+    loads_on,
+    place_on,
+    sample_panel,
+)
 
 # Half the widths of the first and of the last parabola on a panel of a tabulated curve, whose width is 2, and the
 # largest number of parabolas. One whose vertex is far away is followed by one of the same width there.
 FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
-# The distance from the end of a panel at which formulas are evaluated, as a share of the places there.
-CLEARANCE = 4e-16
-
 # The last step for the smallest square of a force. It may almost vanish, and then the force is not flat there.
 LAST_STEP_OF_SQUARE = 1e-8
 
-
-@Inlined
-def level_on(passage, half_v2_at_edges, j):  # type: ignore[no-untyped-def]
-    """Return V**2/2 at an edge of panel j of a passage, the column of the powers about that edge, and the edge's place
-    on the panel.
-
-    It is the edge that is farther from a turning point, because the lowest place of a small swing is near it.
-    """
-    if j == 0 and passage.panels > 1:
-        return half_v2_at_edges[1], RIGHT_TERMS, 1.0
-    return half_v2_at_edges[j], LEFT_TERMS, -1.0
-
-
-@Inlined
-def place_on(curve, k, x):  # type: ignore[no-untyped-def]
-    """Return the place in lam of x on panel k.
-
-    The last place is a little before the next panel, because at a joint formulas are those of the piece that begins.
-    """
-    half, first, last = curve.table.paths[k, HALF], curve.table.edges[k], curve.table.edges[k + 1]
-    place = first + half * (x + 1.0) if x <= 0.0 else last + half * (x - 1.0)
-    return min(place, max(last - CLEARANCE * max(fabs(first), fabs(last)), first))
-
-
-@Inner
-def v2_or_force_on(curve, k, level, function, x):  # type: ignore[no-untyped-def]
-    """Return V**2, or the contact force per unit mass, at a place of panel k; ``level`` is the result of `level_on`."""
-    slack, at, edge = level
-    v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
-    if function == FORCE:
-        return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
-    return v2
-
-
-@Inner
-def fill_squares_on(curve, k, level, direction, n, points, out):  # type: ignore[no-untyped-def]
-    """Fill the square of the contact force per unit mass at n places of panel k, for a direction of motion or for
-    both.
-    """
-    places, frame = point_buffer(), frame_buffer()
-    for i in range(n):
-        places[i], out[i] = place_on(curve, k, points[i]), max(v2_or_force_on(curve, k, level, V2, points[i]), 0.0)
-    if direction != 0:
-        fill_squares(curve, direction, n, places, out, out)
-    else:
-        fill_force(curve, FORCE_SQUARED, n, places, out, frame, out)
-    for i in range(n):
-        out[i] /= curve.mass**2
-
-
-@Inner
-def loads_on(curve, k, level, sought, x0, x1, x2):  # type: ignore[no-untyped-def]
-    """Return V**2, the contact force per unit mass, or the square of its length, at three places of panel k.
-
-    `orbit_extremes.is_loop` explains ``sought``.
-    """
-    if sought[0] != FORCE_SQUARED:
-        return (
-            v2_or_force_on(curve, k, level, sought[0], x0),
-            v2_or_force_on(curve, k, level, sought[0], x1),
-            v2_or_force_on(curve, k, level, sought[0], x2),
-        )
-    points, out = point_buffer(), point_buffer()
-    points[0], points[1], points[2] = x0, x1, x2
-    fill_squares_on(curve, k, level, sought[1], 3, points, out)
-    return out[0], out[1], out[2]
-
-
-@Inner
-def load_on(curve, k, level, sought, x):  # type: ignore[no-untyped-def]
-    """Return what `loads_on` returns, at one place."""
-    if sought[0] != FORCE_SQUARED:
-        return v2_or_force_on(curve, k, level, sought[0], x)
-    points, out = point_buffer(), point_buffer()
-    points[0] = x
-    fill_squares_on(curve, k, level, sought[1], 1, points, out)
-    return out[0]
-
-
-@Inner
-def prepare_vectors(curve, k):  # type: ignore[no-untyped-def]
-    """Fill the vectors at the samples of panel k that the contact force per unit mass is made of, if still missing."""
-    if curve.levels[k] & VECTORS:
-        return
-    curve.levels[k] |= VECTORS
-    places, v2, ahead, back, row = line_buffer(), line_buffer(), vector_buffer(), vector_buffer(), curve.rows[k]
-    for i in range(SAMPLES):
-        places[i], v2[i] = place_on(curve, k, SAMPLE_POINTS[i]), 0.0
-    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, 1.0, curve.p, ahead)
-    for j in range(3 * SAMPLES):
-        row[AT_REST + j] = ahead[SAMPLES + j] / curve.mass
-    for i in range(SAMPLES):
-        v2[i] = 1.0
-    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, 1.0, curve.p, ahead)
-    call_path_in_space(curve.path_in_space, SAMPLES, places, v2, -1.0, curve.p, back)
-    for j in range(3 * SAMPLES):
-        one, other = ahead[SAMPLES + j] / curve.mass, back[SAMPLES + j] / curve.mass
-        row[TURNING + j], row[MOVING + j] = 0.5 * (one + other) - row[AT_REST + j], 0.5 * (one - other)
-
-
-@Inner
-def fill_samples(curve, k, slack, sought, out):  # type: ignore[no-untyped-def]
-    """Fill the same as `loads_on` at the samples of panel k, for V**2/2 at its left edge; squares of lengths lose
-    digits.
-    """
-    row, direction = curve.rows[k], float(sought[1])
-    for i in range(SAMPLES):
-        out[i] = 2.0 * (slack - row[POTENTIAL_SAMPLES + i])
-        if sought[0] == FORCE:
-            out[i] = curve.table.paths[k, KAPPA_SAMPLES + i] * out[i] + row[LOAD_SAMPLES + i]
-    if sought[0] == FORCE_SQUARED:
-        prepare_vectors(curve, k)
-        for i in range(SAMPLES):
-            v2, square = max(out[i], 0.0), 0.0
-            v = direction * sqrt(v2)
-            for j in range(i, 3 * SAMPLES, SAMPLES):
-                part = row[AT_REST + j] + v2 * row[TURNING + j] + v * row[MOVING + j]
-                square += part * part
-            out[i] = square
+# The share of an extreme up to which others are equal.
+EQUAL = 1e-15
 
 
 @Inlined
@@ -197,9 +73,8 @@ def refined(curve, k, level, sought, sign, x, ends, variable):  # type: ignore[n
     span, turns = variable
     u, low, high = variable_at(x, span, turns), variable_at(ends[0], span, turns), variable_at(ends[1], span, turns)
     low, high, step = min(low, high), max(low, high), 0.5 * FIRST_STEP if turns[0] or turns[1] else FIRST_STEP
-    best = sign * load_on(curve, k, level, sought, x)
-    last = LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED and sign < 0.0 else LAST_STEP
-    for _ in range(MAX_PARABOLAS):
+    best, last = -inf, LAST_STEP_OF_SQUARE if sought[0] == FORCE_SQUARED and sign < 0.0 else LAST_STEP
+    for i in range(MAX_PARABOLAS):
         before_step = u
         left, right = max(u - step, low), min(u + step, high)
         if not left < u < right:
@@ -213,81 +88,14 @@ def refined(curve, k, level, sought, sign, x, ends, variable):  # type: ignore[n
         if before != after:
             vertex = u - 0.5 * ((u - left) * before - (u - right) * after) / (before - after)
             u = min(max(vertex, left), right)
+        if i > 0 and u == before_step and (u - low) * (u - high) == 0.0:
+            return best, x  # also in a smaller part of the panel, the function rises towards its end
         if step <= last:
             break
         step = min(step, max(step / STEP_RATIO, fabs(u - before_step)))
     place = place_at(u, span, turns)
     value = sign * load_on(curve, k, level, sought, place)
     return (value, place) if value > best else (best, x)
-
-
-@Inner
-def sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples):  # type: ignore[no-untyped-def]
-    """Fill places on panel j of a passage, and what `load_on` returns there; outside of the stretch it is NaN.
-
-    ``samples`` contains both rows.
-    """
-    k, slack, squared = (passage.first + j) % curve.levels.size, half_v2_at_edges[j], sought[0] == FORCE_SQUARED
-    (places, values), (first, low_x), (last, high_x) = samples, stretch.low, stretch.high
-    low, high, inside = low_x if j == first else -1.0, high_x if j == last else 1.0, first < j < last
-    prepare(curve, k, (FAR | LOAD if sought[0] == FORCE else FAR) | (0 if inside else NEAR))
-    if inside or squared:
-        fill_samples(curve, k, slack, sought, values)
-    for i in range(SAMPLES):
-        places[i] = SAMPLE_POINTS[i]
-        if not inside and (i == SAMPLES - 1 or not squared or i == 0):
-            # The end itself is sampled, because the next panel shares it.
-            places[i] = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
-            values[i] = load_on(curve, k, level_on(passage, half_v2_at_edges, j), sought, places[i])
-        if not low <= places[i] <= high:
-            values[i] = nan
-
-
-@Inner
-def limit_beside(values, sign, i, is_end):  # type: ignore[no-untyped-def]
-    """Return a number that ``sign`` times a function does not exceed next to sample i of a panel; minus infinity if one
-    of its neighbours is larger, beside which it is looked for then.
-
-    Between samples the function exceeds them by less than they differ from those around; at an end of the stretch,
-    beside which it may change with the root of the distance, from the next two.
-    """
-    here, before, after = sign * values[i], sign * values[max(i - 1, 0)], sign * values[min(i + 1, SAMPLES - 1)]
-    if before > here or after > here:
-        return -inf
-    if is_end:  # samples beyond it are NaN
-        before, after = min(sign * values[max(i - 2, 0)], before), min(sign * values[min(i + 2, SAMPLES - 1)], after)
-    drop = here - before if before == before else 0.0
-    return here + max(drop, here - after if after == after else 0.0)
-
-
-@Inner
-def best_sample(curve, stretch, passage, half_v2_at_edges, sought, sign):  # type: ignore[no-untyped-def]
-    """Return the largest value of ``sign`` times what `load_on` returns at the samples, its panel, and its place there;
-    and the largest `limit_beside` the other samples.
-    """
-    samples = line_buffer(), line_buffer()
-    best, best_j, best_x, limit, rival = -inf, 0, 0.0, -inf, -inf
-    (first, _), (last, _) = stretch.low, stretch.high
-    for j in range(first, last + 1):
-        sample_panel(curve, stretch, passage, half_v2_at_edges, sought, j, samples)
-        top, bottom = -inf, inf
-        for i in range(SAMPLES):
-            value = sign * samples[1][i]
-            if value > top:
-                top = value
-            if value < bottom:
-                bottom = value
-        if not top + (top - bottom) > best:
-            continue
-        for i in range(SAMPLES):
-            value = sign * samples[1][i]
-            if value > best:
-                rival = max(rival, limit)
-                best, best_j, best_x = value, j, samples[0][i]
-                limit = limit_beside(samples[1], sign, i, j in (first, last))
-            elif value == value:
-                rival = max(rival, limit_beside(samples[1], sign, i, j in (first, last)))
-    return best, best_j, best_x, rival
 
 
 @Inner
@@ -349,16 +157,15 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
     else:
         # A sample of squares is computed once more, to the last digits.
         best, k, x = refined_beside(curve, passage, stretch, edges, sought, sign, (best_j, best_x))
-    if rival > best:
+    if rival > best + EQUAL * fabs(best):
         samples = line_buffer(), line_buffer()
         for j in range(stretch.low[0], stretch.high[0] + 1):
             sample_panel(curve, stretch, passage, edges, sought, j, samples)
+            is_rooted = sought[1] != 0 and j in (stretch.low[0], stretch.high[0])
             for i in range(SAMPLES):
                 at = j, samples[0][i]
-                if limit_beside(samples[1], sign, i, j in (stretch.low[0], stretch.high[0])) > best and at != (
-                    best_j,
-                    best_x,
-                ):
+                is_best = at == (best_j, best_x) or is_same_joint(at, (best_j, best_x))
+                if not is_best and limit_beside(samples, sign, i, is_rooted) > best + EQUAL * fabs(best):
                     other, other_k, other_x = refined_beside(curve, passage, stretch, edges, sought, sign, at)
                     if other > best:
                         best, k, x = other, other_k, other_x
