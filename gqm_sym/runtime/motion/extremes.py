@@ -35,7 +35,7 @@ PEAK_NODES, MAX_TAIL = 13, 1e-12
 # The distance from an end of a segment within which a peak counts as being at the end, as a share of the segment.
 END_SHARE = 1e-9
 
-# The share of a segment before a joint at which contact is lost in which loads are not searched.
+# The least share of a segment before a joint at which contact is lost in which loads are not searched.
 BEFORE_JOINT = 1e-13
 
 # The share of the contact force by which it must jump at a joint; the pieces of a smooth chart differ by less.
@@ -209,8 +209,8 @@ def _on_segment(
     """Return the size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
     segment = timed.segment
     start, stop = phases(timed, trajectory, end)
-    if timed.end == "liftoff" and quantity is not SPEED and _ends_at_joint(timed):
-        stop -= BEFORE_JOINT * (stop - start)  # the body leaves before the load beyond the joint acts
+    if timed.end == "liftoff" and quantity is not SPEED:
+        stop -= _share_at_joint(timed) * (stop - start)  # the body leaves before the load beyond the joint acts
     low, high = min(start, stop), max(start, stop)
     joints, found = _limits_at_joints(timed, trajectory, quantity, low, high)
     phi = samples(segment, joints, low, high)
@@ -312,12 +312,16 @@ def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[flo
     return timed.phi_start, float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
 
 
-def _ends_at_joint(timed: TimedSegment) -> bool:
-    """Return whether a timed segment ends at a place at which the curve is not smooth, to rounding."""
+def _share_at_joint(timed: TimedSegment) -> float:
+    """Return the share of a timed segment next to its end in which loads are not searched: 0, unless the curve is not
+    smooth at the end, to rounding.
+    """
     f, segment = timed.segment.functions, timed.segment
-    place = float(segment.places(np.array([timed.phi_stop]))[0])
+    start, place = segment.places(np.array([timed.phi_start, timed.phi_stop])).tolist()
     near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
-    return bool(f.joints.size and f.between(f.joints, place - near, place + near).size)
+    if not (f.joints.size and f.between(f.joints, place - near, place + near).size):
+        return 0.0
+    return min(max(BEFORE_JOINT, 2.0 * near / abs(place - start)), 0.5) if place != start else 0.5
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:

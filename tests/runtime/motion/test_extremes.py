@@ -266,3 +266,29 @@ def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
         return places
 
     assert extremes._peak(values, low, high, high) >= high - 2.0 * 2.0**-52
+
+
+@pytest.fixture(scope="module")
+def stadium(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """Return a closed rail of two level lines and two half circles of 1 m."""
+    line, bend = gqm.line(length=3), gqm.arc(radius=1, angle="pi")
+    rail = gqm.Curve.piecewise([line, bend, line, bend], closed=True)
+    return gqm.build(gqm.derive(rail, gqm.Gravity()), name="stadium", folder=tmp_path_factory.mktemp("a"))
+
+
+@pytest.mark.parametrize("before", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_a_body_that_leaves_at_once_at_a_joint(stadium: ModuleType, before: float) -> None:
+    """The load on the line behind the bend does not act, however short the way to it is."""
+    motion = stadium.solve(3 + pi - before, 6.5, contact="above")
+    assert motion.events[-1].kind == "liftoff"
+    load = 6.5**2 - 9.81 * (3 - 2 * cos(before))  # V**2/R less the weight, before the joint
+    assert motion.normal_force_min.value == pytest.approx(load, rel=2e-14)
+
+
+@pytest.mark.parametrize("before", [0.3, 0.04, 1e-3])
+def test_a_speed_is_largest_soon_after_the_launch(stadium: ModuleType, before: float) -> None:
+    """Along a chart too, where the samples beside the launch are farther away than the bottom of the bend."""
+    place, v0, given = 3 + before, 6.5, {"contact": "above", "t_max": 0.4}
+    true = sqrt(v0**2 + 2 * 9.81 * (1 - cos(before)))
+    assert stadium.solve(place, v0, direction=-1, **given).v_max.value == pytest.approx(true, rel=1e-15)
+    assert stadium.sweep("v_max", [place], [v0], direction=-1, **given).values[0] == pytest.approx(true, rel=1e-15)

@@ -152,11 +152,11 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
     if stretch.turns and function == V2 and sign < 0.0:
         return 0.0
     best, best_j, best_x, rival = best_sample(curve, stretch, passage, edges, sought, sign)
-    if function == V2 and (best_j, best_x) == stretch.begin:
-        best = sign * orbit.v2
-    else:
-        # A sample of squares is computed once more, to the last digits.
-        best, k, x = refined_beside(curve, passage, stretch, edges, sought, sign, (best_j, best_x))
+    # A sample of squares is computed once more, to the last digits.
+    best, k, x = refined_beside(curve, passage, stretch, edges, sought, sign, (best_j, best_x))
+    if function == V2 and (best_j, best_x) == stretch.begin and best <= sign * orbit.v2 + EQUAL * orbit.v2:
+        # The extreme is at the launch, where V**2 is known.
+        best, k = sign * orbit.v2, -1
     if rival > best + EQUAL * fabs(best):
         samples = line_buffer(), line_buffer()
         for j in range(stretch.low[0], stretch.high[0] + 1):
