@@ -227,8 +227,10 @@ def test_released_from_a_cusp(force: gqm.Kernel, generated_folder: Path) -> None
     soon = motion.sensitivity([1e-7, 1e-6], (*names, "v0"))
     angle = rate * np.array([1e-7, 1e-6])
     wanted_soon = [-angle, 0.5 * angle / given[1], 0.0 * angle, np.full(2, rate / given[1])]
-    np.testing.assert_allclose(soon.lam, wanted_soon, rtol=3e-14)
-    np.testing.assert_allclose(soon.normal_force[3], rate * np.cos(0.5 * angle), rtol=3e-14)
+    # The place of a motion with losses has an error of 1e-17 there.
+    within = 1e-10 if force is RUBBING else 3e-14
+    np.testing.assert_allclose(soon.lam, wanted_soon, rtol=within)
+    np.testing.assert_allclose(soon.normal_force[3], rate * np.cos(0.5 * angle), rtol=within)
     motion = module.solve(0, 0, -1)
     for ask in (lambda: motion.gradient("time_at", lam=2), lambda: motion.sensitivity([0.1, 0.2])):
         with pytest.raises(SolutionError, match="respect to v0, because the body is released at rest from a cusp"):
