@@ -137,15 +137,8 @@ def travel(forces, route, march, v2, first, way, contact_sign, work):  # type: i
     It begins at the origin of the march with ``v2``, at the distance ``first`` from the end of the first gap. The
     ``way`` is the index of that gap and the number of gaps.
     """
-    gap, count = way
-    u, left, passed, time, time_low, failed = (
-        march.direction,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        Travelled(nan, nan, NOTHING, NOTHING, NOTHING),
-    )
+    (gap, count), u, failed = way, march.direction, Travelled(nan, nan, NOTHING, NOTHING, NOTHING)
+    left, passed, time, time_low = 0.0, 0.0, 0.0, 0.0
     of_v2, of_n0, of_kappa = (v2, v2), NOTHING, NOTHING
     for k in range(count):
         if not 0 <= gap + u * k < route.all_breaks.size:

@@ -12,15 +12,7 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.legs.gaps.blocks import ends_of_gap, gap_behind, kept_gap
-from gqm_sym.runtime.legs.gaps.data import (
-    FASTEST,
-    FILLED,
-    FIRST_LINE,
-    LINE_COLUMNS,
-    REFUSED,
-    TAG,
-    Bounds,
-)
+from gqm_sym.runtime.legs.gaps.data import FASTEST, FILLED, FIRST_LINE, LINE_COLUMNS, REFUSED, TAG, Bounds
 from gqm_sym.runtime.legs.gaps.flows import (
     BOTTOM,
     FIRST,
@@ -47,9 +39,7 @@ from gqm_sym.runtime.legs.gaps.flows import (
     widen,
 )
 from gqm_sym.runtime.legs.panels.breaks import clearance, place_after, within
-from gqm_sym.runtime.legs.panels.equation import (
-    March,
-)
+from gqm_sym.runtime.legs.panels.equation import March
 from gqm_sym.runtime.legs.panels.point import LEAST_V2 as AT_REST
 from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, size_of, sum_and_slope

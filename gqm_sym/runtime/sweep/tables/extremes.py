@@ -148,7 +148,7 @@ def passage_extreme(curve, orbit, passage, stretch, half_v2_at_edges, sought, si
     """Return the result of `orbit_extremes.extreme` on a stretch of a tabulated curve: the best of all samples,
     refined, and others beside which the function may be larger than that.
     """
-    function, edges, k, x = sought[0], half_v2_at_edges, -1, 0.0
+    function, edges = sought[0], half_v2_at_edges
     if stretch.turns and function == V2 and sign < 0.0:
         return 0.0
     best, best_j, best_x, rival = best_sample(curve, stretch, passage, edges, sought, sign)
