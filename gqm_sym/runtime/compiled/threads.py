@@ -8,9 +8,12 @@ import os
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gqm_sym.runtime.compiled.uncompiled import sharing_arrays
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 
 @lru_cache(maxsize=1)
@@ -21,8 +24,22 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+@lru_cache(maxsize=1)
+def _pool(threads: int) -> "ThreadPoolExecutor":
+    """Return the threads beside the caller's. They are kept: to start them takes longer than many a sweep."""
+    from concurrent.futures import ThreadPoolExecutor  # some 20 ms, and most sessions need no threads
+
+    return ThreadPoolExecutor(threads, thread_name_prefix="gqm")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of its parent's threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def run_in_threads(work: Callable[[slice], Any], size: int, min_slice: int) -> None:
-    """Call ``work`` in threads, on one slice of ``range(size)`` for each core.
+    """Call ``work`` in threads, the caller's among them, on one slice of ``range(size)`` for each core.
+
+    It returns, or raises what a call has raised, when no call is running any more.
 
     Parameters
     ----------
@@ -37,13 +54,23 @@ def run_in_threads(work: Callable[[slice], Any], size: int, min_slice: int) -> N
     if parts <= 1:
         work(slice(0, size))
         return
-    from concurrent.futures import ThreadPoolExecutor
 
-    def in_thread(part: slice) -> None:
+    from concurrent.futures import wait
+
+    def share(part: slice) -> None:
         with sharing_arrays():
             work(part)
 
     marks = [size * k // parts for k in range(parts + 1)]
-    with ThreadPoolExecutor(parts) as pool:
-        for done in [pool.submit(in_thread, slice(*ends)) for ends in pairwise(marks)]:
-            done.result()
+    own, *others = (slice(*ends) for ends in pairwise(marks))
+    submitted = [(part, _pool(cores() - 1).submit(share, part)) for part in others]
+    try:
+        share(own)
+        for part, future in submitted:
+            if future.cancel():  # not begun: all threads are busy with the work of others
+                share(part)
+    finally:
+        begun = [future for _, future in submitted if not future.cancel()]
+        wait(begun)
+    for future in begun:
+        future.result()

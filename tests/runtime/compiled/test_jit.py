@@ -293,3 +293,51 @@ def test_threads_compile_an_entry_point_once(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(jit.COMPILER, "entry", compile_slowly)
     threads.run_in_threads(work, 3, 1)
     assert compiled == ["cubed"]
+
+
+def test_threads_that_ask_for_threads_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The caller takes over the parts that no thread has begun, so that parts which have parts of their own end."""
+    monkeypatch.setattr(threads, "cores", lambda: 2)
+    out = np.zeros((8, 8))
+
+    def work(rows: slice) -> None:
+        def row(columns: slice) -> None:
+            out[rows, columns] += 1.0
+
+        threads.run_in_threads(row, 8, 1)
+
+    threads.run_in_threads(work, 8, 1)
+    assert (out == 1.0).all()
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_what_a_thread_raises_is_raised_when_all_have_ended(bad: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is raised whether it was the caller's part or another one that failed, and no part runs on."""
+    monkeypatch.setattr(threads, "cores", lambda: 2)
+    begun, ended = threading.Event(), []
+
+    def work(part: slice) -> None:
+        if part.start == bad:
+            begun.wait()
+            raise ZeroDivisionError
+        begun.set()
+        ended.append(part)
+
+    with pytest.raises(ZeroDivisionError):
+        threads.run_in_threads(work, 2, 1)
+    assert len(ended) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="forked processes exist on POSIX systems only")
+def test_a_forked_process_starts_threads_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The threads of the parent do not exist in a forked process."""
+    monkeypatch.setattr(threads, "cores", lambda: 2)
+    threads.run_in_threads(lambda part: None, 2, 1)
+    met = threading.Barrier(2)
+    if not (child := os.fork()):
+        try:
+            threads.run_in_threads(lambda part: met.wait(20.0), 2, 1)  # both parts must run at once
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0

@@ -262,8 +262,9 @@ def exact_axis_program(orbits: Orbits) -> Program | None:
 def mean_program(orbits: Orbits) -> LaneProgram | None:
     """Return the program of the derivatives of a half period that is pi over an arithmetic-geometric mean.
 
-    With the first mean a_1, it is pi/a_1 in double-double arithmetic plus a small share, and so are its derivatives.
-    These shares and r, which are small where both numbers are alike, are computed in doubles. The coordinate of a place
+    With the first mean a_1, it is pi/a_1 in double-double arithmetic plus a small share, and so are its derivatives,
+    with the first term of r. These shares and the rest of r, which are small unless one number is far smaller than the
+    other, are computed in doubles. The coordinate of a place
     is 1. The first result is half the relative difference of the two numbers before the last step, the square of which
     is the error of the derivatives. The next ones are positive where roundings matter. The program is None if the model
     has no such mean.
@@ -277,13 +278,15 @@ def mean_program(orbits: Orbits) -> LaneProgram | None:
     a, b = (op.sqrt(square) for square in squares)
     first_mean = (a + b) * Fraction(1, 2)
     first_time = op.pi / first_mean
+    first_share = (a - b) / (8 * first_mean)
     difference, rest, more = _mean_in_doubles(op, a, b)
     # The derivatives of half the logarithms of both squares.
     logarithmic = [[part / (2 * square) for part in gradient(op, square, [half, *p])] for square in squares]
     rates, losses = [first_time * more + first_time], []
     for move in moves:
         first, second = (total_change(op, parts, move) for parts in logarithmic)
-        apart, together = first_time * (second - first), -first_time * (first + second) * Fraction(1, 2)
+        apart = first_time * (second - first)
+        together = first_share * apart - first_time * (first + second) * Fraction(1, 2)
         small = rest * apart
         rates.append((small + more * (small + together)) + together)
         losses.append(256 * (small * small) - rates[-1] * rates[-1])
@@ -298,13 +301,13 @@ def mean_program(orbits: Orbits) -> LaneProgram | None:
 
 def _mean_in_doubles(op: LaneRecorder, a: TapeNumber, b: TapeNumber) -> tuple[TapeNumber, TapeNumber, TapeNumber]:
     """Record, for the arithmetic-geometric mean of two numbers, half their relative difference before the last step,
-    the sum r of squares of differences (see the beginning of this file), and by which share the mean is smaller than
-    the arithmetic one, as a share of itself.
+    the sum r of squares of differences (see the beginning of this file) without its first term, and by which share the
+    mean is smaller than the arithmetic one, as a share of itself.
     """
     one = op.place
     mean, difference = (a + b) * Fraction(1, 2) * one, (a - b) * Fraction(1, 2) * one
     first_mean, lost = mean, op.number(0)
-    share = rest = difference / (4 * mean)  # of c_1**2 in c_0**2
+    share, rest = difference / (4 * mean), op.number(0)  # of c_1**2 in c_0**2
     b = op.sqrt(a * b * one)
     for _ in range(MEAN_STEPS):
         following = (mean + b) * Fraction(1, 2)

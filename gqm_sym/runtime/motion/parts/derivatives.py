@@ -15,7 +15,6 @@ from gqm_sym.runtime.gradients.passages.launch_limit import limit_at_launch
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
-from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.parts.positions import Positions
@@ -102,11 +101,11 @@ class Derivatives(Positions):
         SolutionError
             If there are such parameters.
         """
-        problem, charted = self.problem, self.problem.formulas.chart is not None
-        if not charted and problem.w0 != 0.0:
+        charted = self.problem.formulas.chart is not None
+        if not charted and not self._is_at_rest_in_cusp:
             return
         unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
-        if unknown and (charted or is_cusp(problem, problem.lam0)):
+        if unknown:
             if charted:
                 why = "the curve does not exist for neighbouring values (an exponent of a negative number must be an "
                 why += "integer)"
@@ -191,14 +190,16 @@ class Derivatives(Positions):
         check_force(self.problem.formulas, "sensitivity")
         found = self._sensitivity(t, wrt)
         self._check_known("sensitivity", found.wrt, found.lam)
+        if not self._is_released_at_cusp:  # times are read once more below, which takes longer than all else
+            return found
         at_launch = np.asarray(self._times(t)[0] == 0.0).reshape(found.lam.shape[1:])
-        return self._limit_of_sensitivity(found, at_launch, wrt) if at_launch.any() else found
+        return self._limit_of_sensitivity(found, at_launch, wrt)
 
     def _limit_of_sensitivity(self, found: Sensitivity, at_launch: NDArray[np.bool_], wrt: Any) -> Sensitivity:
         """Return derivatives of states with those of the contact force at a release from a cusp, where the curvature is
         infinite, and only the force after the launch has derivatives.
         """
-        if self._is_released_at_cusp:
+        if at_launch.any():
             found.normal_force[:, at_launch] = limit_at_launch(
                 lambda times: self._sensitivity(times, wrt).normal_force, min(self.t_end, LONGEST_START)
             )[:, np.newaxis]

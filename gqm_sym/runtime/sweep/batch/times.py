@@ -201,11 +201,16 @@ def keep_factor_at_turn(rule, n, node, rows, factors):  # type: ignore[no-untype
 
 
 @Inner
-def refuse_rough_factors(n, rows, check, factors):  # type: ignore[no-untyped-def]
-    """Let the smallest factor of V**2 be negative where a factor differs from that in the row ``check``."""
+def refuse_rough_factors(n, rows, check, factors, rests):  # type: ignore[no-untyped-def]
+    """Let the smallest factor of V**2 be negative where a factor differs from that in the row ``check``.
+
+    What the rounding of the inertia changes is left out, because times are corrected by it. ``rests`` are those of
+    `relative_rests`.
+    """
     low, exact = rows[FACTOR_LOW, :n], rows[check, :n]
     for j in range(n):
-        rough = fabs(factors[j] - exact[j]) > MAX_FACTOR_ERROR * exact[j]  # false for NaN
+        lost = (factors[j] - exact[j]) - 2.0 * rests[j] * factors[j]
+        rough = fabs(lost) > MAX_FACTOR_ERROR * exact[j]  # false for NaN
         low[j] = choose(rough, -1.0, low[j])
 
 
@@ -282,11 +287,13 @@ def answer_level(rows, times, verdict, chosen, answers):  # type: ignore[no-unty
 
 
 @Inner
-def fill_rates(fns, kind, n, node, rows, p, scratch):  # type: ignore[no-untyped-def]
+def fill_rates(fns, kind, n, node, rows, params, count, scratch):  # type: ignore[no-untyped-def]
     """Fill the time integrand of each orbit at one node of the rule, and check it."""
-    rates = fill_integrand_batch(fns, kind, n, node, rows, p, scratch.work)
+    rates = fill_integrand_batch(fns, kind, n, node, rows, params[: count * n].reshape(count, n), scratch.work)
     if kind == LIBRATION and node in CHECKED:
-        refuse_rough_factors(n, rows, CHECK_LOW if node == CHECKED[0] else CHECK_HIGH, scratch.work[3, :n])
+        rests = scratch.work[0, :n]
+        relative_rests(params, scratch.layout[2], rests)
+        refuse_rough_factors(n, rows, CHECK_LOW if node == CHECKED[0] else CHECK_HIGH, scratch.work[3, :n], rests)
     return rates
 
 
@@ -347,13 +354,13 @@ def times_by_trapezoid(fns, rule, orbits, rough, scratch, quantity, answers):  #
     ratios = least_ratios(rule, has_tape(scratch))
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
-        p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
+        more, lost = work[6, :n], work[7, :n]
         more[:] = lost[:] = 0.0
         corrected = exactly and nodes <= EXACT_NODES
         if corrected:
             load_block(scratch.exact, scratch.param_count, orbits, scratch.others)
         for node in range(begin, last + 1):
-            rates = fill_rates(fns, kind, n, node, rows, p, scratch)
+            rates = fill_rates(fns, kind, n, node, rows, orbits.params, count, scratch)
             if begin == 0 and node in (0, last):
                 keep_factor_at_turn(rule, n, node, rows, work[3, :n])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
@@ -379,7 +386,9 @@ def times_by_trapezoid(fns, rule, orbits, rough, scratch, quantity, answers):  #
             n = orbits.size
         if begin > 0:
             rests, times = work[1, :n], work[2, :n]
-            relative_rests(orbits.params, scratch.layout[2] if kind != CIRCULATION else -1, rests)
+            # The inertia of the integrand in double-double arithmetic is not rounded.
+            rounded = kind != CIRCULATION and not exactly
+            relative_rests(orbits.params, scratch.layout[2] if rounded else -1, rests)
             set_times(rows, nodes, ranges, rests, times)
             continuing = answer_level(rows, times, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:

@@ -36,6 +36,17 @@ def test_roundings_of_the_inertia_do_not_add_up(beta: float, build: Callable[...
     assert abs(found.mean()) <= MAX_MEAN_ERROR
 
 
+@pytest.mark.extended
+def test_corrected_times_have_the_inertia_once(build: Callable[..., ModuleType]) -> None:
+    """An inertia that rounds to 1 lengthens times by half of what it loses, also where double-double arithmetic, which
+    does not round it, corrects them; there this was counted twice.
+    """
+    module = build("rolling_ripples", gqm.Curve.graph("x**2/2+sin(3*x)/10", parameter="x"), gqm.Rolling(radius="rho"))
+    beta, starts = 0.99 * 2.0**-53, np.linspace(0.3, 1.2, 2000)
+    values, without = (module.sweep("half_period", starts, beta=each, rho=0.05).values for each in (beta, 0.0))
+    assert abs(np.mean((values - without) / without) / beta - 0.5) <= 0.15
+
+
 @pytest.mark.parametrize("beta", [0.1, 0.4, 0.7])
 def test_sums_over_nodes_are_rounded_once(beta: float, build: Callable[..., ModuleType]) -> None:
     """On the parabola z = x**2/2 half periods are complete elliptic integrals of the second kind, and those of the

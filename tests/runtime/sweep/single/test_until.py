@@ -187,7 +187,7 @@ def test_whether_a_place_comes_before_a_loss_of_contact(module_of: ModuleOf) -> 
     assert held.values == pytest.approx(free.values, rel=ROUNDED)
     leaves = well.solve(-0.5, 6.0, contact="above")
     end = leaves.state(leaves.t_end).lam
-    places = np.array([-0.3, 0.5 * (end - 0.5), end - 1e-9, end + 1e-9, 0.9])
+    places = np.array([-0.45, 0.5 * (end - 0.5), end - 1e-9, end + 1e-9, 0.9])
     free, held = (well.sweep("time_at", -0.5, 6.0, lam=places, contact=c) for c in ("bilateral", "above"))
     assert (held.route == 1).all()
     assert np.isnan(held.values).tolist() == [False, False, False, True, True]
