@@ -22,13 +22,16 @@ from numba import types
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import GENERATED
-from gqm_sym.runtime.compiled.trial import Trial, go_on, paused
+from gqm_sym.runtime.compiled.trial import TooSlowError, Trial, go_on, limited, paused
 from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
 # The time in seconds that Python may spend on running a function of a generated module before the function is compiled.
 # Compiling takes some 0.2 s.
 MAX_PYTHON_TIME = 0.02
+
+# The time in seconds by which one call, for an array of many places, may take longer than that.
+MAX_EXCESS = 0.2
 
 
 @cache
@@ -136,10 +139,11 @@ class Emitted:
             if not self._trial.is_over():
                 started = time.perf_counter()
                 try:
-                    self._plain(*arguments)
+                    with limited(max(self._trial.left, 0.0) + MAX_EXCESS):
+                        self._plain(*arguments)
                     self._trial.left -= time.perf_counter() - started
                     return
-                except (ArithmeticError, ValueError):  # compiled code has no exceptions and goes on here
+                except (ArithmeticError, TooSlowError, ValueError):  # compiled code has no exceptions and goes on here
                     pass
             self.compile()
         self.call(*arguments)

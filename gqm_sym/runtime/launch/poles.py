@@ -21,16 +21,17 @@ def pole_ahead(problem: Problem, direction: int, place: float) -> float | None:
     """
     potential, step = Potential(problem.formulas, problem.p), starting_step(problem)
 
-    def attracts(distance: float) -> bool:
-        return direction * potential.slope(place + direction * distance) < 0.0
+    def attracts(lam: float) -> bool:
+        return direction * potential.slope(lam) < 0.0
 
-    near, far = 0.0, ULP * (fabs(place) + step)
-    while attracts(far) and far < POLE_REACH * step:
-        near, far = far, 2.0 * far
-    while near < 0.5 * (near + far) < far:
-        middle = 0.5 * (near + far)
+    distance = ULP * (fabs(place) + step)
+    near, far = place, place + direction * distance
+    while attracts(far) and distance < POLE_REACH * step:
+        distance = 2.0 * distance
+        near, far = far, place + direction * distance
+    while near != (middle := 0.5 * (near + far)) != far:
         near, far = (middle, far) if attracts(middle) else (near, middle)
-    pole = place + direction * far
+    pole = far
     before = pole - direction * POLE_BEGIN * step / POLE_RATIO ** np.arange(3)
     fallen = -np.diff(potential.rows(before)[0])
     return pole if fallen[1] >= POLE_GAIN * fallen[0] > 0.0 else None

@@ -11,6 +11,7 @@ from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.parts.derivatives import Derivatives
 from gqm_sym.runtime.motion.parts.history import History
+from gqm_sym.runtime.motion.parts.searched import swings_below
 from gqm_sym.runtime.motion.riding.cars import Cars, CarsOfRiders, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import load_extreme
@@ -120,7 +121,8 @@ class Motion(History, Derivatives):
             If the motion goes on for ever in another way, or approaches the value without reaching it; give it a
             horizon, ``t_max``; or if it is so small that its square is beyond the range of doubles.
         """
-        found = extreme(self, SPEED, 1)
+        is_slow = self.kind == "libration" and swings_below(self, LEAST_SPEED)
+        found = Extreme(0.0, 0.0, 0.0) if is_slow else extreme(self, SPEED, 1)
         if found.value < LEAST_SPEED and self.kind != "rest" and self._known_end() > 0.0:
             raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
         return found

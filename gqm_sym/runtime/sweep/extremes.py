@@ -1,6 +1,6 @@
 """The smallest and largest speed or contact force of one of many launches, by formulas or on the table of a curve."""
 
-from math import fabs, inf, nan, sqrt
+from math import fabs, inf, nan, pi, sin, sqrt
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
@@ -18,12 +18,16 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     point_buffer,
     sample_loads,
 )
+from gqm_sym.runtime.sweep.single.slow_places import exact_least_speed
 from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 from gqm_sym.runtime.sweep.tables.stretches import stretch_after_turn, stretch_before_turn, stretch_of
 
 # The share up to which an extreme is taken for the value at the end of a motion.
 STOP_SHARE = 1e-3
+
+# The difference of V**2 from that at launch, as a share of the largest V**2/2, below which it is the same to rounding.
+LAUNCH_ROUNDING = 2.0**-46
 
 EXTREMES = (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE)
 
@@ -53,7 +57,10 @@ def extreme_by_itself(curve, orbit, quantity, shares, max_grids):  # type: ignor
     if orbit.leaves == orbit.direction:  # the body does not come to the turning point behind it
         low, high = (0.0, high) if orbit.leaves > 0 else (low, 0.0)
     passed = Orbit(orbit.circulates, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, orbit.leaves)
-    return extreme(curve, passed, sought, sign, max_grids)
+    value, share = extreme(curve, passed, sought, sign, max_grids)
+    if quantity != MIN_SPEED:
+        return value
+    return exact_least_speed(curve, passed, value, share if passed.circulates else sin(0.5 * pi * share) ** 2)
 
 
 @Inner
@@ -129,10 +136,11 @@ def extreme_on_table(curve, orbit, passage, stop, edges, quantity):  # type: ign
     has as many digits as the largest V**2.
     """
     half_v2_at_edges, keeps_digits = edges
-    value, peak = extreme_on(curve, orbit, passage, stop, half_v2_at_edges, quantity), 0.0
-    if not keeps_digits and quantity in (MIN_SPEED, MAX_SPEED) and value > 0.0:
-        for j in range(passage.panels):
-            peak = max(peak, half_v2_at_edges[j])
-        if not 0.5 * value * value >= MIN_CANCELLATION_RATIO * peak:
-            return nan
-    return value
+    value, peak = extreme_on(curve, orbit, passage, stop, half_v2_at_edges, quantity), 0.5 * orbit.v2
+    if quantity not in (MIN_SPEED, MAX_SPEED) or not value > 0.0 or (keeps_digits and quantity == MAX_SPEED):
+        return value
+    for j in range(passage.panels):
+        peak = max(peak, half_v2_at_edges[j])
+    if fabs(value * value - orbit.v2) <= LAUNCH_ROUNDING * peak:
+        return sqrt(orbit.v2)
+    return value if 0.5 * value * value >= MIN_CANCELLATION_RATIO * peak else nan

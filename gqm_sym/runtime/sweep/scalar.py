@@ -54,9 +54,10 @@ from gqm_sym.runtime.sweep.single.liftoff import LEAVES, UNKNOWN, loss_by_itself
 from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS, WHOLE
 from gqm_sym.runtime.sweep.single.slow_places import EXACT, RecordedFormulas
 from gqm_sym.runtime.sweep.single.until import (
-    ACCURATE_PART,
     ROUGH_PART,
+    UNDECIDED_PART,
     checked_arrival,
+    comes_before,
     ends_beside_turn,
     find_for,
     is_beside_turn,
@@ -64,7 +65,7 @@ from gqm_sym.runtime.sweep.single.until import (
     part_until,
     stops_beside_turn,
 )
-from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, follows_formulas
+from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, comes_to_rest, follows_formulas
 from gqm_sym.runtime.sweep.tables.last_places import stop_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP, Stop, loss_of_contact
@@ -164,10 +165,10 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
         value = extreme_on_table(curve, orbit, passage, NO_STOP, (buffers.half_v2_at_edges, False), quantity)
     if value == inf:
         return NEVER_THERE
-    if stop.place == stop.place:
-        until = time_of_stop(curve, orbit, passage, tabulated, stop, buffers)
-        if not value <= until:
-            return NEVER_THERE if value > until else UNDECIDED
+    if stop.place == stop.place and value != 0.0:
+        before, after = comes_before(orbit, target, stop)
+        if not before:
+            return NEVER_THERE if after else UNDECIDED
     out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
     is_beyond_doubles = quantity == MAX_SPEED and value < LEAST_SPEED
     return ANSWERED if isfinite(value) and not is_beyond_doubles else UNDECIDED
@@ -191,13 +192,13 @@ def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ig
     ``asked`` is the quantity and the last time.
     """
     (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
-    (_, direction, _, _), sign = sought_for(curve, orbit, quantity, WHOLE)
-    is_directed = direction != 0
+    is_directed = sought_for(curve, orbit, quantity, WHOLE)[0][1] != 0
+    if quantity == MIN_SPEED and comes_to_rest(curve, orbit, passage, tabulated, t_max, buffers):
+        return 0.0
     if passage.panels <= FEW_PANELS or follows_formulas(curve):  # beside hilltops they have more digits than the table
         what, part, shares = part_until(curve, orbit, t_max, is_directed, buffers.work)
-        # Where the part ends roughly at the last time, it has a largest value if that is not at its end.
-        is_known = what == ACCURATE_PART or (what == ROUGH_PART and sign > 0.0)
-        if is_known and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
+        # Where the part ends roughly at the last time, it has an extreme if that is not at its end.
+        if what != UNDECIDED_PART and not (quantity == MIN_SPEED and stops_beside_turn(orbit, part)):
             value = extreme_by_itself(curve, part, quantity, shares, MAX_GRIDS)
             is_rough = what == ROUGH_PART or (is_directed and ends_beside_turn(orbit, part, shares[1]))
             if is_rough and is_extreme_at_stop(curve, part, quantity, shares, value):

@@ -51,7 +51,7 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
 # Quantities that are found from a tape of the formulas if doubles do not suffice.
-FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME)
+FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME, quantities.MIN_SPEED)
 
 
 def sweep(

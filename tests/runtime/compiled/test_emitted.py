@@ -168,6 +168,18 @@ def test_a_function_is_compiled_when_python_has_taken_long(
     assert call() == [7.0] * 4
 
 
+def test_a_call_that_takes_long_is_given_up(
+    tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python gives a call for many places up, and the compiled function fills all of them."""
+    monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", 10.0)
+    monkeypatch.setattr(emitted, "MAX_EXCESS", -11.0)
+    function, call = _potential(tmp_path, "3.0")
+    monkeypatch.setattr(function, "_plain", lambda *_: trial.go_on())
+    assert call() == [7.0] * 4
+    assert compiler.compiled == ["effective_potential"]
+
+
 def test_a_function_is_compiled_in_the_third_launch_that_uses_it(tmp_path: Path, compiler: _Compiler) -> None:
     """A function is compiled in the third launch that uses it, however short the launches are."""
     _, call = _potential(tmp_path, "3.0")

@@ -8,6 +8,7 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 # The number of samples on each panel of a segment.
@@ -78,6 +79,16 @@ def trajectory_with_extreme(motion: Any, quantity: Any, sign: int) -> tuple[Traj
             if is_within and not _is_exceeded(quantity, sign, segments, ends[0] + 1):
                 return trajectory, segments[-1].t_stop[0]
     return whole_trajectory(motion)
+
+
+def swings_below(motion: Any, speed: float) -> bool:
+    """Return whether a body between two turning points is certainly slower than a speed whose square is next to the
+    smallest doubles: V**2 is at most twice the width of the well times the steepest slope of the potential, which in so
+    small a well is that at a turning point.
+    """
+    problem, (low, high) = motion.problem, motion.turning_points
+    slopes = potential_at(problem.functions.addresses, problem.functions.p, np.array([low, high]))[1]
+    return bool(sqrt(2.0 * abs(high - low)) * sqrt(float(np.abs(slopes).max())) < speed)
 
 
 def _stop(timed: TimedSegment) -> Array:

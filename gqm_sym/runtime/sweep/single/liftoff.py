@@ -133,7 +133,7 @@ def loss_on_way(curve, orbit, end, side):  # type: ignore[no-untyped-def]
         if is_resolved(sums, grids * GRID_INTERVALS, True):
             least, most = side * sums[LEAST], side * sums[LARGEST]
             if min(least, most) > 0.0:
-                top = highest_top(curve, way, force, -side, grids, sums, peaks)
+                top, _ = highest_top(curve, way, force, -side, grids, sums, peaks)
                 if top < 0.0:
                     return Loss(KEEPS, nan, False)
             else:

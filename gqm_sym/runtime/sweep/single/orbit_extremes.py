@@ -257,26 +257,27 @@ def find_peaks(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore[
 
 @Inner
 def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-untyped-def]
-    """Return the value at a peak of a grid with steps of ``step``; NaN if the parabolas do not converge to it, or if
-    there may be more than one peak within a step.
+    """Return the value at a peak of a grid with steps of ``step``, and the share of the grid at which it is; NaN if the
+    parabolas do not converge to it, or if there may be more than one peak within a step.
     """
     points, found, frame = point_buffer(), point_buffer(), frame_buffer()
     f0, f1, f2 = peak[2], peak[3], peak[4]
     share, value, expected, is_flat, grid_step = peak[1] * step, f1, 0.0, False, step
+    at = share
     for k in range(MAX_REFINEMENTS):
         tilt, bend, scale = sign * (f0 - f2), sign * (f0 - 2.0 * f1 + f2), resolution(sought[0], f1, size)
         if k == 1 and not fabs(bend - expected) <= MAX_BEND_CHANGE * fabs(expected) + BEND_ROUNDING * scale:
             is_flat = bend > expected and peak[1] * (peak[1] * grid_step - 1.0) == 0.0
             if not is_flat:
-                return np.nan
+                return np.nan, share
         if is_flat and not bend <= BEND_ROUNDING * scale:
-            return np.nan
+            return np.nan, share
         ratio = FIRST_STEP_RATIO if k == 0 else STEP_RATIO
         expected = bend / ratio**2
         move = 0.5 * tilt / bend if bend < 0.0 else 0.0
         gain = -0.25 * tilt * move if bend < 0.0 else 0.5 * (fabs(tilt) + bend)
         if k > 0 and step <= MAX_LAST_STEP and gain <= MAX_GAIN * scale:
-            return value
+            return value, at
         share += step * min(max(move, -1.0), 1.0)
         step *= 1.0 / ratio if fabs(move) < 1.0 else GROWTH
         points[0], points[1], points[2] = share, share - step, share + step
@@ -285,28 +286,33 @@ def top_of(curve, orbit, sought, sign, peak, step, size):  # type: ignore[no-unt
                 points[i] = sin(0.5 * pi * points[i]) ** 2
         sample_loads(curve, orbit, sought, points, 3, found, frame, False)
         f1, f0, f2 = found[0], found[1], found[2]
-        value = max(value, f1) if sign > 0.0 else min(value, f1)
-    return np.nan
+        if sign * f1 > sign * value:
+            value, at = f1, share
+    return np.nan, share
 
 
 @Inner
 def highest_top(curve, orbit, sought, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
-    """Return ``sign`` times the value at the highest peak of a grid; NaN if the grid is too coarse for one of them."""
+    """Return ``sign`` times the value at the highest peak of a grid, and the share of the grid at which it is; NaN if
+    the grid is too coarse for one of them.
+    """
     least, largest = sums[LEAST], sums[LARGEST]
     size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
+    at = 0.0
     for k in range(PEAKS):
         if peaks[k * PEAK_ROW] >= peaks[0] - PEAK_MARGIN * (largest - least):
-            value = top_of(curve, orbit, sought, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
+            value, share = top_of(curve, orbit, sought, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
             if value != value:
-                return value
-            best = max(best, sign * value)
-    return best
+                return value, share
+            if sign * value > best:
+                best, at = sign * value, share
+    return best, at
 
 
 @Inner
 def extreme(curve, orbit, sought, sign, max_grids):  # type: ignore[no-untyped-def]
-    """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit; `is_loop` explains
-    ``sought``.
+    """Return the largest (``sign`` 1) or smallest (-1) V or contact force on an orbit, and the share of `find_peaks`'s
+    grid at which it is; `is_loop` explains ``sought``.
 
     Parabolas through three points are repeated with smaller and smaller steps. At an extreme the function is flat, so
     its value is accurate to all digits as soon as the place has half of them. The parabolas are fitted to V**2, because
@@ -316,19 +322,19 @@ def extreme(curve, orbit, sought, sign, max_grids):  # type: ignore[no-untyped-d
     force = sought[0] != V2
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
     if meets_turn and not (force or sign > 0.0):
-        return 0.0
+        return 0.0, 0.0
     sums, peaks = sum_buffer(), peak_buffer()
     if orbit.even and not (orbit.circulates or force):
         points, frame = point_buffer(), frame_buffer()
         points[0] = 0.5
         sample_loads(curve, orbit, sought, points, 1, sums, frame, False)
-        return sqrt(sums[0])
+        return sqrt(sums[0]), 0.5
     grids = 1
     while grids <= max_grids:
         find_peaks(curve, orbit, sought, sign, grids, sums, peaks)
         if is_resolved(sums, grids * GRID_INTERVALS, force):
-            best = highest_top(curve, orbit, sought, sign, grids, sums, peaks)
+            best, share = highest_top(curve, orbit, sought, sign, grids, sums, peaks)
             if best == best:
-                return sign * best if sought[0] == FORCE else sqrt(sign * best)
+                return sign * best if sought[0] == FORCE else sqrt(sign * best), share
         grids *= REFINEMENT
-    return np.nan
+    return np.nan, 0.0

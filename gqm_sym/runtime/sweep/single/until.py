@@ -21,7 +21,7 @@ from gqm_sym.runtime.quadrature.time_panels import (
 )
 from gqm_sym.runtime.sweep.extremes import EXTREMES
 from gqm_sym.runtime.sweep.finding import EVERYWHERE, find_orbit
-from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit import CURVE_ENDS, Orbit
 from gqm_sym.runtime.sweep.quantities import ANSWERED, ARRIVAL_TIME, END_TIME, NEVER_THERE, UNDECIDED
 from gqm_sym.runtime.sweep.single.arrivals import arrival, phase_of, refined_end, with_refined_ends
 from gqm_sym.runtime.sweep.single.orbit_extremes import WHOLE
@@ -47,6 +47,9 @@ UNDECIDED_PART, ROUGH_PART, ACCURATE_PART = range(3)
 # The share of a time by which another one must differ to be later beyond doubt.
 ROUNDED_TIME = 1e-12
 
+# The distance of places, as a share of a place, below which it is not known which of them a body comes to first.
+ROUNDED_PLACE = 1e-12
+
 
 @Inlined
 def is_endless(columns, k):  # type: ignore[no-untyped-def]
@@ -66,7 +69,7 @@ def find_for(curve, columns, k, monotone, spans, known, asked, buffers):  # type
     lam0, within, unknown, distance = element(columns, LAM0, k), EVERYWHERE, 0, TO_TURNS
     unit = max(1.0, UNIT_SHARE * fabs(lam0))
     by_time = t_max < inf and (quantity == END_TIME or quantity in EXTREMES) and is_endless(columns, k)
-    if quantity == ARRIVAL_TIME:
+    if quantity == ARRIVAL_TIME and curve.ends == CURVE_ENDS:
         within = (target, inf) if target < lam0 else (-inf, target)
     for doublings in range(-1, MAX_DOUBLINGS):
         if by_time:
@@ -102,6 +105,19 @@ def checked_arrival(status, quantity, t_max, out):  # type: ignore[no-untyped-de
         return status
     status, out[0] = NEVER_THERE if is_later(out[0], t_max) else UNDECIDED, nan
     return status
+
+
+@Inner
+def comes_before(orbit, place, stop):  # type: ignore[no-untyped-def]
+    """Return whether a body comes to a place before it comes to a `Stop`, and whether it would only come there after
+    that; neither if they are the same place to rounding.
+    """
+    v = orbit.direction if orbit.direction * (place - orbit.lam0) > 0.0 else -orbit.direction
+    turns, left = 0 if v == orbit.direction else 1, v * (stop.place - place)
+    if turns != stop.turns:
+        return turns < stop.turns, turns > stop.turns
+    rounded = ROUNDED_PLACE * max(fabs(stop.place), fabs(orbit.lam0))
+    return left > rounded, left < -rounded
 
 
 @Inner

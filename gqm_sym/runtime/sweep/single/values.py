@@ -1,6 +1,6 @@
 """One quantity of one of many orbits, by the first method that is accurate."""
 
-from math import nan
+from math import fabs, nan, sqrt
 
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.quadrature.time_panels import joints_between
@@ -16,6 +16,10 @@ from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_tim
 
 # The largest number of panels of a passage on which formulas are more accurate than a table that is not exact.
 FEW_PANELS = 2
+
+# The share of a time by which a body must have passed a turning point beyond doubt, and, in units of the root of a last
+# place of that point as a share of the way there, what its rounding adds.
+REST_MARGIN, REST_ROUNDINGS, LAST_PLACE = 2.0**-20, 4.0, 2.0**-52
 
 
 @Inner
@@ -101,3 +105,18 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
     if value != value:
         value = value_in_parts(curve, orbit, quantity, target, buffers)
     return value
+
+
+@Inner
+def comes_to_rest(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignore[no-untyped-def]
+    """Return whether a body is at rest at its launch, or certainly at the turning point ahead before the last time."""
+    if orbit.v2 == 0.0:
+        return True
+    if orbit.circulates or orbit.leaves == orbit.direction:
+        return False
+    way = orbit.high if orbit.direction > 0 else orbit.low
+    turn = orbit.lam0 + way
+    time = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, turn, buffers)
+    # A place that is rounded by this much is passed so much earlier or later.
+    rounded = REST_MARGIN + REST_ROUNDINGS * sqrt(LAST_PLACE * fabs(turn / way))
+    return time <= t_max * (1.0 - rounded)

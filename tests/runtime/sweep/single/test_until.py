@@ -148,3 +148,47 @@ def test_a_force_that_depends_on_the_direction_up_to_a_time(generated_folder: ob
                 assert sign * value == pytest.approx(max(found), rel=1e-3)
                 assert sign * value >= max(found) - 1e-12 * abs(value)
                 assert value == pytest.approx(getattr(motion, name).value, rel=1e-12)
+
+
+@pytest.mark.parametrize("excess", [1e-1, 1e-5, 1e-11])
+def test_the_least_speed_of_a_lap(module_of: ModuleOf, excess: float) -> None:
+    """A pendulum that only just goes over its top is slowest there, where V**2 is a small difference of large terms:
+    by the energy V**2 is V0**2 - 4 g L.
+    """
+    circle = module_of("circle")
+    start, v0 = 0.5, np.sqrt(2 * 9.81 * (1 + np.cos(0.5)) * (1 + excess))
+    with mp.workdps(40):
+        least = mp.sqrt(mp.mpf(v0) ** 2 - 2 * mp.mpf(9.81) * (1 + mp.cos(start)))
+    swept = circle.sweep("v_min", [start], v0, L=1, g=9.81)
+    assert swept.route[0] == 1
+    assert swept.values[0] == pytest.approx(float(least), rel=4e-16)
+
+
+def test_a_turn_before_the_last_time_is_rest(module_of: ModuleOf) -> None:
+    """A body that turns before the last time, or is released, has been at rest, however slowly it has passed a hilltop;
+    one that is still on its way has not.
+    """
+    well = module_of("double_well")
+    slow = well.sweep("v_min", [-1.2, 0.054, -1.0005], [0.0, 0.304, 0.0], -1, t_max=20.0)
+    assert slow.values.tolist() == [0.0, 0.0, 0.0]
+    assert (slow.route == 1).all()
+    moving = well.sweep("v_min", 0.054, 0.304, 1, t_max=0.1)
+    assert moving.values == pytest.approx(0.304, rel=0.0)
+
+
+def test_whether_a_place_comes_before_a_loss_of_contact(module_of: ModuleOf) -> None:
+    """A body that is released beside the top between two wells stays on the track, and comes to places when it does so
+    on a track that can pull; one that is launched over the top comes to none beyond the place where it leaves.
+    """
+    well = module_of("double_well")
+    places = np.array([0.1, 0.3, 0.6, 0.9])
+    free, held = (well.sweep("time_at", 0.0514, lam=places, contact=c) for c in ("bilateral", "above"))
+    assert (held.route == 1).all()
+    assert held.values == pytest.approx(free.values, rel=ROUNDED)
+    leaves = well.solve(-0.5, 6.0, contact="above")
+    end = leaves.state(leaves.t_end).lam
+    places = np.array([-0.45, 0.5 * (end - 0.5), end - 1e-9, end + 1e-9, 0.9])
+    free, held = (well.sweep("time_at", -0.5, 6.0, lam=places, contact=c) for c in ("bilateral", "above"))
+    assert (held.route == 1).all()
+    assert np.isnan(held.values).tolist() == [False, False, False, True, True]
+    assert held.values[:3] == pytest.approx(free.values[:3], rel=ROUNDED)
