@@ -1,7 +1,7 @@
 """Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from collections.abc import Iterable
-from math import isfinite, isnan, nan
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,9 @@ from gqm_sym.runtime.gradients.passages.launch_limit import limit_at_launch
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
-from gqm_sym.runtime.launch.ends import is_cusp
 from gqm_sym.runtime.launch.kinds import EXTREMES, QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.parts.positions import Positions
-from gqm_sym.runtime.motion.sampler import plain_time
 
 # The longest time in s after a launch from a cusp from which the derivatives of the contact force there follow.
 LONGEST_START = 16.0
@@ -103,13 +101,11 @@ class Derivatives(Positions):
         SolutionError
             If there are such parameters.
         """
-        problem, charted = self.problem, self.problem.formulas.chart is not None
-        if not charted and problem.w0 != 0.0:
-            return
-        if isinstance(values, np.ndarray) and not isnan(values.sum()):  # one sum is much faster than row by row
+        charted = self.problem.formulas.chart is not None
+        if not charted and self.problem.w0 != 0.0:
             return
         unknown = [name for name, value in zip(names, values, strict=True) if np.isnan(value).any()]
-        if unknown and (charted or is_cusp(problem, problem.lam0)):
+        if unknown and (charted or self._is_at_rest_in_cusp):
             if charted:
                 why = "the curve does not exist for neighbouring values (an exponent of a negative number must be an "
                 why += "integer)"
@@ -193,8 +189,10 @@ class Derivatives(Positions):
         """
         check_force(self.problem.formulas, "sensitivity")
         found = self._sensitivity(t, wrt)
-        self._check_known("sensitivity", found.wrt, found.lam)
-        if self.problem.w0 != 0.0 or plain_time(t):  # reading times once more takes longer than all else
+        in_cusp = self._is_at_rest_in_cusp
+        if in_cusp or self.problem.formulas.chart is not None:
+            self._check_known("sensitivity", found.wrt, found.lam)
+        if not in_cusp:  # reading times once more takes longer than all else
             return found
         at_launch = np.asarray(self._times(t)[0] == 0.0).reshape(found.lam.shape[1:])
         return self._limit_of_sensitivity(found, at_launch, wrt) if at_launch.any() else found

@@ -204,10 +204,15 @@ class Positions(ChecksArguments, ABC):
         return times >= (last if self.legs[-1].end == "rest" else inf)
 
     @computed_once
+    def _is_at_rest_in_cusp(self) -> bool:
+        """Whether the body is launched at rest in a cusp."""
+        problem = self.problem
+        return problem.w0 == 0.0 and is_cusp(problem, problem.lam0)
+
+    @computed_once
     def _is_released_at_cusp(self) -> bool:
         """Whether the body is released at rest from a cusp and moves."""
-        problem = self.problem
-        return problem.w0 == 0.0 and self.kind != "rest" and is_cusp(problem, problem.lam0)
+        return self.kind != "rest" and self._is_at_rest_in_cusp
 
     @computed_once
     def _force_beside_cusp(self) -> float:
