@@ -176,7 +176,6 @@ TESTED_THROUGH = {
     "legs/gaps/data.py": "claims/test_space_curves.py",
     "legs/gaps/places.py": "runtime/legs/gaps/test_flows.py",
     "legs/gaps/turn_flows.py": "runtime/legs/gaps/test_flows.py",
-    "legs/gaps/rooms.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/inherited.py": "runtime/legs/test_leg_errors.py",
     "legs/kinks/places.py": "runtime/legs/kinks/test_parts.py",
     "legs/layout.py": "claims/test_dissipative.py",

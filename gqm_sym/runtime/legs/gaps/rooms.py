@@ -3,14 +3,34 @@
 import threading
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
+from gqm_sym.runtime.compiled.threads import cores
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.legs.advance import NO_NUMBERS
 from gqm_sym.runtime.legs.gaps.data import room_kept
 
-# The rooms by forces, parameters and chart. The chart is stored with them, so that no other chart can have the same
-# identity. A thread that uses an entry removes it for that time.
-_KEPT: dict[Hashable, tuple[Array, Array]] = {}
+
+class Kept(NamedTuple):
+    """A room that no call uses.
+
+    Attributes
+    ----------
+    key : hashable
+        The forces, the run-time parameters and the identity of the chart.
+    room : array
+    chart : array
+        The chart. It is stored so that no other chart can have the same identity.
+    """
+
+    key: Hashable
+    room: Array
+    chart: Array
+
+
+# The rooms, of which the last was used last. There may be several with the same key, because threads that follow bodies
+# at the same time need one each; a thread removes its room for that time.
+_KEPT: list[Kept] = []
 MAX_KEPT = 8
 _LOCK = threading.Lock()
 
@@ -30,14 +50,20 @@ def room_for(chart: Array, breaks: int, key: Hashable | None, *, with_blocks: bo
     if not breaks:
         yield NO_NUMBERS
         return
-    found = None
-    if key is not None:
-        with _LOCK:
-            found = _KEPT.pop(key, None)
-    room = room_kept(breaks, with_blocks=with_blocks) if found is None else found[0]
+    room = None if key is None else _taken(key)
+    if room is None:
+        room = room_kept(breaks, with_blocks=with_blocks)
     yield room
     if key is not None:
         with _LOCK:
-            _KEPT[key] = room, chart
-            while len(_KEPT) > MAX_KEPT:
-                del _KEPT[next(iter(_KEPT))]
+            _KEPT.append(Kept(key, room, chart))
+            del _KEPT[: -max(MAX_KEPT, cores())]
+
+
+def _taken(key: Hashable) -> Array | None:
+    """Remove the room with the key that was used last, and return it; None if there is none."""
+    with _LOCK:
+        for k in range(len(_KEPT) - 1, -1, -1):
+            if _KEPT[k].key == key:
+                return _KEPT.pop(k).room
+    return None

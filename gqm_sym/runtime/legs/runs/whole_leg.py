@@ -233,7 +233,8 @@ def is_whole(forces, march, panel, blocks, variable, reading, kinks, work):  # t
             return False, HAS_KINKS, 1.0
         if curve_fine and not is_kept:
             return False, 0, 1.0
-    fill_v2(blocks, h, BETWEEN_TURNS, work)
+    if forces.linear:  # otherwise V**2 was filled with the last width
+        fill_v2(blocks, h, BETWEEN_TURNS, work)
     reads_force = reading.what >= PANELS or (reading.what == PEAKS and reading.force)
     if reads_force and not forces.linear and size_of_row(blocks, work, KAPPA) == 0.0:
         # The contact force may be that for V**2 before its last change.
