@@ -9,6 +9,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
@@ -321,46 +322,6 @@ def _share_at_joint(timed: TimedSegment) -> float:
         return 0.0
     start = float(timed.segment.places(np.array([timed.phi_start]))[0])
     return min(max(BEFORE_JOINT, 2.0 * loss.near / abs(loss.last - start)), 0.5) if loss.last != start else 0.5
-
-
-def _peaks(values: Array, size: float) -> list[int]:
-    """Return the indices of samples that no neighbour exceeds, the largest first; of samples side by side that are
-    equal within rounding, at most the first and the largest.
-    """
-    padded = np.concatenate([[-np.inf], values, [-np.inf]])
-    peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:])).tolist()
-    with np.errstate(invalid="ignore"):  # infinite values
-        level = np.cumsum(np.abs(np.diff(values, prepend=values[:1])) > EQUAL_ROUNDINGS * ULP * size).tolist()
-    by_value = sorted(peaks, key=lambda k: -float(values[k]))
-    largest = {level[k]: k for k in reversed(by_value)}
-    first = {level[k]: k for k in reversed(peaks)}
-    kept = {*largest.values(), *first.values()}
-    return [k for k in by_value if k in kept]
-
-
-def _falls_into_pole(problem: "Problem", timed: TimedSegment) -> bool:
-    """Return whether the potential has a pole where the last segment of a motion ends."""
-    first, last = timed.segment.places(np.array([timed.phi_start, timed.phi_stop])).tolist()
-    return pole_ahead(problem, 1 if last > first else -1, last) is not None
-
-
-def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:
-    """Return the phase angles at which a timed segment begins, and at which it or the time ``end`` stops."""
-    if timed.t_stop[0] <= end:
-        return timed.phi_start, timed.phi_stop
-    return timed.phi_start, float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
-
-
-def _share_at_joint(timed: TimedSegment) -> float:
-    """Return the share of a timed segment next to its end in which loads are not searched: 0, unless the curve is not
-    smooth at the end, to rounding.
-    """
-    f, segment = timed.segment.functions, timed.segment
-    start, place = segment.places(np.array([timed.phi_start, timed.phi_stop])).tolist()
-    near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
-    if not (f.joints.size and f.between(f.joints, place - near, place + near).size):
-        return 0.0
-    return min(max(BEFORE_JOINT, 2.0 * near / abs(place - start)), 0.5) if place != start else 0.5
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:

@@ -286,8 +286,8 @@ def test_a_body_that_leaves_at_once_at_a_joint(stadium: ModuleType, before: floa
 
 
 def test_the_load_at_a_loss_of_contact_is_that_of_arrival(stadium: ModuleType) -> None:
-    """The state at the end is that on the bend, whatever the rounding of the time and of the joint's place, for one time
-    and for many. It was that on the line in 44 of 80 launches.
+    """The state at the end is that on the bend, whatever the rounding of the time and of the joint's place, for one and
+    for many times. It was that on the line in 44 of 80 launches.
     """
     for before in np.linspace(1e-3, 1.2, 9).tolist():
         motion = stadium.solve(3 + pi - before, 6.5, contact="above")
