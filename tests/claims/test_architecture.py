@@ -206,6 +206,7 @@ TESTED_THROUGH = {
     "model.py": "claims/test_reference.py",
     "motion/at_rest.py": "runtime/motion/parts/test_tabulated.py",
     "motion/motion.py": "claims/test_reference.py",
+    "motion/parts/before_joint.py": "runtime/motion/test_extremes.py",
     "motion/parts/derivatives.py": "runtime/gradients/test_quantities.py",
     "motion/parts/history.py": "runtime/motion/test_events.py",
     "motion/parts/positions.py": "claims/test_reference.py",

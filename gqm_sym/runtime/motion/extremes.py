@@ -13,6 +13,7 @@ from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.poles import pole_ahead
 from gqm_sym.runtime.motion.events import contact_force_at, contact_force_on
+from gqm_sym.runtime.motion.parts.before_joint import loss_at_joint
 from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
 from gqm_sym.runtime.motion.parts.searched import EQUAL_ROUNDINGS, samples, size_of, trajectory_with_extreme
 from gqm_sym.runtime.motion.segments.segment import Segment
@@ -316,12 +317,11 @@ def _share_at_joint(timed: TimedSegment) -> float:
     """Return the share of a timed segment next to its end in which loads are not searched: 0, unless the curve is not
     smooth at the end, to rounding.
     """
-    f, segment = timed.segment.functions, timed.segment
-    start, place = segment.places(np.array([timed.phi_start, timed.phi_stop])).tolist()
-    near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
-    if not (f.joints.size and f.between(f.joints, place - near, place + near).size):
+    loss = loss_at_joint(timed)
+    if loss is None:
         return 0.0
-    return min(max(BEFORE_JOINT, 2.0 * near / abs(place - start)), 0.5) if place != start else 0.5
+    start = float(timed.segment.places(np.array([timed.phi_start]))[0])
+    return min(max(BEFORE_JOINT, 2.0 * loss.near / abs(loss.last - start)), 0.5) if loss.last != start else 0.5
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:

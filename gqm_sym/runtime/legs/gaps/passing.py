@@ -64,6 +64,7 @@ from gqm_sym.runtime.legs.leg_record import (
     RIGHT,
     TIME,
     TIME_ERROR,
+    TIMES,
     Y_ROW,
     has_space,
 )
@@ -239,6 +240,8 @@ def pass_block(forces, route, reading, v2, v, contact_sign, upcoming, work):  # 
 @Inner
 def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
     """Return whether a gap contains the place or the time up to which a leg is read, which requires a panel."""
+    if route.reading.what == TIMES:
+        return False
     if route.reading.what == PASSAGE:
         return min(places) <= route.target <= max(places)
     near = ROUNDINGS_OF_TIMES * times[1]

@@ -20,6 +20,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space, path_in_space_once
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import computed_once, locked
+from gqm_sym.runtime.motion.parts.before_joint import before_joint
 from gqm_sym.runtime.motion.parts.beside_cusp import force_beside_cusp
 from gqm_sym.runtime.motion.riding.loads import loads_on_rider
 from gqm_sym.runtime.motion.sampler import STATE_ROWS
@@ -174,6 +175,8 @@ class Positions(ChecksArguments, ABC):
         f, trajectory = self.problem.functions, points.trajectory
         reduced, s, v = self._places(points), points.arc_lengths(), self._velocities(points)
         v2 = v**2
+        if trajectory.segments:
+            reduced = before_joint(trajectory.segments[-1], reduced)
         x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, reduced, v2)
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap

@@ -12,6 +12,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion.leg_tables import place_on_leg, places_along_legs, state_on_leg, states_along_legs
 from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.parts.before_joint import loss_at_joint
 from gqm_sym.runtime.motion.parts.positions import Positions
 from gqm_sym.runtime.motion.sampler import (
     MIN_PLACES_PER_THREAD,
@@ -201,6 +202,8 @@ class Tabulated(Positions):
         """Return the record of tabulated pieces, which are those of timed segments that follow each other."""
         record = leg_record(self.problem, self.direction * self.problem.launch.v0.value, pieces)
         until, has_speeds = min(self._known_end(), timed[-1].t_stop[0]), all(piece.is_resolved for piece in pieces)
+        loss = loss_at_joint(timed[-1])
+        until = until if loss is None else min(until, loss.since)
         return Reading(record, until, timed[0].t_start[0], pieces, has_speeds)
 
     @locked
