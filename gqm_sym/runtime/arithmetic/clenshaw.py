@@ -88,3 +88,19 @@ def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     for k in range(c.size - 1, 0, -1):
         high, low = (c[k] - DECAY[k] * low) + (GROWTH[k] * x) * high, high
     return c[0] + x * high - 0.5 * low
+
+
+@Inner
+def legendre_growth(c, x_from_start):  # type: ignore[no-untyped-def]
+    """Return by how much the Legendre series with coefficients c grows from -1 to a place, given by its distance from
+    there.
+
+    Its relative error stays small for small distances, because each polynomial is divided by the distance:
+    P_k(x) - P_k(-1) = (1 + x) Q_k(x), and (k+1) Q_(k+1) = (2k+1) (x Q_k + (-1)^k) - k Q_(k-1).
+    """
+    before, here, sign, total = 0.0, 1.0, -1.0, 0.0
+    x = x_from_start - 1.0
+    for k in range(1, c.size):
+        total = fma(c[k], here, total)
+        before, here, sign = here, GROWTH[k] * fma(x, here, sign) - DECAY[k - 1] * before, -sign
+    return x_from_start * total

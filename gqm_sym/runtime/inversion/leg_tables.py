@@ -20,7 +20,7 @@ PANELS              a row for each panel: edge, half width, arc length there, an
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_growth, legendre_sum
 from gqm_sym.runtime.arithmetic.elementary import cos, exp, sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, item_at
@@ -105,13 +105,13 @@ def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
 
 @Inlined
 def speed_at(states, panels, kind, of, phi):  # type: ignore[no-untyped-def]
-    """Return the index of the panel of a phase angle, the place on it from -1 to 1, and the speed there.
+    """Return the index of the panel of a phase angle, the place on it from 0 to 2, and the speed there.
 
     ``kind`` is that of the segment, and ``of`` the index at which the state of its interval begins.
     """
     panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
-    x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
-    speed = legendre_sum(panels[panel + SERIES + WIDE : panel + SERIES + 2 * WIDE], x)
+    x = (phi - panels[panel + EDGE]) / panels[panel + HALF]
+    speed = legendre_sum(panels[panel + SERIES + WIDE : panel + SERIES + 2 * WIDE], x - 1.0)
     growth = fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
     if kind == TO_EQUILIBRIUM:
         growth = exp(-phi)
@@ -157,7 +157,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
             phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
             panel, x, speed = speed_at(states, panels, item_at(intervals, at + KIND), of, phi)
-            arc = panels[panel + ARC] + legendre_sum(panels[panel + SERIES : panel + SERIES + WIDE], x)
+            arc = panels[panel + ARC] + legendre_growth(panels[panel + SERIES : panel + SERIES + WIDE], x)
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
             lam = choose(launched, place, place + item_at(intervals, at + LAPS))

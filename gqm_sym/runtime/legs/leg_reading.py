@@ -5,7 +5,7 @@ from math import asin, cos, fabs, inf, pi, sin, sqrt
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_growth, legendre_sum
 from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -70,11 +70,9 @@ to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 # Buffers for two series of a panel, and for rows of a leg.
 terms_buffer, rows_buffer = on_stack(2 * WIDE), on_stack(3 * MAX_BLOCKS * WIDE)
 
-# The largest number of steps of a search within a panel, and the share of the panel at which the search stops.
-MAX_STEPS, LAST_STEP = 60, 4e-16
-
-# A phase angle is found to the square of this.
-LAST_PHASE = 1e-9
+# The largest number of steps of a search within a panel. A place on it is found to the square of the second number, as
+# a share of the distance from its beginning, and a phase angle to the square of the third.
+MAX_STEPS, LAST_STEP, LAST_PHASE = 60, 1e-9, 1e-9
 
 
 @Inner
@@ -96,7 +94,7 @@ def time_to(record, begin, count, w):  # type: ignore[no-untyped-def]
     if w >= right:
         return time + record[begin + k * COLUMNS + TIME]
     to_integral(record, begin + k * COLUMNS, terms, 0)
-    return time + 0.5 * (right - left) * legendre_sum(terms[:WIDE], 2.0 * (w - left) / (right - left) - 1.0)
+    return time + 0.5 * (right - left) * legendre_growth(terms[:WIDE], 2.0 * (w - left) / (right - left))
 
 
 @Inner
@@ -114,18 +112,18 @@ def marched_in(record, begin, count, time):  # type: ignore[no-untyped-def]
         return np.nan
     to_integral(record, at, terms, 0)
     to_plain(record, at, terms, WIDE)
-    lo, hi, share = -1.0, 1.0, time / record[at + TIME]
-    x = min(max(2.0 * share - 1.0, -1.0), 1.0)
+    # The distance from the beginning of the panel, as a share of half its width.
+    lo, hi, x = 0.0, 2.0, min(max(2.0 * time / record[at + TIME], 0.0), 2.0)
     for _ in range(MAX_STEPS):
-        late = half * legendre_sum(terms[:WIDE], x) - time
+        late = half * legendre_growth(terms[:WIDE], x) - time
         lo, hi = (lo, x) if late > 0.0 else (x, hi)
-        new = x - late / (half * legendre_sum(terms[WIDE:], x))
+        new = x - late / (half * legendre_sum(terms[WIDE:], x - 1.0))
         if not lo <= new <= hi:
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= LAST_STEP:
+        step, x = fabs(new - x), new
+        if step <= LAST_STEP * x:
             break
-        x = new
-    return edge(record, begin, k) + half * (1.0 + x)
+    return edge(record, begin, k) + half * x
 
 
 @Inner

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_growth, legendre_sum
 from gqm_sym.runtime.compiled.buffers import longer, with_rows
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
@@ -292,8 +292,7 @@ def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     """
     k = panel_of(edges, phi)
     half = 0.5 * (edges[k + 1] - edges[k])
-    x = ((phi - edges[k]) - half) / half
-    return marks[k] + legendre_sum(terms[k], x)
+    return marks[k] + legendre_growth(terms[k], (phi - edges[k]) / half)
 
 
 @Inner

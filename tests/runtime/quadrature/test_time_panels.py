@@ -10,7 +10,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_growth, legendre_sum
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.quadrature.integrands import speeds_at
@@ -154,6 +154,17 @@ def test_a_legendre_series_is_summed_as_its_terms_say() -> None:
             truth = mp.fsum(mpf(float(c)) * mp.legendre(k, mpf(x)) for k, c in enumerate(terms))
         # Rounding is amplified by at most the number of terms.
         assert share(legendre_sum(terms, x), truth, np.abs(terms).sum()) <= DEGREE * ULP
+
+
+@pytest.mark.parametrize("ratio", [1.5, 4.0])
+def test_a_legendre_series_near_its_beginning(ratio: float) -> None:
+    """The growth of a series from -1 keeps its digits however near the place is."""
+    terms = (-ratio) ** -np.arange(24.0)
+    for way in (1e-12, 1e-7, 1e-3, 0.5, 1.25, 2.0):
+        with mp.workdps(40):
+            parts = [mpf(float(c)) * (mp.legendre(k, mpf(way) - 1) - (-1) ** k) for k, c in enumerate(terms)]
+            truth, size = mp.fsum(parts), mp.fsum(abs(part) for part in parts)
+        assert share(legendre_growth(terms, way), truth, float(size)) <= 4 * ULP
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.25, -0.75])

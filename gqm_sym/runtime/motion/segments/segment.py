@@ -14,6 +14,7 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.regular_factors import regular_factors
 from gqm_sym.runtime.quadrature.running_totals import running_totals
 from gqm_sym.runtime.quadrature.substitution import (
     FROM_TURN,
@@ -374,7 +375,7 @@ class Segment:
             speeds = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
             speeds *= self.width_ratio
         else:
-            speeds = read_off_many(self.edges, np.zeros_like(self.edges), self.speed_terms, phi)
+            speeds = regular_factors(self.edges, self.speed_terms, phi)
             slope, rest = self.growth
             speeds *= np.sin(phi) if self.kind == TURN_TURN else slope * phi + rest
         return speeds
