@@ -17,13 +17,13 @@ import sympy as sp
 
 from gqm_sym.derivation import Model
 from gqm_sym.errors import SolutionError
-from gqm_sym.export.html import summary
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION
 from gqm_sym.optional import require
 from gqm_sym.runtime import Motion
 from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY
+from gqm_sym.runtime.motion.parts.summary import summary
 from gqm_sym.runtime.motion.rows import Rows, table
 from gqm_sym.specfile import Spec
 from gqm_sym.sympy_charts import ChartFunction

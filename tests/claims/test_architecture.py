@@ -58,7 +58,6 @@ LAYERS = (
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
     ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_pandas, Motion.to_xarray
-    ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_, Motion.__str__
     ("runtime/motion/aperiodic.py", "gqm_sym.runtime.legs.variations.without_losses"),  # derivatives along charts
     ("declare/curve.py", "gqm_sym.building"),  # Curve.plot
     ("derivation/model.py", "gqm_sym.building"),  # Model.equilibria
@@ -210,6 +209,7 @@ TESTED_THROUGH = {
     "motion/parts/derivatives.py": "runtime/gradients/test_quantities.py",
     "motion/parts/history.py": "runtime/motion/test_events.py",
     "motion/parts/positions.py": "claims/test_reference.py",
+    "motion/parts/summary.py": "export/test_datasets.py",
     "motion/periodic.py": "claims/test_properties.py",
     "motion/periodic_times.py": "runtime/motion/test_timing.py",
     "motion/riding/cars.py": "claims/test_trains.py",

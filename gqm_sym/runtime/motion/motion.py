@@ -4,7 +4,6 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 from gqm_sym.errors import SolutionError, renamed
-from gqm_sym.export.html import page, summary
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.launch.request import LEAST_SPEED, Launch, LaunchRequest
 from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
@@ -12,6 +11,7 @@ from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.parts.derivatives import Derivatives
 from gqm_sym.runtime.motion.parts.history import History
 from gqm_sym.runtime.motion.parts.searched import swings_below
+from gqm_sym.runtime.motion.parts.summary import page, summary
 from gqm_sym.runtime.motion.riding.cars import Cars, CarsOfRiders, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import load_extreme

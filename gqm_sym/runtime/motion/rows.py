@@ -33,7 +33,7 @@ class Rows(tuple[T, ...]):
 def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
     """Return an HTML table; each number is the shortest text that is read back as the same double."""
     head = "".join(f"<th>{escape(title)}</th>" for title in titles)
-    body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    body = "".join(f"<tr>{''.join(f'<td>{as_html(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
@@ -44,5 +44,6 @@ def text_table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> list[str
     return ["  " + "  ".join(c.ljust(width) for c, width in zip(row, widths, strict=True)).rstrip() for row in cells]
 
 
-def _text(cell: Any) -> str:
+def as_html(cell: Any) -> str:
+    """Return the text of a table's cell, in which characters that mean something else in HTML are escaped."""
     return repr(float(cell) + 0.0) if isinstance(cell, float) else escape(str(cell))

@@ -1,16 +1,13 @@
-"""Motions and their events as HTML tables, for notebooks and reports."""
+"""The facts of a motion, and its HTML for notebooks."""
 
 from html import escape
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gqm_sym.runtime.motion.rows import Rows, _text
-
-if TYPE_CHECKING:
-    from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.rows import Rows, as_html
 
 
-def summary(motion: "Motion") -> list[tuple[str, Any]]:
+def summary(motion: Any) -> list[tuple[str, Any]]:
     """Return the kind, launch, turning points, times and parameters of a motion as pairs of label and value."""
     problem = motion.problem
     name = problem.formulas.parameter
@@ -28,8 +25,8 @@ def summary(motion: "Motion") -> list[tuple[str, Any]]:
     return rows
 
 
-def page(motion: "Motion") -> str:
+def page(motion: Any) -> str:
     """Return the summary and the events of a motion as HTML."""
-    lines = "".join(f"<tr><th>{escape(label)}</th><td>{_text(value)}</td></tr>" for label, value in summary(motion))
+    lines = "".join(f"<tr><th>{escape(label)}</th><td>{as_html(value)}</td></tr>" for label, value in summary(motion))
     events = Rows(motion.events)._repr_html_()
     return f"<p><b>{escape(motion.problem.formulas.name)}</b></p><table><tbody>{lines}</tbody></table>{events}"
