@@ -40,14 +40,10 @@ from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.inversion.fourier import sum_wave
-from gqm_sym.runtime.inversion.table import LAST, TERMS, Table, look_up
+from gqm_sym.runtime.inversion.table import BESIDE_END, TERMS, Table, factor_beside_end, look_up
 from gqm_sym.runtime.quadrature.integrands import Integrand, fill_speeds
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN, place_at, place_on_libration
 from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block, sum_block
-
-# The phase angle from which on its distance from pi follows from the time that is left, and the largest rounding of it;
-# more is a part of the segment that takes too little time to be in the table.
-BESIDE_END, MAX_ROUNDING = 3.0, 8.0 * ULP
 
 # The number of times for which states are found together.
 BLOCK = 128
@@ -205,28 +201,6 @@ def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore
 
 
 @Inner
-def correction_beside_end(table, timing, phases, i):  # type: ignore[no-untyped-def]
-    """Return by which factor the speed next to the turning point at the end of a segment is larger than at the rounded
-    phase angle.
-
-    It is proportional to the sine of the phase angle, that is, of what this lacks to pi, most of which is lost where
-    the angle is rounded. It follows from the time that is left, by the divided difference of the polynomial over this
-    time and the end.
-    """
-    k = table.ends.size - 1
-    left = (timing[4] - phases.work[0, i]) + (timing[5] - phases.work[1, i])
-    if phases.segments[i] != k or not left > 0.0:
-        return 1.0
-    share = left * table.scales[k]
-    total = quotient = table.powers[k, LAST]
-    for j in range(LAST - 1, 0, -1):
-        total += table.powers[k, j]
-        quotient = fma(quotient, 1.0 - share, total)
-    exact, rounded = sin(share * quotient), sin(phases.phi[i])
-    return exact / rounded if fabs(exact - rounded) <= MAX_ROUNDING else 1.0
-
-
-@Inner
 def fill_motion(record, p, t, n, phases, panels, work, found):  # type: ignore[no-untyped-def]
     """Fill the phases at n times, the panels of the phase angles, and rows of the place within the lap, of the velocity
     and of its square.
@@ -253,7 +227,8 @@ def fill_motion(record, p, t, n, phases, panels, work, found):  # type: ignore[n
         table, timing = table_of(record), section(record, TIMING)
         for i in range(n):
             if phases.phi[i] > BESIDE_END:
-                v[i] *= correction_beside_end(table, timing, phases, i)
+                left = (timing[4] - phases.work[0, i]) + (timing[5] - phases.work[1, i])
+                v[i] *= factor_beside_end(table.scales, table.powers, left, phases.phi[i])
     for i in range(n):
         launched = t[i] == 0.0
         place, speed = place_at(kind, a, b, phases.phi[i]), v[i] * (direction * phases.sense[i] * width_ratio)

@@ -12,7 +12,8 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
+from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.buffers import longer, with_rows
 from gqm_sym.runtime.compiled.intrinsics import fma, item_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -68,6 +69,10 @@ LAST_NEWTON_STEP = 1e-10
 # The number of equal parts of the whole time for each segment. The more there are, the more often the first segment of
 # a part is the right one for a time, and the better a processor foresees that no other one is tried.
 PARTS_PER_SEGMENT = 32
+
+# The phase angle from which on its distance from pi follows from the time that is left, and the largest rounding of it;
+# more is a part of the segment that takes too little time to be in the table.
+BESIDE_END, MAX_ROUNDING = 3.0, 8.0 * ULP
 
 # The number of times that are looked up together.
 BLOCK = 64
@@ -286,6 +291,36 @@ def look_up(table, t, t_low, n, segments, out):  # type: ignore[no-untyped-def]
         out[i] = phi
 
 
+@Inner
+def factor_beside_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
+    """Return by which factor the speed next to the turning point at the end of a segment is larger than at the rounded
+    phase angle.
+
+    It is proportional to the sine of the phase angle, that is, of what this lacks to pi, most of which is lost where
+    the angle is rounded. It follows from the time that is left, by the divided difference of the polynomial over this
+    time and the end.
+
+    Parameters
+    ----------
+    scales, powers
+        As `Table` has them.
+    left : float
+        The time in s to the end.
+    phi : float
+        The rounded phase angle.
+    """
+    k = scales.size - 1
+    share = left * scales[k]
+    if not 0.0 < share <= 2.0:  # the end, or beyond the last segment
+        return 1.0
+    total = quotient = powers[k, LAST]
+    for j in range(LAST - 1, 0, -1):
+        total += powers[k, j]
+        quotient = fma(quotient, 1.0 - share, total)
+    exact, rounded = sin(share * quotient), sin(phi)
+    return exact / rounded if fabs(exact - rounded) <= MAX_ROUNDING else 1.0
+
+
 TABLE_TYPE = types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, types.int64[::1], VECTOR, VECTOR))
 
 
@@ -305,3 +340,13 @@ def phase_angles(middles, lows, scales, powers, index, ends, t, t_low):  # type:
         block = slice(start, start + n)
         look_up(table, t[block], t_low[block], n, segments, out[block])
     return out
+
+
+@entry(VECTOR(VECTOR, MATRIX, VECTOR, VECTOR))
+def factors_beside_end(scales, powers, left, phi):  # type: ignore[no-untyped-def]
+    """Return the factors of speeds (`factor_beside_end`) at many phase angles; 1 far from the end."""
+    found = np.ones(phi.size)
+    for i in range(phi.size):
+        if phi[i] > BESIDE_END:
+            found[i] = factor_beside_end(scales, powers, left[i], phi[i])
+    return found

@@ -48,7 +48,7 @@ class MotionAtRest(Motion):
         return column
 
     def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
-        return PhasePoints((), np.ones(t.shape, dtype=bool), np.zeros_like(t), self._trajectory(0.0))
+        return PhasePoints((), np.ones(t.shape, dtype=bool), np.zeros_like(t), self._trajectory(0.0), t, t_low)
 
     def _trajectory(self, end_time: float) -> Trajectory:
         return Trajectory(segments=(), period=None if self._lifts_off else ZERO)

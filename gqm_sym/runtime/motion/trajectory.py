@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus, reduce_many, two_sum
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.inversion.table import BESIDE_END, factors_beside_end
 from gqm_sym.runtime.motion.segments.segment import Segment
+from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
 
 class TimedSegment(NamedTuple):
@@ -112,15 +114,19 @@ class Trajectory:
         starts = np.array([timed.t_start[0] for timed in self.segments])
         return np.clip(np.searchsorted(starts, reduced, side="right") - 1, 0, len(self.segments) - 1)
 
-    def phase_angles(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> Array:
-        """Return the phase angles on a timed segment at reduced times."""
+    def segment_times(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> tuple[Array, Array]:
+        """Return the times of the segment's table at reduced times, from its end ``a``, as two doubles each."""
         s, e = two_sum.py_func(reduced, -timed.t_start[0])
         e = e + (reduced_low - timed.t_start[1])
         r, low = two_sum.py_func(timed.r_start[0], timed.sense * s)
         low = low + (timed.r_start[1] + timed.sense * e)
         # The table has the times of the segment's own quadrature, whose total may be wrong in the last place.
         low = low + r * self.time_scale_error
-        return timed.segment.phase_angle(np.ascontiguousarray(r), np.ascontiguousarray(low))
+        return np.ascontiguousarray(r), np.ascontiguousarray(low)
+
+    def phase_angles(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> Array:
+        """Return the phase angles on a timed segment at reduced times."""
+        return timed.segment.phase_angle(*self.segment_times(timed, reduced, reduced_low))
 
     def time_of(self, timed: TimedSegment, phi: float) -> float:
         """Return the time in s from launch of a phase angle of a timed segment."""
@@ -214,12 +220,16 @@ class PhasePoints:
         The number of laps at each time.
     trajectory : Trajectory
         The trajectory to which the segments belong.
+    reduced, reduced_low : arrays
+        The times without whole periods, as two doubles each.
     """
 
     segments: tuple[tuple[TimedSegment, NDArray[np.bool_], Array], ...]
     at_launch: NDArray[np.bool_]
     laps: Array
     trajectory: Trajectory
+    reduced: Array
+    reduced_low: Array
 
     def places(self, launch: float) -> Array:
         """Return the curve parameter within the lap; at launch it is exactly the launch place."""
@@ -241,9 +251,20 @@ class PhasePoints:
         """Return ds/dt in m/s; at launch it is exactly that of the launch."""
         v = np.zeros_like(self.laps)
         for timed, mask, phi in self.segments:
-            v[mask] = timed.direction * timed.segment.speeds(phi)
+            v[mask] = timed.direction * self._speeds(timed, mask, phi)
         v[self.at_launch] = launch
         return v
+
+    def _speeds(self, timed: TimedSegment, mask: NDArray[np.bool_], phi: Array) -> Array:
+        """Return |ds/dt| in m/s on a timed segment; beside the turning point at its end, from the time that is left."""
+        segment = timed.segment
+        speeds = segment.speeds(phi)
+        if segment.kind != TURN_TURN or not phi.max(initial=0.0) > BESIDE_END:
+            return speeds
+        r, low = self.trajectory.segment_times(timed, self.reduced[mask], self.reduced_low[mask])
+        (_, _, scales, powers, *_), total = segment.table, segment.total_time
+        exact: Array = speeds * factors_beside_end(scales, powers, (total[0] - r) + (total[1] - low), phi)
+        return exact
 
 
 def locate(trajectory: Trajectory, t: Array, t_low: Array) -> PhasePoints:
@@ -256,4 +277,5 @@ def locate(trajectory: Trajectory, t: Array, t_low: Array) -> PhasePoints:
         laps[mask] += timed.laps
         phi = trajectory.phase_angles(timed, reduced[mask], reduced_low[mask])
         segments.append((timed, mask, np.clip(phi, 0.0, timed.segment.edges[-1])))
-    return PhasePoints(tuple(segments), (reduced == 0.0) & (reduced_low == 0.0), laps, trajectory)
+    at_launch = (reduced == 0.0) & (reduced_low == 0.0)
+    return PhasePoints(tuple(segments), at_launch, laps, trajectory, reduced, reduced_low)

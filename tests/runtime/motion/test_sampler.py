@@ -1,6 +1,7 @@
 """Periodic motions at many times agree with closed forms, and with the reading of one exact time."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from types import ModuleType
 from typing import Any
 
@@ -288,5 +289,5 @@ def test_just_after_a_release(place: float, t: float, module_of: ModuleOf) -> No
         cd, sd, nd = (mp.ellipfun(name, rate * mpf(t), m=modulus**2) for name in ("cd", "sd", "nd"))
         fall = (1 - modulus**2) * sd * nd
         wanted = -mp.sign(place) * 2 * modulus * rate * fall / mp.sqrt(1 - (modulus * cd) ** 2)
-    for found in (motion.state(t).v, motion.state(np.array([t, 2.0])).v[0]):
+    for found in (motion.state(t).v, motion.state(np.array([t, 2.0])).v[0], motion.state(Fraction(t)).v):
         assert abs(found / wanted - 1) <= RELEASED
