@@ -15,7 +15,7 @@ from typing import Any
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, several
+from gqm_sym.arguments import checked, one_line, several
 from gqm_sym.declare.curve import Curve
 from gqm_sym.design.tracks import evaluated, extended_precision, read_constant
 from gqm_sym.errors import DeclarationError
@@ -89,7 +89,7 @@ def brachistochrone(to: Sequence[Source], *, mu: Source = 0, title: str = "") ->
         z=z if across > 0 else -z,
         parameter="psi",
         domain=(0, given[4]),
-        title=title or f"Brachistochrone to ({place[0]}, {place[1]}), mu = {mu}",
+        title=one_line(title, where=f"{where}: title") or f"Brachistochrone to ({place[0]}, {place[1]}), mu = {mu}",
     )
 
 

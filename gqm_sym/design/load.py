@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, short
+from gqm_sym.arguments import checked, one_line, short
 from gqm_sym.budgets import budget, check_budget
 from gqm_sym.declare.curve import Curve
 from gqm_sym.design.tracks import (
@@ -31,6 +31,9 @@ MAX_LAST_TERM = 1e-22
 
 # A piece that is shorter than this share of the track shows that the track ends there.
 MIN_SHARE = 1e-4
+
+# Under a larger load, in multiples of the weight, a loop would be a rounding of its height.
+MAX_LOAD = 1e15
 
 
 @checked("design.constant_load")
@@ -98,6 +101,8 @@ def constant_load(
             f"{where}: n: must be greater than 1, got {short(n)}: under a smaller load no track closes a loop; "
             "design.from_load takes any load"
         )
+    if load.is_number and not load < MAX_LOAD:
+        raise DeclarationError(f"{where}: n: must be less than {MAX_LOAD:g}, got {short(n)}")
     for value, name in ((speed, "v0"), (gravity, "g")):
         if value.is_number and not value > 0:
             raise DeclarationError(f"{where}: {name}: must be positive, got {value}")
@@ -109,7 +114,8 @@ def constant_load(
         parameter="psi",
         domain=domain,
         parameters=parameters,
-        title=title or f"Loop of constant contact force, N/(m*g) = {n}, from v0 = {with_unit(v0, 'm/s')}",
+        title=one_line(title, where=f"{where}: title")
+        or f"Loop of constant contact force, N/(m*g) = {n}, from v0 = {with_unit(v0, 'm/s')}",
     )
 
 
@@ -219,7 +225,10 @@ def from_load(
             continue
         pieces.append(piece)
         u, state, width = u + width, ahead, 2 * width
-    title = title or f"Track of contact force N/(m*g) = {law}, from v0 = {with_unit(v0, 'm/s')}"
+    title = (
+        one_line(title, where=f"{where}: title")
+        or f"Track of contact force N/(m*g) = {law}, from v0 = {with_unit(v0, 'm/s')}"
+    )
     return polynomial_curve(mp, pieces, origin=0, breaks=(), title=title)
 
 

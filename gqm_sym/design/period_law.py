@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial.legendre import leggauss
 
-from gqm_sym.arguments import checked, short
+from gqm_sym.arguments import checked, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare.curve import Curve
 from gqm_sym.design.tracks import (
@@ -140,7 +140,8 @@ def from_period(
         pieces,
         origin=count,
         breaks=() if smooth else (count,),
-        title=title or f"Track of period {with_unit(law, 's')}, up to h = {float(end):.9g} m{note}",
+        title=one_line(title, where=f"{where}: title")
+        or f"Track of period {with_unit(law, 's')}, up to h = {float(end):.9g} m{note}",
     )
 
 

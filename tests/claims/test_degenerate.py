@@ -254,6 +254,7 @@ def test_speeds_whose_square_is_beyond_doubles(module_of: Callable[[str], Module
         slow = circle.solve(size, L=1, g=9.81)
         with pytest.raises(SolutionError, match="v_max: the speed is below 1e-150 m/s"):
             _ = slow.v_max
+        assert slow.v_min == (0.0, 0.0, size)
         assert "_in_multiprecision" not in vars(slow)
 
 

@@ -64,6 +64,8 @@ def test_without_load_the_body_flies(tmp_path: Path) -> None:
 
 BAD = {
     "too small a load": (lambda: gqm.design.constant_load(1, 12), "n: must be greater than 1"),
+    "too large a load": (lambda: gqm.design.constant_load(10**400, 12), "n: must be less than"),
+    "no title": (lambda: gqm.design.constant_load(3, 12, title=np.zeros(2)), "title: must be text"),
     "backwards": (lambda: gqm.design.constant_load(3, -12), "v0: must be positive"),
     "up to rest": (lambda: gqm.design.from_load(0, 5, until=9, heading="pi/2"), "the body comes to rest"),
     "both": (lambda: gqm.design.from_load("s + t", 5, until=3), "must be a function of one of s, t"),

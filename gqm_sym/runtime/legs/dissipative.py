@@ -56,7 +56,7 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
     motion = dissipate(formulas, p, launch)
     v2 = np.full(places.shape, np.nan)
     if isinstance(motion, DissipativeMotion):
-        motion.fill_launch_leg(places, v2)
+        motion._fill_launch_leg(places, v2)
     v2[places == launch.lam0.value] = launch.v0.value**2
     return v2
 
@@ -212,7 +212,7 @@ class DissipativeMotion(FollowedMotion):
             turns.pop()
         return turns, runs[: turns[-1] + 1] if turns else []
 
-    def fill_launch_leg(self, places: Array, v2: Array) -> None:
+    def _fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""
         done, lap, laps = 0, self.problem.period, 0.0
         order = np.argsort(places, kind="stable")

@@ -86,12 +86,15 @@ class AperiodicMotion(Tabulated, Motion):
     If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
     pole is continued when later times or farther places are requested; `t_end`, `legs` and `events` cover as many
     segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` allow, whatever was requested before.
+
+    `conservative.solve` appends its first segments by methods that begin with an underscore, because users have no
+    business with them.
     """
 
     def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
         super().__init__(problem, kind, direction)
         self._segments: list[TimedSegment] = []
-        self.open_end: OpenEnd | None = None
+        self._open_end: OpenEnd | None = None
         # The reason for which a motion to infinity cannot be followed any farther.
         self._obstacle = ""
         self._segments_at_first, self._is_endless = 0, False
@@ -107,11 +110,11 @@ class AperiodicMotion(Tabulated, Motion):
         return min(self._horizon, _end_time(self._history()))
 
     @property
-    def lifted_off(self) -> bool:
+    def _lifted_off(self) -> bool:
         """Whether contact has been lost."""
         return bool(self._segments) and self._segments[-1].end == "liftoff"
 
-    def add(self, segment: Segment, sense: int, end: str) -> None:
+    def _add(self, segment: Segment, sense: int, end: str) -> None:
         """Append a whole segment, passed from its end ``a`` if ``sense`` is +1 and towards ``a`` if it is -1; ``end``
         is the name of its end.
         """
@@ -122,7 +125,7 @@ class AperiodicMotion(Tabulated, Motion):
         t, s = (self._segments[-1].t_stop, self._arc_end()) if self._segments else (ZERO, 0.0)
         s_a = s if sense > 0 else s - segment.direction * segment.length
         phi_start, phi_stop = (0.0, segment.stop) if sense > 0 else (segment.stop, 0.0)
-        self.append(
+        self._append(
             TimedSegment(
                 segment=segment,
                 sense=sense,
@@ -147,22 +150,22 @@ class AperiodicMotion(Tabulated, Motion):
         at_double = sqrt(max(0.0, speed * speed + v2_correction(f.addresses, f.p, self.problem.launch.lam0)))
         return segment.direction * low * float(ds) * 2.0 / (speed + at_double)
 
-    def append(self, timed: TimedSegment) -> None:
+    def _append(self, timed: TimedSegment) -> None:
         """Append a timed segment, as far as contact lasts."""
-        if self.lifted_off:
+        if self._lifted_off:
             return
         side = ONLY_SIGN[self.problem.launch.contact]
         lost = liftoff(self.problem.formulas, timed, side, first=not self._segments) if side else None
         if lost is not None and not self._is_at_pole(timed, lost[1]):
             t_stop = stop_time(timed.sense, timed.r_start, lost[0], timed.t_start)
             timed = timed._replace(r_stop=lost[0], phi_stop=lost[1], t_stop=t_stop, end="liftoff")
-            self.kind, self.open_end = "transit", None
+            self.kind, self._open_end = "transit", None
         self._segments.append(timed)
 
-    def approach(self, start: float, equilibrium: float) -> None:
+    def _approach(self, start: float, equilibrium: float) -> None:
         """Append the approach to an equilibrium from ``start``, which takes infinite time."""
-        if not self.lifted_off:
-            self.add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
+        if not self._lifted_off:
+            self._add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
 
     def _is_at_pole(self, timed: TimedSegment, phi: float) -> bool:
         """Return whether a phase angle of a timed segment is so near to the pole into which the body falls that the
@@ -177,14 +180,14 @@ class AperiodicMotion(Tabulated, Motion):
         changes = super()._contact_changes(timed)
         return [change for change in changes if not self._is_at_pole(timed, change[1])]
 
-    def leave_open(self, end: OpenEnd) -> None:
+    def _leave_open(self, end: OpenEnd) -> None:
         """Let the motion be continued beyond its segments, unless contact is lost on them."""
-        if not self.lifted_off:
-            self.open_end, self._pole = end, end.limit
+        if not self._lifted_off:
+            self._open_end, self._pole = end, end.limit
 
-    def finish(self) -> "AperiodicMotion":
+    def _finish(self) -> "AperiodicMotion":
         """Compute at least the first segment; return the motion itself."""
-        end = self.open_end
+        end = self._open_end
         self._is_endless = end is not None and not isfinite(end.limit)
         if end is not None and not self._segments:
             self._extend()
@@ -253,7 +256,7 @@ class AperiodicMotion(Tabulated, Motion):
         return last.s_a + (last.segment.direction * last.segment.length if last.sense > 0 else 0.0)
 
     def _trajectory(self, end_time: float) -> Trajectory:
-        while self.open_end is not None and self._segments[-1].t_stop[0] <= end_time:
+        while self._open_end is not None and self._segments[-1].t_stop[0] <= end_time:
             self._extend()
         if self._obstacle and self._segments[-1].t_stop[0] < end_time:
             raise SolutionError(self._obstacle)
@@ -263,7 +266,7 @@ class AperiodicMotion(Tabulated, Motion):
         if isfinite(self._horizon):
             return self._trajectory(self._horizon).segments
         # One more segment shows whether the last of them leads to the end.
-        while self.open_end is not None and len(self._segments) <= self._segments_ahead():
+        while self._open_end is not None and len(self._segments) <= self._segments_ahead():
             self._extend()
         count = self._segments_ahead()
         return tuple(self._segments if count == inf else self._segments[: int(count)])
@@ -301,7 +304,7 @@ class AperiodicMotion(Tabulated, Motion):
 
     def _is_ahead(self, lam: float) -> bool:
         """Return whether the motion will reach a place beyond the part that has been computed."""
-        end = self.open_end
+        end = self._open_end
         return end is not None and (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
 
     def _shown_time(self) -> float:
@@ -313,7 +316,7 @@ class AperiodicMotion(Tabulated, Motion):
     @budget("motion", 60.0, "give a shorter t_max, or ask for earlier times")
     def _extend(self) -> None:
         """Append one more segment of a motion to infinity or to a pole."""
-        end, problem = self.open_end, self.problem
+        end, problem = self._open_end, self.problem
         assert end is not None
         f, lam0, name = problem.functions, problem.lam0, problem.formulas.parameter
         target = end.target
@@ -331,8 +334,8 @@ class AperiodicMotion(Tabulated, Motion):
         if what == zeros.STEPS_SPENT and abs(near) > begin:
             target = lam0 + near  # one search ends here, and the next one begins here
         elif what == zeros.CUSP:
-            self.add(through(f, end.place, lam0 + far, lam0, problem.w0), 1, "cusp")
-            self.open_end = None
+            self._add(through(f, end.place, lam0 + far, lam0, problem.w0), 1, "cusp")
+            self._open_end = None
             return
         elif what != zeros.LIMIT:
             self._stop_following(f"the motion beyond {name} = {lam0 + near!r} could not be followed")
@@ -344,19 +347,19 @@ class AperiodicMotion(Tabulated, Motion):
         ):
             self._end_here()  # the motion along a spiral has reached its centre
             return
-        self.add(segment, 1, "")
+        self._add(segment, 1, "")
         end.place = target
         if segment.edges.size <= MAX_PANELS_TO_DOUBLE:
             end.step *= 2.0
 
     def _stop_following(self, why: str) -> None:
         """Stop the computation of a motion to infinity."""
-        self.open_end, self._obstacle = None, f"{why}; give a shorter t_max, or a domain that ends there"
+        self._open_end, self._obstacle = None, f"{why}; give a shorter t_max, or a domain that ends there"
 
     def _end_here(self) -> None:
         """End the motion at a singular point, because the rest of it has no duration and no length within rounding."""
         self._segments[-1] = self._segments[-1]._replace(end="singular-point")
-        self.open_end = None
+        self._open_end = None
 
     def _time_error(self, t: Array) -> Array:
         return np.zeros_like(t)

@@ -81,8 +81,8 @@ def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
         return motion  # an aperiodic motion itself finds the place where contact is lost
     until_liftoff = AperiodicMotion(motion.problem, "transit", motion.direction)
     for timed in motion.one_period:
-        until_liftoff.append(timed)
-    return until_liftoff.finish() if until_liftoff.lifted_off else motion
+        until_liftoff._append(timed)
+    return until_liftoff._finish() if until_liftoff._lifted_off else motion
 
 
 def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
@@ -241,8 +241,8 @@ def _from_cusp(problem: Problem) -> Motion:
         # from both ends.
         steps = np.geomspace(1e-12, 0.25, 25) * (front.place - lam0)
         panel_breaks = (*(lam0 + steps), *(front.place - steps))
-        motion.add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
-        return motion.finish()
+        motion._add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
+        return motion._finish()
     if front.what != "turn":
         return _without_turn(problem, direction, front, from_cusp)
     if w0 == 0.0:
@@ -253,8 +253,8 @@ def _from_cusp(problem: Problem) -> Motion:
         whole = from_turn(f, front.place, lam0)
         parts = [(whole, -1, "turn"), (whole, 1, "cusp")]
     for segment, sense, end in parts:
-        motion.add(segment, sense, end)
-    return motion.finish()
+        motion._add(segment, sense, end)
+    return motion._finish()
 
 
 def _is_level_cusp(problem: Problem) -> bool:
@@ -301,34 +301,34 @@ def _without_turn(
     motion = AperiodicMotion(problem, kind, direction)
     if problem.w0 > 0.0:
         if front.what == "equilibrium":
-            motion.approach(_to_half_way(motion, front.place), front.place)
+            motion._approach(_to_half_way(motion, front.place), front.place)
         elif front.what == "open":
-            motion.leave_open(OpenEnd(lam0, direction, front.place))
+            motion._leave_open(OpenEnd(lam0, direction, front.place))
         else:
             ref, ref_v2 = (front.place, 0.0) if front.zero_v2 else (lam0, problem.w0)
-            motion.add(through(f, lam0, front.place, ref, ref_v2), 1, front.what)
-        return motion.finish()
+            motion._add(through(f, lam0, front.place, ref, ref_v2), 1, front.what)
+        return motion._finish()
     if front.what == "equilibrium":
         middle = 0.5 * (lam0 + front.place)
-        motion.add(from_rest(f, lam0, middle), 1, "")
-        motion.approach(middle, front.place)
+        motion._add(from_rest(f, lam0, middle), 1, "")
+        motion._approach(middle, front.place)
     elif front.what == "open":
         middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
-        motion.add(from_rest(f, lam0, middle), 1, "")
-        motion.leave_open(OpenEnd(middle, direction, front.place))
+        motion._add(from_rest(f, lam0, middle), 1, "")
+        motion._leave_open(OpenEnd(middle, direction, front.place))
     else:
         _add_way_to_end(motion, from_rest, lam0, front)
-    return motion.finish()
+    return motion._finish()
 
 
 def _add_way_to_end(motion: AperiodicMotion, from_rest: Callable[..., Segment], turn: float, end: EndOfMotion) -> None:
     """Add the way from a place at rest to an end; V**2 vanishes there too if it is a cusp as high as that place."""
     f, middle = motion.problem.functions, 0.5 * (turn + end.place)
     if end.zero_v2:
-        motion.add(from_rest(f, turn, middle), 1, "")
-        motion.add(from_cusp(f, end.place, middle), -1, end.what)
+        motion._add(from_rest(f, turn, middle), 1, "")
+        motion._add(from_cusp(f, end.place, middle), -1, end.what)
     else:
-        motion.add(from_rest(f, turn, end.place), 1, end.what)
+        motion._add(from_rest(f, turn, end.place), 1, end.what)
 
 
 def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
@@ -343,7 +343,7 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
     if w0 >= middle_v2:
         return lam0
     if w0 >= MIN_CANCELLATION_RATIO * middle_v2 or f.exact is None:
-        motion.add(through(f, lam0, middle, lam0, w0), 1, "")
+        motion._add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
     # So slow a launch is next to another equilibrium, and its place is needed as exactly as it was given.
     scale = f.exact.at(DIGITS)
@@ -351,7 +351,7 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
     slow = Segment(
         functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels, speed_terms=speed_terms
     )
-    motion.add(slow, 1, "")
+    motion._add(slow, 1, "")
     return middle
 
 
@@ -361,14 +361,14 @@ def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: E
     kind: MotionKind = "asymptotic" if back.what == "equilibrium" else "transit"
     motion = AperiodicMotion(problem, kind, direction)
     inbound = from_turn(f, front.place, lam0)
-    motion.add(inbound, -1, "turn")
+    motion._add(inbound, -1, "turn")
     if back.what == "open":
-        motion.add(inbound, 1, "")
-        motion.leave_open(OpenEnd(lam0, -direction, back.place))
+        motion._add(inbound, 1, "")
+        motion._leave_open(OpenEnd(lam0, -direction, back.place))
     elif back.what == "equilibrium":
         middle = 0.5 * (front.place + back.place)
-        motion.add(from_turn(f, front.place, middle), 1, "")
-        motion.approach(middle, back.place)
+        motion._add(from_turn(f, front.place, middle), 1, "")
+        motion._approach(middle, back.place)
     else:
         _add_way_to_end(motion, from_turn, front.place, back)
-    return motion.finish()
+    return motion._finish()

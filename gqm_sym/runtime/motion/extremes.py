@@ -179,6 +179,8 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     if motion.kind == "rest" or motion._end_of_legs() == 0.0:  # the body stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(quantity.of_state(state), 0.0, state.lam)
+    if quantity is SPEED and sign < 0 and motion.problem.launch.v0.value == 0.0:
+        return Extreme(0.0, 0.0, motion.problem.launch.lam0.value)
     trajectory, end = trajectory_with_extreme(motion, quantity, sign)
     last = trajectory.segments[-1]
     if last.end == "singular-point" and last.t_stop[0] <= end and _falls_into_pole(motion.problem, last):
@@ -194,8 +196,9 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
             if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
                 best = Extreme(value, min(t, end), lam)  # the time of the end itself may be rounded up
     assert best is not None
-    if best.t == 0.0:  # as it was given, without rounding
-        launch, value = motion.problem.launch, best.value
+    launch, value = motion.problem.launch, best.value
+    is_given = quantity is SPEED and sign * (launch.v0.value - value) > 0.0  # along a level line, to rounding
+    if best.t == 0.0 or is_given:  # as it was given, without rounding
         if quantity is SPEED:
             value = launch.v0.value
         elif motion._is_released_at_cusp:  # where the force is the limit after the release

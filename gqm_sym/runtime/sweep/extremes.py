@@ -18,7 +18,7 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
     point_buffer,
     sample_loads,
 )
-from gqm_sym.runtime.sweep.single.slow_places import exact_least_speed
+from gqm_sym.runtime.sweep.single.slow_places import exact_extreme_speed
 from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 from gqm_sym.runtime.sweep.tables.stretches import stretch_after_turn, stretch_before_turn, stretch_of
@@ -58,9 +58,9 @@ def extreme_by_itself(curve, orbit, quantity, shares, max_grids):  # type: ignor
         low, high = (0.0, high) if orbit.leaves > 0 else (low, 0.0)
     passed = Orbit(orbit.circulates, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, orbit.leaves)
     value, share = extreme(curve, passed, sought, sign, max_grids)
-    if quantity != MIN_SPEED:
+    if quantity not in (MIN_SPEED, MAX_SPEED):
         return value
-    return exact_least_speed(curve, passed, value, share if passed.circulates else sin(0.5 * pi * share) ** 2)
+    return exact_extreme_speed(curve, passed, value, share if passed.circulates else sin(0.5 * pi * share) ** 2)
 
 
 @Inner

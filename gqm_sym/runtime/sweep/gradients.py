@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gqm_sym.arguments import one_of
 from gqm_sym.errors import GQMError, InputError
 from gqm_sym.runtime.compiled.strided import lay_out, widen
 from gqm_sym.runtime.compiled.types import Array
@@ -21,7 +22,7 @@ from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.sweep.columns import as_doubles
-from gqm_sym.runtime.sweep.quantities import ANSWERED, LOWER_END, SOLVE, UPPER_END
+from gqm_sym.runtime.sweep.quantities import ANSWERED, LOWER_END, QUANTITIES, SOLVE, UPPER_END
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.sweep import Solve, sweep, sweep_with_columns
 
@@ -47,6 +48,7 @@ def sweep_with_gradient(
     wrt : str or sequence of str
         The variables of differentiation.
     """
+    one_of(quantity, tuple(QUANTITIES), where="quantity")
     rows = selected(formulas.parameters, wrt)
     if quantity in LOAD_EXTREMES:
         raise InputError(f"gradient: there is none of {quantity}, which is a load on a rider; leave gradient out")

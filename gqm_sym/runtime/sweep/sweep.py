@@ -51,7 +51,8 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
 # Quantities that are found from a tape of the formulas if doubles do not suffice.
-FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME, quantities.MIN_SPEED)
+EXTREME_SPEEDS = (quantities.MIN_SPEED, quantities.MAX_SPEED)
+FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME, *EXTREME_SPEEDS)
 
 
 def sweep(
@@ -209,8 +210,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         lines = lay_out(columns, chunk.start, chunk.stop)
         launches, found = (pointers(lines), formulas.monotone), answers.part(chunk)
         spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
+        exact = _recorded(formulas, asked.lows) if batches is not None or code in FROM_TAPE else NO_TAPE
         if batches is not None:
-            exact = _recorded(formulas, asked.lows)
             arrives = code == quantities.ARRIVAL_TIME and exact.work.size and not joints.size
             wanted = code if code in ANSWERED_BY_BATCHES or arrives else quantities.SPANS
             layout = (batches.orbit_rows, batches.integrand_rows, formulas.inertia_row)
@@ -237,14 +238,15 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         in_space, loads = (made.address if made else 0 for made in (formulas.path_in_space, formulas.rider_loads))
         of_force = formulas.signed, in_space, formulas.directed, loads
         given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, *of_force)
+        if code in EXTREME_SPEEDS:
+            given = given._replace(exact=exact)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
-        exact = _recorded(formulas, asked.lows) if code in FROM_TAPE else NO_TAPE
         if code in ANSWERED_BY_BATCHES and exact.work.size:
             spans = np.empty((found.status.size, 2))
             one_by_one(quantities.SPANS, spans, found._replace(values=spans), given)
             answer_exactly(exact, launches[0], code, spans, found)
         one_by_one(code, spans, found, given)
-        if code in FROM_TAPE and (found.status == quantities.UNDECIDED).any():
+        if code in FROM_TAPE and code not in EXTREME_SPEEDS and (found.status == quantities.UNDECIDED).any():
             one_by_one(code, spans, found, given._replace(exact=exact))
 
 

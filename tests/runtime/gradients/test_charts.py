@@ -53,6 +53,14 @@ def valley(generated_folder: Path) -> ModuleType:
     return gqm.build(gqm.derive(gqm.Curve.sampled(points), force), name="gradient_valley", folder=generated_folder)
 
 
+@pytest.mark.parametrize("shape", [(0,), (2, 0)])
+def test_no_times(shape: tuple[int, ...], rail: ModuleType) -> None:
+    """For no times there are no derivatives, and the shapes are as for others."""
+    motion = rail.solve(0.5, 9.0)
+    assert motion.kind == "transit"
+    assert motion.sensitivity(np.empty(shape), ("q", "v0")).lam.shape == (2, *shape)
+
+
 def durations(module: ModuleType, launch: dict[str, Any], name: str) -> float:
     """Return the derivative of a half period, or of the time of a lap, as a difference quotient."""
     sides = []

@@ -229,6 +229,9 @@ def test_what_has_no_gradient() -> None:
     """A quantity without a gradient gives one clear error."""
     with pytest.raises(InputError, match="did you mean 'L'"):
         generated("circle").sweep("period", lam0=1.0, gradient="l")
+    for quantity in ([], np.zeros(2)):
+        with pytest.raises(InputError, match="quantity: "):
+            generated("circle").sweep(quantity, lam0=1.0, gradient="L")
 
 
 def test_quantities_of_solved_motions() -> None:

@@ -303,3 +303,12 @@ def test_a_speed_is_largest_soon_after_the_launch(stadium: ModuleType, before: f
     true = sqrt(v0**2 + 2 * 9.81 * (1 - cos(before)))
     assert stadium.solve(place, v0, direction=-1, **given).v_max.value == pytest.approx(true, rel=1e-15)
     assert stadium.sweep("v_max", [place], [v0], direction=-1, **given).values[0] == pytest.approx(true, rel=1e-15)
+
+
+@pytest.mark.parametrize("v0", [0.001, 0.1, 0.3])
+def test_the_speed_on_a_level_line(stadium: ModuleType, v0: float) -> None:
+    """The launch is part of the motion, so that roundings of other speeds do not exclude the launch speed."""
+    motion = stadium.solve(0.5, v0, t_max=0.1)
+    least, largest = motion.v_min.value, motion.v_max.value
+    assert least <= v0 <= largest
+    assert (least, largest) == pytest.approx((v0, v0), rel=1e-13)

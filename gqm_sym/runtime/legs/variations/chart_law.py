@@ -86,7 +86,7 @@ class ChartLaw(Law):
             some = slice(start, start + BLOCK)
             parts.append(self._shape.path(self._shape.places(high[some], low[some]), ORDERS))
         found = np.concatenate(parts, axis=1)
-        return np.stack([found, np.zeros_like(found)], axis=1).reshape(-1, high.size)
+        return np.stack([found, np.zeros_like(found)], axis=1).reshape(2 * found.shape[0], high.size)
 
     def matrix(self, states: Array) -> Array:
         """See `Law`."""
@@ -123,7 +123,7 @@ class ChartLaw(Law):
         program, places = chart_path_program(self._forces), self._coordinates(high, low)
         found = np.empty((program.outputs.size, 1, high.size))
         fill_values(program.operands, program.work, self.parameters, places, found)
-        return PathRows(found.reshape(-1, self.count + 2, high.size))
+        return PathRows(found.reshape(program.outputs.size // (self.count + 2), self.count + 2, high.size))
 
 
 def law_of(problem: Problem) -> Law:

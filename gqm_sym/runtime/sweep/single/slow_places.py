@@ -36,8 +36,9 @@ from gqm_sym.runtime.sweep.single.orbit_extremes import (
 MIN_V2_SHARE = 1e-9
 
 # The share of V**2 at launch below which V**2 elsewhere, as its difference from that, has lost digits; and the half
-# width of the interval in which a hilltop is sought where V**2 is smallest, as a share of the orbit's width.
-MIN_SHARE_OF_LAUNCH, HILLTOP_SHARE = 0.25, 1e-5
+# width of the interval in which an equilibrium is sought where V**2 is smallest or largest, as a share of the orbit's
+# width.
+MIN_SHARE_OF_LAUNCH, EQUILIBRIUM_SHARE = 0.25, 1e-5
 
 # The largest number of parts of an orbit, and the number of times that the interval of the grid in which V**2 is
 # smallest is halved.
@@ -102,26 +103,31 @@ def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def exact_least_speed(curve, orbit, value, share):  # type: ignore[no-untyped-def]
-    """Return the least speed of an orbit, given its value in doubles and the share of the orbit's width at which it is;
-    NaN if that has lost digits and there is no tape.
+def exact_extreme_speed(curve, orbit, value, share):  # type: ignore[no-untyped-def]
+    """Return the least or largest speed of an orbit, given its value in doubles and the share of the orbit's width at
+    which it is; NaN if that has lost most of its digits and there is no tape.
 
-    Where V**2 is smallest inside the orbit, the potential has a hilltop, on which an error of the place does not count.
+    In doubles V**2 is the difference from its value at launch, whose terms cancel beside equilibria. Where V**2 is
+    smallest or largest inside the orbit, the potential has an equilibrium, on which an error of the place does not
+    count. In even wells the middle is such a place, and few potentials have terms that cancel there.
     """
-    if value >= sqrt(MIN_SHARE_OF_LAUNCH) * sqrt(orbit.v2) or value == 0.0:
+    if not value > 0.0 or value * value == orbit.v2 or (orbit.even and not orbit.circulates):
         return value
     if curve.exact.work.size == 0:
-        return nan
+        return value if value * value >= MIN_SHARE_OF_LAUNCH * orbit.v2 else nan
     width = orbit.high - orbit.low
     place, low_part = two_sum(orbit.lam0, orbit.low + width * share)
-    reach = HILLTOP_SHARE * width
-    if slope_at(curve, place - reach) > 0.0 and slope_at(curve, place + reach) < 0.0:
+    reach = EQUILIBRIUM_SHARE * width
+    before, after = slope_at(curve, place - reach), slope_at(curve, place + reach)
+    if before > 0.0 and after < 0.0:
         place, low_part = hilltop_between(curve, place - reach, place + reach), 0.0
+    elif before < 0.0 and after > 0.0:  # at the bottom of a well V**2 is large, and one step of the secant method does
+        place, low_part = place - reach * (after + before) / (after - before), 0.0
     places, v2, slopes = place_buffer(), place_buffer(), place_buffer()
     places[0] = place
     fill_exactly(curve, orbit.lam0, places, 1, v2, slopes)
-    least = v2[0] - 2.0 * slopes[0] * low_part
-    return sqrt(least) if least > 0.0 else nan
+    square = v2[0] - 2.0 * slopes[0] * low_part
+    return sqrt(square) if square > 0.0 else nan
 
 
 @Inner

@@ -161,7 +161,21 @@ def test_the_least_speed_of_a_lap(module_of: ModuleOf, excess: float) -> None:
         least = mp.sqrt(mp.mpf(v0) ** 2 - 2 * mp.mpf(9.81) * (1 + mp.cos(start)))
     swept = circle.sweep("v_min", [start], v0, L=1, g=9.81)
     assert swept.route[0] == 1
-    assert swept.values[0] == pytest.approx(float(least), rel=4e-16)
+    assert swept.values[0] == pytest.approx(float(least), rel=4e-16, abs=0.0)
+
+
+@pytest.mark.parametrize("v0", [0.0, 1e-4])
+def test_the_largest_speed_beside_the_bottom_of_a_well(module_of: ModuleOf, v0: float) -> None:
+    """A body that is launched beside the bottom of an uneven well is fastest there, although the terms of the potential
+    almost cancel between both places: by the energy V**2 is V0**2 + 2 g (start**2 - 1/2)**2.
+    """
+    starts = [0.65, 0.7055, 0.70712, 0.7086, 0.77]
+    with mp.workdps(40):
+        drops = [(mp.mpf(start) ** 2 - 0.5) ** 2 for start in starts]
+        largest = [float(mp.sqrt(mp.mpf(v0) ** 2 + 2 * mp.mpf(9.81) * drop)) for drop in drops]
+    swept = module_of("double_well").sweep("v_max", starts, v0, g=9.81)
+    assert (swept.route == 1).all()
+    assert swept.values == pytest.approx(largest, rel=4e-16, abs=0.0)
 
 
 def test_a_turn_before_the_last_time_is_rest(module_of: ModuleOf) -> None:
