@@ -65,7 +65,7 @@ from gqm_sym.runtime.sweep.single.until import (
     part_until,
     stops_beside_turn,
 )
-from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, comes_to_rest, follows_formulas
+from gqm_sym.runtime.sweep.single.values import FEW_PANELS, best_value, follows_formulas, passes_extreme
 from gqm_sym.runtime.sweep.tables.last_places import stop_at
 from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP, Stop, loss_of_contact
@@ -175,16 +175,6 @@ def fill_value(curve, orbit, passage, tabulated, asked, buffers, out):  # type: 
 
 
 @Inner
-def passes_all(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignore[no-untyped-def]
-    """Return whether a body passes its whole orbit, in both directions if it turns, before the last time."""
-    quantity = HALF_PERIOD if orbit.leaves == 0 else ARRIVAL_TIME
-    time = best_value(curve, orbit, passage, tabulated, quantity, nan, buffers)
-    if orbit.leaves == 0 and not orbit.circulates:
-        time *= 2.0
-    return is_later(t_max, time)
-
-
-@Inner
 def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ignore[no-untyped-def]
     """Return an extreme up to the last time, before which a body does not pass its whole orbit; NaN if it is not
     accurate.
@@ -193,8 +183,6 @@ def extreme_until(curve, orbit, passage, tabulated, asked, buffers):  # type: ig
     """
     (quantity, t_max), value, edges = asked, nan, buffers.half_v2_at_edges
     is_directed = sought_for(curve, orbit, quantity, WHOLE)[0][1] != 0
-    if quantity == MIN_SPEED and comes_to_rest(curve, orbit, passage, tabulated, t_max, buffers):
-        return 0.0
     if passage.panels <= FEW_PANELS or follows_formulas(curve):  # beside hilltops they have more digits than the table
         what, part, shares = part_until(curve, orbit, t_max, is_directed, buffers.work)
         # Where the part ends roughly at the last time, it has an extreme if that is not at its end.
@@ -290,8 +278,9 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if by_ends or (orbit.circulates and quantity == HALF_PERIOD):
         return fill_ends(orbit, quantity, out)
     until_last = quantity in EXTREMES and t_max < inf
-    if until_last and stop.place != stop.place:
-        until_last = not passes_all(curve, orbit, passage, tabulated, t_max, buffers)
+    if until_last:
+        needed = quantity, t_max, stop.place == stop.place
+        until_last = not passes_extreme(curve, orbit, passage, tabulated, needed, buffers)
     if until_last:
         out[0] = extreme_until(curve, orbit, passage, tabulated, (quantity, t_max), buffers)
         return ANSWERED if isfinite(out[0]) else UNDECIDED

@@ -7,10 +7,11 @@ from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, time_by_panels, time_by_trapezoid
 from gqm_sym.runtime.sweep.extremes import EXTREMES, extreme_by_itself, extreme_on
 from gqm_sym.runtime.sweep.orbit import Orbit
-from gqm_sym.runtime.sweep.quantities import ARRIVAL_TIME, HALF_PERIOD, PERIOD
+from gqm_sym.runtime.sweep.quantities import ARRIVAL_TIME, HALF_PERIOD, MIN_SPEED, PERIOD
 from gqm_sym.runtime.sweep.single.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.single.orbit_extremes import MAX_GRIDS, WHOLE
 from gqm_sym.runtime.sweep.single.slow_places import passing_time, turns_at
+from gqm_sym.runtime.sweep.single.until import is_later
 from gqm_sym.runtime.sweep.tables.liftoff import NO_STOP
 from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
 
@@ -108,15 +109,27 @@ def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # 
 
 
 @Inner
-def comes_to_rest(curve, orbit, passage, tabulated, t_max, buffers):  # type: ignore[no-untyped-def]
-    """Return whether a body is at rest at its launch, or certainly at the turning point ahead before the last time."""
-    if orbit.v2 == 0.0:
+def passes_extreme(curve, orbit, passage, tabulated, asked, buffers):  # type: ignore[no-untyped-def]
+    """Return whether a body certainly passes, before the last time, all of its orbit on which an extreme may lie.
+
+    For the least speed that is the launch at rest, or the way to the turning point ahead if there is one; else it is
+    the whole orbit, in both directions if it turns.
+    ``asked`` is the quantity, the last time, and whether contact is lost after that time.
+    """
+    quantity, t_max, is_lost = asked
+    to_turn = quantity == MIN_SPEED and not orbit.circulates and orbit.leaves != orbit.direction
+    if quantity == MIN_SPEED and orbit.v2 == 0.0:
         return True
-    if orbit.circulates or orbit.leaves == orbit.direction:
+    if is_lost and not to_turn:
         return False
     way = orbit.high if orbit.direction > 0 else orbit.low
     turn = orbit.lam0 + way
-    time = best_value(curve, orbit, passage, tabulated, ARRIVAL_TIME, turn, buffers)
-    # A place that is rounded by this much is passed so much earlier or later.
-    rounded = REST_MARGIN + REST_ROUNDINGS * sqrt(LAST_PLACE * fabs(turn / way))
-    return time <= t_max * (1.0 - rounded)
+    what, target = (ARRIVAL_TIME, turn) if to_turn else (HALF_PERIOD if orbit.leaves == 0 else ARRIVAL_TIME, nan)
+    time = best_value(curve, orbit, passage, tabulated, what, target, buffers)
+    if to_turn:
+        # A place that is rounded by this much is passed so much earlier or later.
+        rounded = REST_MARGIN + REST_ROUNDINGS * sqrt(LAST_PLACE * fabs(turn / way))
+        return time <= t_max * (1.0 - rounded)
+    if orbit.leaves == 0 and not orbit.circulates:
+        time *= 2.0
+    return is_later(t_max, time)
