@@ -70,8 +70,8 @@ LAST_NEWTON_STEP = 1e-10
 # a part is the right one for a time, and the better a processor foresees that no other one is tried.
 PARTS_PER_SEGMENT = 32
 
-# The phase angle from which on its distance from pi follows from the time that is left, and the largest rounding of it;
-# more is a part of the segment that takes too little time to be in the table.
+# The phase angle from which on its distance from pi follows from the time that is left. Where the two differ by more
+# than the second number, more than a rounding, the last part of the segment takes too little time to be in the table.
 BESIDE_END, MAX_ROUNDING = 3.0, 8.0 * ULP
 
 # The number of times that are looked up together.

@@ -50,8 +50,10 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 # Quantities that batches compute themselves, as they do arrivals; for others they find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
-# Quantities that are found from a tape of the formulas if doubles do not suffice.
+# Quantities for which the loop over launches always has a tape of the formulas, because V**2 cancels beside equilibria.
 EXTREME_SPEEDS = (quantities.MIN_SPEED, quantities.MAX_SPEED)
+
+# Quantities that are found from the tape if doubles do not suffice.
 FROM_TAPE = (*ANSWERED_BY_BATCHES, quantities.ARRIVAL_TIME, quantities.END_TIME, *EXTREME_SPEEDS)
 
 
