@@ -41,7 +41,7 @@ from gqm_sym.runtime.legs.frames.local_frame import may_be_small
 from gqm_sym.runtime.legs.frames.tiny_legs import is_tiny, slides_little
 from gqm_sym.runtime.legs.gaps.data import forget
 from gqm_sym.runtime.legs.gaps.rooms import room_for
-from gqm_sym.runtime.legs.leg_record import AHEAD, BACK, PANELS, PASSAGE, PEAKS, ROWS, TIMES, USED, pack
+from gqm_sym.runtime.legs.leg_record import AHEAD, BACK, PANELS, PASSAGE, PEAKS, PLACES, ROWS, TIMES, USED, pack
 from gqm_sym.runtime.legs.questions import (
     ARRIVAL,
     FIRST_LEGS,
@@ -160,7 +160,7 @@ def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no
     """
     for k in range(SIZE):
         before[k] = body[k]
-    reads = TIMES if joints.gaps.size > 0 else ROWS
+    reads = PLACES if joints.gaps.size > 0 else ROWS
     what = advance(dissipation, p, joints, body, Reading(reads, False, False, 1.0, -inf), record)
     if what in (END_TURN, END_REST, END_LIMIT, END_RECORD_FULL):
         return what

@@ -63,9 +63,9 @@ END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE
 WHOLE, WHOLE_WIDTH, RISING, FALLING, EXTENT, AHEAD, BACK, USED, HEAD = range(15, 24)
 
 # The data that are read from a record (`runs.route.Reading`): the times and places between which the leg runs; also the
-# largest or smallest speed or contact force; the time at which the body passes a place; everything that panels contain;
-# or that for a leg which is followed in a way that gives it, and for another one the first.
-TIMES, PEAKS, PASSAGE, PANELS, ROWS = range(5)
+# place at the last time; the largest or smallest speed or contact force; the time at which the body passes a place;
+# everything that panels contain; or that for a leg which is followed in a way that gives it, else PLACES.
+TIMES, PLACES, PEAKS, PASSAGE, PANELS, ROWS = range(6)
 
 COLUMNS = 4 * WIDE
 MAX_ROWS, ROWS_COUNT_AS = 4, 2

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
+from gqm_sym.runtime.legs.driver import Driver
 
 U = np.linspace(-2, 2, 201)
 POINTS = np.column_stack([U, 0.5 * U * U + 0.01 * np.cos(3 * U)])
@@ -64,3 +65,15 @@ def test_early_times_on_an_implicit_curve(tmp_path: Path, lam0: float, true: flo
     curve = gqm.Curve.implicit("x**4+z**4-1.0*x*z/5-1", start=(0, -1))
     found = swept(curve, tmp_path, "time_at", lam0=lam0, lam=0.5449999999999999, t_max=10.0)
     np.testing.assert_allclose(found, true, rtol=1e-15)
+
+
+def test_the_place_at_the_last_time_needs_no_leg_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A leg that is passed by gaps has a panel where the last time is, from which its place then is read."""
+    law = gqm.Gravity() + gqm.QuadraticDrag(b="1/5")
+    module = gqm.build(gqm.derive(gqm.Curve.sampled(POINTS), law), name="last_place", folder=tmp_path)
+    with_panels, followed = Driver.with_panels, []
+    monkeypatch.setattr(Driver, "with_panels", lambda *given: followed.append(given) or with_panels(*given))
+    motion = module.solve(3.0, t_max=10.0)
+    last = motion.legs[-1]
+    assert (last.end, followed) == ("horizon", [])
+    np.testing.assert_allclose(last.lam_end, motion.lam(10.0), rtol=1e-14)
