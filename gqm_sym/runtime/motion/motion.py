@@ -121,11 +121,12 @@ class Motion(History, Derivatives):
             If the motion goes on for ever in another way, or approaches the value without reaching it; give it a
             horizon, ``t_max``; or if it is so small that its square is beyond the range of doubles.
         """
-        is_slow = self.kind == "libration" and swings_below(self, LEAST_SPEED)
-        found = Extreme(0.0, 0.0, 0.0) if is_slow else extreme(self, SPEED, 1)
-        if found.value < LEAST_SPEED and self.kind != "rest" and self._known_end() > 0.0:
-            raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
-        return found
+        lasts = self._known_end() > 0.0
+        if not (lasts and self.kind == "libration" and swings_below(self, LEAST_SPEED)):
+            found = extreme(self, SPEED, 1)
+            if not (lasts and found.value < LEAST_SPEED and self.kind != "rest"):
+                return found
+        raise SolutionError(f"v_max: the speed is below {LEAST_SPEED:g} m/s, and its square is beyond doubles")
 
     @property
     @locked

@@ -40,9 +40,7 @@ def plain_time(t: Any) -> float | None:
     """Return a time that is a double or equal to one; None for any other time."""
     if type(t) is float:
         return t
-    if type(t) is np.float64:
-        return float(t)
-    if isinstance(t, np.ndarray) and t.ndim == 0 and t.dtype == np.float64:
+    if type(t) is np.float64 or (isinstance(t, np.ndarray) and t.ndim == 0 and t.dtype == np.float64):
         return float(t)
     return float(t) if type(t) is int and abs(t) < 2**53 else None
 

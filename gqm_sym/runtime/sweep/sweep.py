@@ -239,9 +239,8 @@ def _answer(formulas: "Formulas", asked: Question, group: Group, answers: Answer
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
         in_space, loads = (made.address if made else 0 for made in (formulas.path_in_space, formulas.rider_loads))
         of_force = formulas.signed, in_space, formulas.directed, loads
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE, *of_force)
-        if code in EXTREME_SPEEDS:
-            given = given._replace(exact=exact)
+        at_once = exact if code in EXTREME_SPEEDS else NO_TAPE
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, at_once, *of_force)
         one_by_one = partial(scalar.answer_one_by_one, formulas.functions.addresses(), *launches)
         if code in ANSWERED_BY_BATCHES and exact.work.size:
             spans = np.empty((found.status.size, 2))
