@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import borrowed
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, sine_and_cosine
@@ -35,6 +35,22 @@ MAX_RATE_ERROR = 2.0**-54
 GROWTHS = (0.5, 2.0, 1.0)
 
 PAIR = types.UniTuple(REAL, 2)
+
+
+@Inner
+def fill_shares(kind, middle, reach, nodes, rows):  # type: ignore[no-untyped-def]
+    """Fill the share of a segment at each node of a panel, and its derivative with respect to phi, two doubles each."""
+    for i in range(nodes.size):
+        phi, low = multiply(reach[0], reach[1], nodes[i], 0.0)
+        phi, low = add(middle[0], middle[1], phi, low)
+        rows[0, i], rows[1, i], rows[2, i], rows[3, i] = phi, low, 1.0, 0.0
+        if kind == TURN_TURN:
+            s, s_low, c, c_low = sine_and_cosine(0.5 * phi, 0.5 * low)
+            rows[0, i], rows[1, i] = multiply(s, s_low, s, s_low)
+            rows[2, i], rows[3, i] = multiply(s, s_low, c, c_low)
+        elif kind == FROM_TURN:
+            rows[0, i], rows[1, i] = multiply(phi, low, phi, low)
+            rows[2, i], rows[3, i] = 2.0 * phi, 2.0 * low
 
 
 @entry(
@@ -75,18 +91,7 @@ def fill_rates(tape, work, p, launch, kind, panel, nodes, out):  # type: ignore[
     level = energy_level(work, registers, launch, 0)
     start, width, middle, reach = panel
     n, rows, rates = nodes.size, np.empty((4, nodes.size)), np.empty(ROW)
-    for i in range(n):
-        phi, low = multiply(reach[0], reach[1], nodes[i], 0.0)
-        phi, low = add(middle[0], middle[1], phi, low)
-        # The share of the segment at each node, and its derivative with respect to phi.
-        rows[0, i], rows[1, i], rows[2, i], rows[3, i] = phi, low, 1.0, 0.0
-        if kind == TURN_TURN:
-            s, s_low, c, c_low = sine_and_cosine(0.5 * phi, 0.5 * low)
-            rows[0, i], rows[1, i] = multiply(s, s_low, s, s_low)
-            rows[2, i], rows[3, i] = multiply(s, s_low, c, c_low)
-        elif kind == FROM_TURN:
-            rows[0, i], rows[1, i] = multiply(phi, low, phi, low)
-            rows[2, i], rows[3, i] = 2.0 * phi, 2.0 * low
+    fill_shares(kind, middle, reach, nodes, rows)
     fill_places(n, start, width, rows, 0, work[place : place + ROW])
     call_interpreter(address, operations, parts[0], parts[1], work, n)
     metric = work[ds : ds + ROW]

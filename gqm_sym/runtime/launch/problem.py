@@ -6,6 +6,14 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.double_double.making import TruePieces
+from gqm_sym.runtime.charts.double_double.panel_rates import (
+    CURVE_BEGIN,
+    CURVE_END,
+    LAUNCH_PLACE,
+    PLACE,
+    TURNING_POINT,
+    ChartRates,
+)
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
 from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.double_double.tapes import bind as bind_tape
@@ -18,6 +26,7 @@ from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.rounded import RoundedProblem
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
 from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
 
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
@@ -107,13 +116,7 @@ class Problem:
     @property
     def true_pieces(self) -> TruePieces | None:
         """A charted curve in double-double arithmetic; None if the curve is known in doubles only."""
-        maker, p = self.formulas.chart, self.p
-        if maker is None or not isinstance(self.formulas.exact, ExactPotential):
-            return None
-        if p.true_pieces is None:
-            chart = self.formulas.charted(p)
-            p.true_pieces = true_pieces_of(maker, p, chart) or False
-        return p.true_pieces or None
+        return pieces_of(self.formulas, self.p)
 
     @property
     def arc_origin(self) -> float:
@@ -157,6 +160,37 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
     return p.tape or None
 
 
+def pieces_of(formulas: "Formulas", p: "ParameterValues") -> TruePieces | None:
+    """Return a charted curve in double-double arithmetic; None if the curve is known in doubles only."""
+    maker = formulas.chart
+    if maker is None or not isinstance(formulas.exact, ExactPotential):
+        return None
+    if p.true_pieces is None:
+        p.true_pieces = true_pieces_of(maker, p, formulas.charted(p)) or False
+    return p.true_pieces or None
+
+
+def _rates_along(
+    formulas: "Formulas", p: "ParameterValues", launch: "Launch", kind: int, ends: tuple[float, float]
+) -> ChartRates | None:
+    """Return the integrands of a segment along a charted curve (`ExactProblem.along_chart`)."""
+    pieces, tape, lam0 = pieces_of(formulas, p), tape_of(formulas, p), launch.lam0
+    if pieces is None or tape is None:
+        return None
+    chart, whats = formulas.charted(p), [PLACE, PLACE]
+    for i in range(2):
+        is_turn = kind == TURN_TURN or (kind == FROM_TURN and i == 0)
+        if ends[i] == lam0.value and not (is_turn and launch.v0.value):
+            whats[i] = LAUNCH_PLACE
+        elif is_turn:
+            whats[i] = TURNING_POINT
+        elif not chart.period and ends[i] in (chart.edges[0], chart.edges[-1]):
+            whats[i] = CURVE_BEGIN if ends[i] == chart.edges[0] else CURVE_END
+    given = (lam0, launch.v0, launch.point), kind, ends, (whats[0], whats[1]), formulas.offset(p)
+    rates = ChartRates(pieces, tape, *given)
+    return rates if rates.is_known else None
+
+
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
     """Return the problem of one launch in extended precision; None if the curve is known in doubles only."""
     exact, maker = formulas.exact, formulas.chart
@@ -168,5 +202,6 @@ def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") 
         if maker.is_exact(chart):
             given = formulas.radius(p), (launch.lam0, launch.point)
             along = partial(ChartTrack, maker, chart, exact.effective_potential, *given)
-            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0, lambda: None)
+            rates = partial(_rates_along, formulas, p, launch)
+            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0, lambda: None, rates)
     return None

@@ -33,7 +33,7 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 from gqm_sym.runtime.motion.segments.kinds import between_turns, from_cusp, from_turn, through
 from gqm_sym.runtime.motion.segments.segment import Segment
-from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
+from gqm_sym.runtime.multiprecision.exact_panels import lay_exactly, rates_between
 from gqm_sym.runtime.quadrature.substitution import REGULAR
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 
@@ -346,8 +346,9 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
         motion._add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
     # So slow a launch is next to another equilibrium, and its place is needed as exactly as it was given.
-    scale = f.exact.at(DIGITS)
-    panels, speed_terms = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
+    joints = ((f.between(f.breaks, lam0, middle) - lam0) / (middle - lam0)).tolist()
+    rates, _ = rates_between(f.exact, REGULAR, (lam0, middle), (None, None), joints)
+    panels, speed_terms = lay_exactly(rates, 1.0)
     slow = Segment(
         functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels, speed_terms=speed_terms
     )

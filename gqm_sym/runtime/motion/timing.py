@@ -218,7 +218,7 @@ def in_double_double(
     is_thrown, lam0 = kind == "libration" and problem.w0 > 0.0, problem.launch.lam0
     if problem.formulas.chart is not None:
         inner = segment.edges[1:-1] if not is_smooth else NOWHERE
-        passage = passage_of(problem, kind, direction, offsets) if not segment.from_multiprecision else None
+        passage = passage_of(problem, kind, direction, offsets)
         orbit = None if passage is None else passage.orbit
         rows = None if passage is None or orbit is None else passage.times_at(inner, is_thrown=is_thrown)
         if passage is None or orbit is None or rows is None:

@@ -5,7 +5,9 @@ The panels are those of `time_panels`, but the integrands at their nodes are acc
 in double-double arithmetic, or with mpmath if too many of its digits cancel.
 """
 
-from typing import Any
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -67,17 +69,60 @@ def exact_ends(
     return out[0], out[1]
 
 
-class _Rates:
+@cache
+def _mpmath_context() -> Any:
+    from mpmath.ctx_mp import MPContext
+
+    context = MPContext()
+    context.dps = DIGITS
+    return context
+
+
+class Rates(Protocol):
     """The integrands of time and arc length, and the speed, at the nodes of panels of one segment, accurate to the last
     bit.
+
+    Attributes
+    ----------
+    kind : int
+        The segment's kind (`substitution`), which is not TO_EQUILIBRIUM.
+    context : mpmath.MPContext
+        The arithmetic of the phase angles.
+    places : (float, float)
+        The segment's ends, each the double nearest to it.
+    joints : sequence
+        The phase angles at which panels must begin.
+    """
+
+    kind: int
+    context: Any
+    places: tuple[float, float]
+    joints: Sequence[Any]
+
+    def __call__(self, middle: Any, reach: Any) -> Array:
+        """Return rows of dt/dphi, ds/dphi and the regular factor of the speed, as `panel_rates`."""
+
+
+class ExactRates:
+    """The integrands of a segment between two ends that are known in extended precision; see `Rates`.
+
+    Parameters
+    ----------
+    exact : ExactProblem
+        The launch.
+    kind : int
+        The segment's kind.
+    ends : pair
+        Its ends, from `exact_ends`.
     """
 
     def __init__(self, exact: ExactProblem, kind: int, ends: tuple[Any, Any]) -> None:
         self.scale, self.kind, self.ends = exact.at(DIGITS), kind, ends
+        self.context, self.places = self.scale.context, (float(ends[0]), float(ends[1]))
+        self.joints = self.scale.phase_angles(kind, *ends, self.scale.track.joints(*ends) or ())
         self.launch, self.tape = (exact.lam0, exact.v0), exact.tape()
         self.segment = two_doubles(ends[0]), two_doubles(ends[1] - ends[0])
-        has_joints = bool(self.scale.track.joints(*ends))
-        self.slow = None if self.tape is None or has_joints else SlowRates(self.scale, kind, ends)
+        self.slow = None if self.tape is None or len(self.joints) else SlowRates(self.scale, kind, ends)
 
     def __call__(self, middle: Any, reach: Any) -> Array:
         """Return rows of dt/dphi, ds/dphi and the regular factor of the speed, as `panel_rates`."""
@@ -108,20 +153,56 @@ class _Rates:
         return values
 
 
+class _RatesAlongChart:
+    """The integrands along a charted curve in double-double arithmetic, or by mpmath where that does not suffice."""
+
+    def __init__(
+        self, exact: ExactProblem, kind: int, known: tuple[tuple[float, float], tuple[Any, Any]], along: Any, joints: Any
+    ) -> None:
+        self.kind, self.context, self.places, self.joints = kind, _mpmath_context(), along.ends, joints
+        self._exact, self._known, self._along = exact, known, along
+
+    def __call__(self, middle: Any, reach: Any) -> Array:
+        values: Array | None = self._along(two_doubles(middle), two_doubles(reach), ALL_NODES)
+        return self._precise(middle, reach) if values is None else values
+
+    @cached_property
+    def _precise(self) -> ExactRates:
+        (a, b), ends = self._known
+        return ExactRates(self._exact, self.kind, exact_ends(self._exact, DIGITS, self.kind, a, b, ends))
+
+
+def rates_between(
+    exact: ExactProblem, kind: int, places: tuple[float, float], ends: tuple[Any, Any], joints: Sequence[float]
+) -> tuple[Rates, tuple[Any, Any]]:
+    """Return the integrands of a segment, and its ends as far as they are known in extended precision.
+
+    Parameters
+    ----------
+    exact, kind
+        As for `ExactRates`.
+    places : (float, float)
+        The ends of the segment as doubles.
+    ends : pair
+        Its ends in extended precision, or None for each that is not known.
+    joints : sequence of float
+        The phase angles of the edges of a charted curve's pieces.
+    """
+    along = exact.along_chart(kind, places) if ends == (None, None) else None
+    if along is not None:
+        return _RatesAlongChart(exact, kind, (places, ends), along, joints), ends
+    ends = exact_ends(exact, DIGITS, kind, *places, ends)
+    return ExactRates(exact, kind, ends), ends
+
+
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium")
-def lay_exactly(
-    exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float, *, starts_at_cusp: bool = False
-) -> tuple[Panels, Array]:
+def lay_exactly(rates: Rates, stop: float, *, starts_at_cusp: bool = False) -> tuple[Panels, Array]:
     """Lay panels over a segment in extended precision.
 
     Parameters
     ----------
-    exact : ExactProblem
-        The launch.
-    kind : int
-        The segment's kind (`substitution`), which is not TO_EQUILIBRIUM.
-    ends : pair
-        Its ends, from `exact_ends`.
+    rates : Rates
+        The integrands of the segment.
     stop : float
         Its last phase angle.
     starts_at_cusp : bool
@@ -139,23 +220,22 @@ def lay_exactly(
     SolutionError
         If V**2 is not positive inside the segment, or changes so often there that panels do not resolve it.
     """
-    scale, rates_on = exact.at(DIGITS), _Rates(exact, kind, ends)
+    context, kind = rates.context, rates.kind
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
     all_terms = []
     # The last phase angle is pi itself and not its nearest double, because near a barrier the body takes a long time
     # for the difference.
-    end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
-    joints = scale.phase_angles(kind, *ends, scale.track.joints(*ends) or ())
-    pending = [stop, *reversed([phi for phi in joints if 0 < phi < stop])]
+    end = context.pi if kind == TURN_TURN else context.mpf(stop)
+    pending = [stop, *reversed([phi for phi in rates.joints if 0 < phi < stop])]
     left, error, status, max_panels = 0.0, 0.0, CONVERGED, MAX_PANELS + len(pending)
     while pending:
         right = pending[-1]
         # The nodes are not rounded to doubles, because the rounding would be visible as noise next to a peak of width
         # 1e-6.
-        high = end if right == stop else scale.mpf(right)
+        high = end if right == stop else context.mpf(right)
         reach, middle = (high - left) / 2, (high + left) / 2
-        half, values = float(reach), rates_on(middle, reach)
+        half, values = float(reach), rates(middle, reach)
         if starts_at_cusp:
             values[2] /= float(middle) + half * ALL_NODES
         series, terms = np.empty(DEGREE + 1), np.empty((3, DEGREE))
@@ -173,7 +253,7 @@ def lay_exactly(
         if not resolved and half > 2.0**-50 * right:
             if len(edges) + len(pending) >= max_panels:
                 raise SolutionError(
-                    f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: is not resolved by {MAX_PANELS} "
+                    f"time of flight from {rates.places[0]!r} to {rates.places[1]!r}: is not resolved by {MAX_PANELS} "
                     "panels; launch so that the body passes fewer hills and dips"
                 )
             pending.append((left + right) / 2)

@@ -75,6 +75,10 @@ class ExactProblem:
     tape : callable
         A function that returns the formulas for double-double arithmetic; None for charted curves, and if they are too
         long.
+    along_chart : callable
+        A function of the kind of a segment (`quadrature.substitution`) and its ends as doubles. It returns the
+        segment's integrands along a charted curve in double-double arithmetic; None for formulas, and if such
+        arithmetic does not suffice.
     """
 
     track: TrackMaker
@@ -83,6 +87,7 @@ class ExactProblem:
     lam0: Number
     v0: Number
     tape: Callable[[], BoundTape | None]
+    along_chart: Callable[[int, tuple[float, float]], Any] = lambda kind, ends: None
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":

@@ -12,7 +12,7 @@ from paths import ROOT
 import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.loading import load
-from gqm_sym.runtime.multiprecision.exact_panels import ALL_NODES, DIGITS, _Rates, exact_ends
+from gqm_sym.runtime.multiprecision.exact_panels import ALL_NODES, DIGITS, ExactRates, exact_ends
 from gqm_sym.runtime.multiprecision.gauss_legendre import legendre_rule
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 
@@ -85,7 +85,7 @@ def test_the_integrands_where_the_body_is_slow(
     problem = module_of("circle").solve(lam0, v0, L=1, g=9.81).problem
     exact = problem.functions.exact
     known = exact_ends(exact, DIGITS, kind, *ends, (None, None))
-    rates, scale = _Rates(exact, kind, known), exact.at(DIGITS)
+    rates, scale = ExactRates(exact, kind, known), exact.at(DIGITS)
     assert rates.slow is not None
     begin = scale.context.pi / 2 if kind == REGULAR else scale.mpf(0)
     for size in (1e-9, 1e-7, 1e-5):

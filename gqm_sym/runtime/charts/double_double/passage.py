@@ -4,6 +4,7 @@ orbit.
 
 from functools import cached_property
 from math import nan
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -134,7 +135,7 @@ class ChartPassage:
         self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int, offset: Pair = ZERO
     ) -> None:
         self._pieces, self.found, self._direction = pieces, found, direction
-        self._given = pieces.curve._replace(offset=offset), *formulas.operands, found
+        self._given: Any = pieces.curve._replace(offset=offset), *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
         """Return the times to stops, with errors (`fill_passage`)."""
@@ -201,6 +202,39 @@ class ChartPassage:
         return None if np.isnan(times).any() else times[:-1]
 
 
+def begin_orbit(
+    pieces: TruePieces,
+    formulas: BoundTape,
+    launch: tuple[Number, Number, tuple[Number, Number] | None],
+    ends: tuple[float, float],
+    direction: int,
+    offset: Pair = ZERO,
+) -> tuple[Any, ...] | None:
+    """Make the pieces of an orbit, and find its launch, its energy level and the turning points of a libration.
+
+    The parameters are those of `pass_along`.
+
+    Returns
+    -------
+    (curve, tape, work, p, found) or None
+        The arguments of `locate` with its result; None if the orbit is too many laps away from the start.
+    """
+    lam0, v0, point = launch
+    begin, count = pieces.begin, len(pieces.curve.counts)
+    numbers = [begin, *map(pieces.number_of, (lam0.value, *ends))]
+    if max(numbers) - min(numbers) > MAX_LAPS * count:
+        return None
+    pieces.make(min(numbers) - 1, max(numbers) + 1)
+    x, z = point or (lam0, lam0)
+    length = plus(pieces.start_length, (lam0.value, lam0.low))
+    place = *length, v0.value, v0.low, float(point is not None), x.value, x.low, z.value, z.low
+    found = np.full((ROWS, COLUMNS), nan)
+    found[LAUNCH, 3] = pieces.doubt + UNIT * max(abs(x.value), abs(z.value))
+    given: Any = pieces.curve._replace(offset=offset), *formulas.operands
+    locate(*given, place, (*ends, float(direction != 0)), begin, found)
+    return *given, found
+
+
 def pass_along(
     pieces: TruePieces,
     formulas: BoundTape,
@@ -226,20 +260,11 @@ def pass_along(
     offset : pair of float
         The distance of the body's path to the left of the curve.
     """
-    lam0, v0, point = launch
-    begin, count = pieces.begin, len(pieces.curve.counts)
-    numbers = [begin, *map(pieces.number_of, (lam0.value, *ends))]
-    if max(numbers) - min(numbers) > MAX_LAPS * count:
+    given = begin_orbit(pieces, formulas, launch, ends, direction, offset)
+    if given is None:
         return None
-    pieces.make(min(numbers) - 1, max(numbers) + 1)
-    x, z = point or (lam0, lam0)
-    length = plus(pieces.start_length, (lam0.value, lam0.low))
-    given = *length, v0.value, v0.low, float(point is not None), x.value, x.low, z.value, z.low
-    found = np.full((ROWS, COLUMNS), nan)
-    found[LAUNCH, 3] = pieces.doubt + UNIT * max(abs(x.value), abs(z.value))
+    lam0, found = launch[0], given[-1]
     passage = ChartPassage(pieces, formulas, found, direction, offset)
-    curve, tape, work, p, _ = passage._given
-    locate(curve, tape, work, p, given, (*ends, float(direction != 0)), begin, found)
     if direction == 0:
         (behind, ahead), enough = passage.offsets, MAX_MISMATCH * (ends[1] - ends[0])
         if not (abs(behind - lam0.value + ends[0]) <= enough and abs(ahead - ends[1] + lam0.value) <= enough):

@@ -12,7 +12,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion.table import build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.segments.conditioning import launch_condition_number, v2_correction
-from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
+from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly, rates_between
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
 from gqm_sym.runtime.quadrature.regular_factors import regular_factors
 from gqm_sym.runtime.quadrature.running_totals import running_totals
@@ -146,11 +146,10 @@ class Segment:
             or (self.kind == FROM_TURN and self._is_short(MIN_TIMED_WIDTH_SHARE))
         )
         if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
-            self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
-            self.a, self.b = float(self.ends[0]), float(self.ends[1])
-            self.stored_panels, self.speed_terms = lay_exactly(
-                f.exact, self.kind, self.ends, self.stop, starts_at_cusp=self._starts_at_cusp
-            )
+            places, joints = (self.a, self.b), self._initial_edges().tolist()
+            rates, self.ends = rates_between(f.exact, self.kind, places, self.ends, joints)
+            self.a, self.b = rates.places
+            self.stored_panels, self.speed_terms = lay_exactly(rates, self.stop, starts_at_cusp=self._starts_at_cusp)
             self._from_multiprecision = True
         if self.stored_panels[7] == ILL_CONDITIONED:
             raise SolutionError(

@@ -1,0 +1,232 @@
+"""The integrands over panels of phase angles along a chart in double-double arithmetic.
+
+They are those of `double_double.panel_rates`, for a segment between two places of a chart.
+"""
+
+from math import fabs, nan, sqrt
+
+import numpy as np
+from numba import types
+
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
+from gqm_sym.runtime.charts.double_double.making import TruePieces
+from gqm_sym.runtime.charts.double_double.offset_path import fill_path
+from gqm_sym.runtime.charts.double_double.passage import begin_orbit
+from gqm_sym.runtime.charts.double_double.pieces import (
+    TRUE_CURVE,
+    arc_between,
+    arc_on,
+    fill_points,
+    place_at,
+    squared_rate,
+    stacked_places,
+    stacked_points,
+    unshared,
+)
+from gqm_sym.runtime.charts.double_double.potential import Path, fill_registers
+from gqm_sym.runtime.charts.double_double.turning_points import LAUNCH, LEVEL, LOWER, UPPER, arc_from, find_turn
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import borrowed
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply, square_root
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, call_interpreter
+from gqm_sym.runtime.double_double.nodes import RULE
+from gqm_sym.runtime.double_double.panel_rates import GROWTHS, MAX_RATE_ERROR, PAIR, fill_shares
+from gqm_sym.runtime.double_double.quadrature import TAPE, fill_parameters
+from gqm_sym.runtime.double_double.recording import BoundTape
+
+# What an end of a segment is: a place, a turning point, the launch place, or the beginning or the end of an open curve.
+# Neither of the last three need be a double.
+PLACE, TURNING_POINT, LAUNCH_PLACE, CURVE_BEGIN, CURVE_END = 0.0, 1.0, 2.0, 3.0, 4.0
+
+# Rows of the array that `find_ends` fills, two doubles each: the arc length from the left edge of the piece on which
+# the segment begins to its beginning; its width, which is negative for a motion backwards; and the arc lengths from the
+# left edge of the starting piece to both of its ends.
+BASE, WIDTH, FIRST, LAST = range(4)
+
+
+@entry(
+    types.void(
+        TRUE_CURVE, TAPE, VECTOR, MATRIX, types.UniTuple(PAIR, 2), types.UniTuple(REAL, 2), INTEGER, MATRIX, MATRIX
+    ),
+    checked=False,
+)
+def find_ends(curve, tape, work, p, ends, whats, start, found, spans):  # type: ignore[no-untyped-def]
+    """Find the ends of a segment; they are NaN if a turning point is not found.
+
+    Parameters
+    ----------
+    curve, tape, work, p, start
+        As for `turning_points.locate`.
+    ends : two pairs of float
+        The arc lengths of both ends from the left edge of the piece ``start``; those of turning points are guesses.
+    whats : two floats
+        What they are, from PLACE to CURVE_END.
+    found : (ROWS, COLUMNS) array
+        The launch and the energy level, from `locate`. The ends are filled in the rows LOWER, which is that of the
+        beginning, and UPPER.
+    spans : (4, 2) array
+        Filled.
+    """
+    curve, work, found, spans = unshared(curve), borrowed(work), borrowed(found), borrowed(spans)
+    address, operations, parts, registers = tape
+    tape = (address, borrowed(operations), parts, registers)
+    fill_parameters(tape, borrowed(p), work)
+    path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
+    for i, row in ((0, LOWER), (1, UPPER)):
+        number, place = int(found[LAUNCH, 0]), (found[LAUNCH, 1], found[LAUNCH, 2])
+        if whats[i] == CURVE_BEGIN:
+            number, place = 0, (-1.0, 0.0)
+        elif whats[i] == CURVE_END:
+            number, place = curve.counts.shape[0] - 1, (1.0, 0.0)
+        elif whats[i] != LAUNCH_PLACE:
+            number, place = place_at(curve, start, ends[i])
+        if whats[i] == TURNING_POINT:
+            inward = 1 if ends[1 - i][0] > ends[i][0] else -1
+            turn, _, _ = find_turn(path, number, place, inward)
+            number, place = turn[0], (turn[1], turn[2])
+        found[row, 0], found[row, 1], found[row, 2] = number, place[0], place[1]
+        spans[FIRST + i, 0], spans[FIRST + i, 1] = arc_from(curve, start, number, place)
+    first, last = int(found[LOWER, 0]), int(found[UPPER, 0])
+    a, b = (found[LOWER, 1], found[LOWER, 2]), (found[UPPER, 1], found[UPPER, 2])
+    (spans[BASE, 0], spans[BASE, 1]), _ = arc_on(curve, first, (-1.0, 0.0), a)
+    if last > first or (last == first and b[0] >= a[0]):
+        width, _ = arc_between(curve, first, a, last, b)
+    else:
+        back, _ = arc_between(curve, last, b, first, a)
+        width = -back[0], -back[1]
+    spans[WIDTH, 0], spans[WIDTH, 1] = width
+
+
+@Inner
+def rate_at(path, number, place):  # type: ignore[no-untyped-def]
+    """Return V**2 and ds/dlam at a place on a piece, two doubles each, and a bound on the error of V**2.
+
+    The curve parameter lam is the arc length of the curve, and ds that of the body's path.
+    """
+    curve, tape, work, level = path
+    address, operations, parts, registers = tape
+    u, points = stacked_places(), stacked_points()
+    u[0], u[RULE] = place
+    error, _ = fill_path(curve, number, 1, u, points)
+    fill_registers(curve, tape, work, 1, points, error)
+    call_interpreter(address, operations, parts[0], parts[1], work, 1)
+    value = registers[2]
+    half, half_low = add(level[0], level[1], -work[value], -work[value + LOW])
+    metric, metric_low = 1.0, 0.0
+    if curve.offset[0] != 0.0:
+        s, s_low = squared_rate(curve, points, 0)
+        fill_points(curve, number, 1, u, points)
+        t, t_low = squared_rate(curve, points, 0)
+        metric, metric_low = divide(s, s_low, t, t_low)
+        metric, metric_low = square_root(metric, metric_low)
+    return (2.0 * half, 2.0 * half_low), (metric, metric_low), 2.0 * (level[2] + level[3] + work[value + ERROR])
+
+
+@entry(
+    types.boolean(
+        TRUE_CURVE, TAPE, VECTOR, MATRIX, MATRIX, MATRIX, INTEGER, types.UniTuple(PAIR, 2), VECTOR, MATRIX
+    ),
+    checked=False,
+)
+def fill_rates(curve, tape, work, p, found, spans, kind, panel, nodes, out):  # type: ignore[no-untyped-def]
+    """Fill the rows of ``out`` with dt/dphi, ds/dphi and the regular factor of the speed at the nodes of a panel.
+
+    Parameters
+    ----------
+    curve, tape, work, p, found, spans
+        As for `find_ends`.
+    kind, panel, nodes
+        As for `double_double.panel_rates.fill_rates`, without the first two pairs.
+
+    Returns
+    -------
+    bool
+        Whether the errors are small enough at all nodes, and V**2 is positive there.
+    """
+    curve, work, found, spans = unshared(curve), borrowed(work), borrowed(found), borrowed(spans)
+    nodes, out = borrowed(nodes), borrowed(out)
+    address, operations, parts, registers = tape
+    tape = (address, borrowed(operations), parts, registers)
+    fill_parameters(tape, borrowed(p), work)
+    path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
+    first, base, width = int(found[LOWER, 0]), (spans[BASE, 0], spans[BASE, 1]), (spans[WIDTH, 0], spans[WIDTH, 1])
+    n, rows = nodes.size, np.empty((4, nodes.size))
+    fill_shares(kind, panel[0], panel[1], nodes, rows)
+    for i in range(n):
+        ahead, ahead_low = multiply(rows[0, i], rows[1, i], width[0], width[1])
+        number, place = place_at(curve, first, add(base[0], base[1], ahead, ahead_low))
+        square, metric, error = rate_at(path, number, place)
+        if not 0.5 * error <= MAX_RATE_ERROR * square[0]:
+            return False
+        speed, speed_low = square_root(square[0], square[1])
+        length, low = multiply(rows[2, i], rows[3, i], metric[0], metric[1])
+        length, low = multiply(length, low, width[0], width[1])
+        time, _ = divide(length, low, speed, speed_low)
+        factor, _ = divide(speed, speed_low, rows[2, i], rows[3, i])
+        out[0, i], out[1, i], out[2, i] = fabs(time), fabs(length), GROWTHS[kind] * factor
+    return True
+
+
+class ChartRates:
+    """The integrands at the nodes of panels of one segment of a chart.
+
+    Parameters
+    ----------
+    pieces : TruePieces
+        The curve.
+    formulas : BoundTape
+        The effective potential as a function of the plane.
+    launch : (Number, Number, (Number, Number) or None)
+        As for `passage.pass_along`.
+    kind : int
+        The segment's kind (`quadrature.substitution`).
+    ends : (float, float)
+        Its ends as doubles.
+    whats : (float, float)
+        What they are, from PLACE to CURVE_END.
+    offset : pair of float
+        The distance of the body's path to the left of the curve.
+
+    Attributes
+    ----------
+    is_known : bool
+        Whether both ends were found.
+    ends : (float, float)
+        The ends, each the double nearest to it.
+    """
+
+    def __init__(
+        self,
+        pieces: TruePieces,
+        formulas: BoundTape,
+        launch: tuple[Number, Number, tuple[Number, Number] | None],
+        kind: int,
+        ends: tuple[float, float],
+        whats: tuple[float, float],
+        offset: Pair = ZERO,
+    ) -> None:
+        self._kind, self._spans, self.is_known = kind, np.full((4, 2), nan), False
+        given = begin_orbit(pieces, formulas, launch, ends, 1, offset)
+        if given is None:
+            return
+        arcs = plus(pieces.start_length, (ends[0], 0.0)), plus(pieces.start_length, (ends[1], 0.0))
+        find_ends(*given[:-1], arcs, whats, pieces.begin, given[-1], self._spans)
+        self._given, self.is_known = (*given, self._spans), bool(np.isfinite(self._spans).all())
+        found = [minus(self._spans[row].tolist(), pieces.start_length)[0] for row in (FIRST, LAST)]
+        self.ends = tuple(at if what == TURNING_POINT else end for end, what, at in zip(ends, whats, found, strict=True))
+
+    def __call__(self, middle: Pair, reach: Pair, nodes: Array) -> Array | None:
+        """Return dt/dphi in s, ds/dphi in m and the regular factor of the speed in m/s at the nodes of a panel; None
+        if the errors are too large.
+
+        Parameters
+        ----------
+        middle, reach : pair of float
+            The phase angle in the middle of the panel, and the angle from there to its end.
+        nodes : (n,) array
+            Nodes between -1 and 1.
+        """
+        out = np.empty((3, nodes.size))
+        return out if fill_rates(*self._given, self._kind, (middle, reach), nodes, out) else None
