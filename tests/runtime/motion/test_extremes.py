@@ -12,7 +12,6 @@ import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import Motion
-from gqm_sym.runtime.motion import extremes
 
 NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
 
@@ -254,18 +253,6 @@ def test_a_load_that_falls_up_to_a_joint(mu: float, tmp_path: Path) -> None:
     assert found.value == pytest.approx(least, rel=4e-14)
     assert found.lam == line + length
     assert module.sweep("normal_force_min", [0.0], v0, 1).values[0] == pytest.approx(found.value, rel=1e-14)
-
-
-@pytest.mark.parametrize("width", [0.0, 2.0**-53, 2.0**-50, 2.0**-46, 1e-3])
-def test_a_peak_is_sought_between_its_neighbours_only(width: float) -> None:
-    """On a panel of the width of a few roundings, polynomials mean nothing beside it."""
-    low, high = 1.0 - width, 1.0
-
-    def values(places: np.ndarray) -> np.ndarray:
-        assert np.all((places >= low) & (places <= high))
-        return places
-
-    assert extremes._peak(values, low, high, high) >= high - 2.0 * 2.0**-52
 
 
 @pytest.fixture(scope="module")
