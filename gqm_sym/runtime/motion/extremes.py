@@ -210,13 +210,15 @@ def _on_segment(
     ):
         values[at_cusp] = copysign(np.inf, values[at_cusp])
     size = size_of(values)
-    for k in _peaks(values, size)[:MAX_PEAKS]:
+    if least > -np.inf and not _may_reach(values, least):
+        return size, sorted(found, key=lambda peak: peak.t)
+    in_time = np.arange(phi.size) if stop > start else np.arange(phi.size)[::-1]
+    for k in in_time[_peaks(values[in_time], size)[:MAX_PEAKS]].tolist():
         if values[k] == np.inf:
             found.append(_extreme_at(timed, trajectory, stop, sign * np.inf))
             continue
         first, last = max(k - 1, 0), min(k + 1, phi.size - 1)
-        value = float(values[k])
-        if value + MAX_EXCESS * (value - min(float(values[first]), float(values[last]))) < least:
+        if least > -np.inf and not _may_reach(values[first : last + 1], least):
             continue
         angle = peak_between(signed, float(phi[first]), float(phi[k]), float(phi[last]))
         if np.abs(joints - angle).min(initial=np.inf) < END_SHARE * (high - low):
@@ -263,9 +265,17 @@ def _limits_at_joints(
     ]
 
 
+def _may_reach(values: Array, least: float) -> bool:
+    """Return whether a quantity may reach a value beside one of its samples."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    with np.errstate(invalid="ignore"):  # infinite values
+        reach = values + MAX_EXCESS * (values - np.minimum(padded[:-2], padded[2:]))
+    return bool((reach >= least).any())
+
+
 def _peaks(values: Array, size: float) -> list[int]:
-    """Return the indices of samples that no neighbour exceeds, the largest first; of samples side by side that are
-    equal within rounding, at most the first and the largest.
+    """Return the indices of samples in the order of time that no neighbour exceeds, the largest first; of samples side
+    by side that are equal within rounding, at most the first and the largest.
     """
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:])).tolist()

@@ -1,5 +1,6 @@
 """Extremes of speed and of the contact force, their times and places agree with closed forms and dense samples."""
 
+from importlib import import_module
 from math import cos, pi, sin, sqrt
 from pathlib import Path
 from types import ModuleType
@@ -299,3 +300,14 @@ def test_the_speed_on_a_level_line(stadium: ModuleType, v0: float) -> None:
     least, largest = motion.v_min.value, motion.v_max.value
     assert least <= v0 <= largest
     assert (least, largest) == pytest.approx((v0, v0), rel=1e-13)
+
+
+@pytest.mark.parametrize(("place", "speed"), [(-0.5, 0.0), (0.875, 0.34), (-0.4, 4.4)])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_constant_force_is_extreme_at_the_launch(place: float, speed: float, direction: int) -> None:
+    """A contact force that is constant has its largest and its least value at the launch, where it is first reached,
+    whichever way the body moves.
+    """
+    motion = import_module("generated.line_spring").solve(place, speed, direction)
+    for found in (motion.normal_force_max, motion.normal_force_min):
+        assert found == (pytest.approx(2.704, rel=1e-15), 0.0, place)

@@ -82,6 +82,8 @@ def peak_between(function: Callable[[Array], Array], low: float, middle: float, 
         return middle
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     values = function(centre + half * NODES)
+    if values.max() - values.min() <= 2.0 * ULP * size_of(values):
+        return middle  # the function is constant
     beside = min(BESIDE_JOINT * max(abs(low), abs(high)), half)
     candidates = [low + beside, high - beside, low, middle, high]
     if np.isfinite(values).all():
