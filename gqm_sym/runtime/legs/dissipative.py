@@ -28,13 +28,13 @@ from gqm_sym.runtime.legs.variations.answers import (
     places_at,
     points_by_record,
     points_of,
-    states_at,
+    sensitivities_at,
     turning_points,
 )
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.at_rest import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.locking import computed_once, locked
+from gqm_sym.runtime.motion.locking import computed_once, kept, locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.parts.tabulated import times_from_launch
@@ -103,7 +103,7 @@ class DissipativeMotion(FollowedMotion):
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property
-    @locked
+    @kept
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
@@ -142,16 +142,15 @@ class DissipativeMotion(FollowedMotion):
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found = states_at(self._changes, points)
-        fields = (getattr(found, name) for name in Sensitivity._fields[1:])
-        return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+        found = sensitivities_at(self._changes, points, list(rows.values()))
+        return Sensitivity(tuple(rows), *found.reshape(len(found), len(rows), *shape))
 
     @locked
-    def place_changes(self, t: Any, wrt: Any) -> Array:
+    def place_changes(self, t: Any, wrt: Any = None) -> Array:
         """Return the derivatives of the curve parameter at given times; see `Motion.place_changes`."""
         rows = selected(self.problem.formulas.parameters, wrt)
         points, shape = self._march_points(t)
-        found: Array = places_at(self, self._changes, points)[list(rows.values())].reshape(len(rows), *shape)
+        found = places_at(self, self._changes, points, list(rows.values())).reshape(len(rows), *shape)
         self._check_known("sensitivity", rows, found)
         return found
 

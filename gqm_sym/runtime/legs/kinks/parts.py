@@ -40,7 +40,7 @@ from gqm_sym.runtime.legs.panels.equation import (
     product,
     solution_row,
 )
-from gqm_sym.runtime.legs.panels.point import point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.point import SMOOTH_AT_REST, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.panels.resolution import CANCELLATION_NOISE
 from gqm_sym.runtime.legs.runs.branch_points import branch_beside
@@ -65,7 +65,7 @@ from gqm_sym.runtime.legs.runs.whole_rows import (
     size_of_row,
     whole_buffer,
 )
-from gqm_sym.runtime.legs.runs.whole_tables import MAX_BLOCKS, to_arrival_time, to_means
+from gqm_sym.runtime.legs.runs.whole_tables import IN_SHARE, MAX_BLOCKS, to_arrival_time, to_means
 
 # The least ratio of V**2 between two parts to the largest so far. A rounding of the latter has an effect on the time
 # that grows with the root of its inverse.
@@ -331,7 +331,7 @@ def try_next(march, kinks, variable, blocks, branch, ratio, work):  # type: igno
         branch = branch_beside(march, h, work)
         if variable_for(branch, march.origin, march.direction, h).extent > 0.0:
             return 1, branch
-    more = blocks_for(ratio, blocks, variable.extent > 0.0)
+    more = blocks_for(ratio, blocks, variable.extent > 0.0, IN_SHARE)
     for k in range(blocks, more):
         kinks[k] = min(h, kinks[k]) if kinks[k] > 0.0 else h
     if more == 0:
@@ -366,7 +366,7 @@ def run_past_kinks(forces, start, branch, route, expected, record):  # type: ign
         nu = sign_of_load(forces, start.place, 0.0, point_buffer())
     part = PartStart((start.place, start.place_low), 0.0, False, 0.0, 0.0, 0.0, 0.0, reading.best)
     work, blocks, rest = whole_buffer(), 0, expected if expected > 0.0 else inf
-    choose_variable(0.0, work)
+    choose_variable(SMOOTH_AT_REST, 0.0, work)
     for _ in range(MAX_TRIES if nu != 0 and nu != -route.only_sign else 0):
         march, panel = March(part.place, v, 0.0, 1.0), Panel(0.0, part.v2, nu, (-inf, inf))
         place, room, stop = stop_ahead(start, route, part, rest)

@@ -29,6 +29,7 @@ from gqm_sym.runtime.legs.runs.branch_points import NOT_TRIED, Attempt, carry_v2
 from gqm_sym.runtime.legs.runs.ends import END_NONE, END_PAUSE, End
 from gqm_sym.runtime.legs.runs.whole_rows import (
     FROM_TURN,
+    GRADE,
     HAS_KINKS,
     NO_KINKS,
     are_rows_resolved,
@@ -87,18 +88,18 @@ def is_resolved(forces, march, panel, blocks, variable, kinks, work):  # type: i
     fine, ratio = are_rows_resolved(blocks, h, work)
     load_fine, is_kept, load_ratio = load_sign(is_stretched, blocks, panel.contact_sign, work)
     if not (fine and load_fine):
-        return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched), ratio
+        return False, blocks_for(max(ratio, load_ratio), blocks, is_stretched, work[GRADE]), ratio
     noise = CANCELLATION_NOISE * size_of_row(blocks, work, FORCE)
     if not (is_kept and keeps_sign(blocks, work, W_FACTOR, 1, noise)):
         return False, 0, 1.0
     if not (curve_fine and bends_one_way):
-        return False, blocks_for(curve_ratio, blocks, is_stretched), curve_ratio
+        return False, blocks_for(curve_ratio, blocks, is_stretched, work[GRADE]), curve_ratio
     fine, ratio = fill_times(blocks, h, work)
-    return fine, blocks_for(ratio, blocks, is_stretched), ratio
+    return fine, blocks_for(ratio, blocks, is_stretched, work[GRADE]), ratio
 
 
 @Inner
-def run_to_target(forces, start, branch, slope_at_rest, route, off, record):  # type: ignore[no-untyped-def]
+def run_to_target(forces, start, branch, rest, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from a turn to the place whose passage is to be found, if it passes it fast on one polynomial.
 
     Parameters and Returns are those of `whole_leg.run_whole`; the end, if there is one, has the code END_PAUSE.
@@ -114,7 +115,7 @@ def run_to_target(forces, start, branch, slope_at_rest, route, off, record):  # 
             nu = sign_of_load(forces, start.place, 0.0, point_buffer())
         work, panel, blocks = whole_buffer(), Panel(0.0, 0.0, nu, span), 1 if nu != 0 and nu != -route.only_sign else 0
         attempt = first_attempt(blocks, branch, march, h)
-        choose_variable(slope_at_rest * h, work)
+        choose_variable(rest, h, work)
         begin_leg(1, work)
         while attempt.blocks > 0:
             blocks, variable = attempt.blocks, attempt.variable
